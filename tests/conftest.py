@@ -8,6 +8,7 @@ from tests.rigs.files import machine
 from tests.rigs.forwarder import changed_rig, rig
 
 __all__ = ["changed_rig", "machine", "rig"]
+pytest_plugins = ["tests.budget", "pytester"]
 
 # No time limit per example: machines are noisy. On a build machine the examples are the same every
 # time, so that a red run can be repeated; elsewhere every run tries new ones.

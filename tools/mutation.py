@@ -1,8 +1,8 @@
 """Mutation run: change the code in small ways, one at a time, and see whether a test notices.
 
     tools/mutation.py                     every module of the coverage gate, group by group
-    tools/mutation.py core                what runs in `make test`: state machine and output limits,
-                                          without the survivors that are explained
+    tools/mutation.py core                part of `make test-all`: state machine and output
+                                          limits, without the survivors that are explained
     tools/mutation.py shaping PATTERN     mutants by name, such as '*fir*zv_taps*'
     tools/mutation.py -j1 daemon          so many at a time, here one; two without it
     tools/mutation.py --new machine       without the survivors that are explained: each needs every
@@ -81,7 +81,7 @@ do_not_mutate = {GATE["omit"]}
 also_copy = {COPIED[1:]}
 pytest_add_cli_args_test_selection = {tests}
 pytest_add_cli_args = [
-    "-m", "not long and not processes", "--hypothesis-profile=mutants", "-p", "no:cacheprovider",
+    "-m", "not slow and not processes", "--hypothesis-profile=mutants", "-p", "no:cacheprovider",
     "-p", "no:unraisableexception",  # collects garbage at the end of every run
 ]
 timeout_multiplier = 2.0

@@ -4,9 +4,10 @@
     tools/quick.py BASE     what differs from BASE
     tools/quick.py --all    every room of the daemon, for `make versions`
 
-Tests marked `long` or `processes` are left out, and few examples are made. Two run side by side.
+Tests marked `slow` or `processes` are left out, and few examples are made.
 """
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -24,9 +25,9 @@ TESTS = {
     "tools": ["packaging"],
     "sim": ["sim"],
 }
-# They take minutes, or another kernel: make test, make test-machines.
+# They take minutes, or another kernel: make test-all.
 NOT_QUICK = {"faults", "fuzz", "hil", "hostile", "lane", "soak", "systemd", "studio"}
-OPTIONS = ["-q", "-m", "not long and not processes", "--hypothesis-profile=few"]
+OPTIONS = ["-q", "-m", "not slow and not processes", "--hypothesis-profile=few"]
 
 
 def changed(base: str) -> list[Path]:
@@ -55,33 +56,19 @@ def tests_of(file: Path) -> list[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the tests in two processes; the status of the first that fails."""
+    """Run the tests, side by side on every processor; return pytest's status."""
     if arguments == ["--all"]:
         chosen = set(DAEMON)
     else:
         chosen = {test for file in changed(*arguments or ["main"]) for test in tests_of(file)}
     chosen = {
         t for t in chosen if t.split("/")[0] not in NOT_QUICK and (ROOT / "tests" / t).exists()
-    }
-    print("tests of", *sorted(chosen | {"golden"}), flush=True)
-    files: list[Path] = []
-    for test in chosen | {"golden"}:
-        path = ROOT / "tests" / test
-        files += sorted(path.rglob("test_*.py")) if path.is_dir() else [path]
-    files = sorted(set(files), key=lambda file: -file.stat().st_size)
-    halves = [[str(file.relative_to(ROOT)) for file in files[half::2]] for half in (0, 1)]
-    pytest = [sys.executable, "-m", "pytest", *OPTIONS]
-    running = [
-        subprocess.Popen([*pytest, *half], cwd=ROOT, stdout=subprocess.PIPE, text=True)
-        for half in halves
-        if half
-    ]
-    status = 0
-    for one in running:
-        out, _ = one.communicate()
-        print(out, end="")
-        status = status or one.returncode
-    return status
+    } | {"golden"}
+    print("tests of", *sorted(chosen), flush=True)
+    paths = [f"tests/{test}" for test in sorted(chosen)]
+    spread = ["-n", str(len(os.sched_getaffinity(0))), "--dist", "worksteal"]
+    command = [sys.executable, "-m", "pytest", *OPTIONS, *spread, *paths]
+    return subprocess.run(command, cwd=ROOT, check=False).returncode
 
 
 if __name__ == "__main__":

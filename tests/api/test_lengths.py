@@ -19,6 +19,7 @@ def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef, *, verb: bool) ->
     return function.end_lineno - function.lineno + 1  # type: ignore[operator]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tree", TREES)
 def test_no_function_is_longer_than_a_screen(tree: str) -> None:
     long = []

@@ -97,6 +97,7 @@ SAYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", sorted(SAYS))
 def test_examples_run(example: str, tmp_path: Path) -> None:
     path = ROOT / "examples" / example

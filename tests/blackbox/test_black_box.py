@@ -66,6 +66,7 @@ def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path)
     assert about["identity"] == load_deployment(tmp_path / "machine.yaml").identity.lines()
 
 
+@pytest.mark.slow
 def test_with_other_files_its_joysticks_drive_them(box: Path, tmp_path: Path) -> None:
     text = replayed(box, "--config", "forwarder-robust.yaml", "--out", tmp_path / "out")
     assert "those of a clock: the black box is of other files" in text
@@ -103,6 +104,7 @@ def test_a_folder_that_cannot_be_written_costs_one_line(
     assert log() == [f"black-box=not-written folder={folder} No such file or directory"]
 
 
+@pytest.mark.slow
 def test_many_trips_make_a_file_a_minute_and_the_oldest_go(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
 ) -> None:
@@ -120,6 +122,7 @@ def test_many_trips_make_a_file_a_minute_and_the_oldest_go(
         replayed(folder / name, "--verify", "--out", tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_it_reaches_a_minute_back_and_not_much_further(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +240,7 @@ def test_one_that_is_cut_off_is_played_up_to_there_or_reported(
     assert "the file is cut off" in text if part > 0.01 else "expected " in text
 
 
+@pytest.mark.slow
 def test_a_byte_that_is_another_is_reported(box: Path, tmp_path: Path) -> None:
     path = inside(box, tmp_path)
     whole = path.read_bytes()

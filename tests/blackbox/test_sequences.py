@@ -41,6 +41,7 @@ def kept(name: str, seed: int) -> list[tuple[bytes, bytes]]:
     return [box for one in made for box in one.boxes]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_played_is_the_same(name: str, tmp_path: Path) -> None:
     seen: Counter[str] = Counter()

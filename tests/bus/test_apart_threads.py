@@ -209,6 +209,7 @@ def test_a_frame_and_what_is_raised_come_in_their_order(bus: BusApart, held: Hel
     assert str(frames[1]) == "garbled"
 
 
+@pytest.mark.slow
 def test_a_backlog_is_bounded(held: Held) -> None:
     held.waiting = [message(n % 256) for n in range(MOST_RECEIVED + 10)]
     bus = BusApart(held)  # type: ignore[arg-type]

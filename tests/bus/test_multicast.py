@@ -73,6 +73,7 @@ def test_without_its_loopback_interface_a_bus_says_so_and_leaks_nothing(
     assert caplog.messages == []
 
 
+@pytest.mark.slow
 @pytest.mark.processes
 @pytest.mark.parametrize("shared", [False, True])
 def test_nothing_leaves_this_machine_and_nothing_comes_in(shared: bool) -> None:

@@ -33,6 +33,7 @@ def rows(folder: Path) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["seed"])
 
 
+@pytest.mark.slow
 def test_drives_are_summed_up_and_kept(tmp_path: Path) -> None:
     report = tmp_path.with_suffix(".html")
     arguments = ("-n", "24", "--processes", "1", "--out", str(tmp_path), "--report", str(report))
@@ -52,6 +53,7 @@ def test_drives_are_summed_up_and_kept(tmp_path: Path) -> None:
     assert worst[0] == max(sound, key=lambda row: row["residual_deg"])["seed"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "code", "text"),
     [(90, 0, "kept"), (0.001, 1, "EXCEEDED"), ("p99", 1, "NOT SHOWN")],
@@ -65,6 +67,7 @@ def test_the_limits_of_the_file_decide(tmp_path: Path, limit: Any, code: int, te
     assert f": {text}" in done.output
 
 
+@pytest.mark.slow
 def test_shares_make_the_same_drives_as_one_campaign(tmp_path: Path) -> None:
     whole = ("-n", "7", "--processes", "1")
     assert campaign(PLAIN, *whole, "--out", str(tmp_path / "whole")).exit_code == 0
@@ -90,6 +93,7 @@ def test_it_goes_on_where_it_was_and_never_by_mistake(tmp_path: Path) -> None:
     assert [path.stat().st_mtime_ns for path in parts(tmp_path)][:1] == before
 
 
+@pytest.mark.slow
 def test_two_files_meet_the_same_drives(tmp_path: Path) -> None:
     other = str(CONFIG / "forwarder-robust.yaml")
     arguments = ("-n", "12", "--processes", "1", "--out", str(tmp_path))
@@ -158,6 +162,7 @@ def test_an_out_that_is_a_file_is_reported(tmp_path: Path) -> None:
     assert (done.exit_code, done.output) == (2, f"{tmp_path / 'out'}: File exists\n")
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = Processes.run
 
@@ -179,6 +184,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert [row["seed"] for row in rows(tmp_path)] == [*range(60)]
 
 
+@pytest.mark.slow
 def test_the_worst_drive_can_be_looked_at(tmp_path: Path) -> None:
     campaign(PLAIN, "-n", "3", "--processes", "1", "--out", str(tmp_path / "drives"))
     row = rows(tmp_path / "drives")[2]
@@ -189,6 +195,7 @@ def test_the_worst_drive_can_be_looked_at(tmp_path: Path) -> None:
     assert shaped["peak_deg"] == pytest.approx(row["peak_deg"], abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_drive_of_the_second_file_is_looked_at_with_the_ranges_of_the_first(
     tmp_path: Path,
 ) -> None:

@@ -97,6 +97,7 @@ def source() -> Source:
     return Source.of(deployment, deployment.config.uncertainty)
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_loses_no_drive_and_none_counts_twice(
     nodes: Nodes, tmp_path: Path
 ) -> None:
@@ -120,6 +121,7 @@ def test_a_worker_that_is_killed_loses_no_drive_and_none_counts_twice(
     assert {name: column[::20] for name, column in columns.items()} == expected
 
 
+@pytest.mark.slow
 def test_a_worker_of_another_version_is_reported_and_the_rest_goes_on(
     nodes: Nodes, tmp_path: Path
 ) -> None:
@@ -135,6 +137,7 @@ def test_a_worker_of_another_version_is_reported_and_the_rest_goes_on(
     assert store.columns()["seed"] == [*range(48)]
 
 
+@pytest.mark.slow
 def test_only_workers_of_another_version_end_the_campaign(nodes: Nodes, tmp_path: Path) -> None:
     copy = another_version(tmp_path / "other")
     nodes.worker(cwd=copy)

@@ -21,6 +21,7 @@ def demo(out: Path, *arguments: str, code: int = 0) -> tuple[str, Any]:
     return result.output, json.loads(report.read_text()) if report.exists() else None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", SHIPPED, ids=[file.stem for file in SHIPPED])
 def test_every_shipped_deployment_drives_its_own_axes_together(file: Path, tmp_path: Path) -> None:
     text, report = demo(tmp_path, str(file))
@@ -33,6 +34,7 @@ def test_every_shipped_deployment_drives_its_own_axes_together(file: Path, tmp_p
     assert (tmp_path / "demo.png").stat().st_size > 50_000
 
 
+@pytest.mark.slow
 def test_without_a_file_it_is_the_recommended_deployment_with_its_price(tmp_path: Path) -> None:
     text, report = demo(tmp_path)
     assert report["deployment"] == "forwarder-robust.yaml"
@@ -50,6 +52,7 @@ def test_without_a_file_it_is_the_recommended_deployment_with_its_price(tmp_path
         )
 
 
+@pytest.mark.slow
 def test_with_a_sensor_a_wrong_length_costs_little(tmp_path: Path) -> None:
     longer = ("--set", "grapple.l2_m=1.5")
     left = [demo(tmp_path, *one, *longer)[1] for one in ((), ("--sensor",))]
@@ -60,6 +63,7 @@ def test_with_a_sensor_a_wrong_length_costs_little(tmp_path: Path) -> None:
     assert "--sensor: expected without FILE, got forwarder.yaml" in text
 
 
+@pytest.mark.slow
 def test_readme_shows_what_the_demo_prints(tmp_path: Path) -> None:
     text, _ = demo(tmp_path)
     printed = [line.rstrip() for line in text.splitlines()]
@@ -70,6 +74,7 @@ def test_readme_shows_what_the_demo_prints(tmp_path: Path) -> None:
     assert list(filter(None, block.splitlines())) == list(filter(None, printed[first : last + 1]))
 
 
+@pytest.mark.slow
 def test_one_of_several_cranes_is_driven(tmp_path: Path) -> None:
     first, _ = demo(tmp_path, "two-cranes.yaml", "--script", "pulse-slew")
     assert "Crane: front (of front, rear)" in first

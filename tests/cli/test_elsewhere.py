@@ -53,6 +53,7 @@ def called(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, text=True, capture_output=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "answer"),
     [
@@ -72,6 +73,7 @@ def test_desk_work_runs_on_any_system(line: str, answer: str, tmp_path: Path) ->
     assert answer in done.stdout
 
 
+@pytest.mark.slow
 def test_what_is_found_is_written_on_any_system(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
@@ -81,6 +83,7 @@ def test_what_is_found_is_written_on_any_system(tmp_path: Path) -> None:
     assert load_deployment(file).axes["near_far"].config.filter.kind == "robust"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", sorted(LINUX_ONLY))
 def test_what_needs_linux_says_so(verb: str) -> None:
     done = called(verb, "config/forwarder.yaml")
@@ -91,6 +94,7 @@ def test_what_needs_linux_says_so(verb: str) -> None:
     assert called(verb, "--help").returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", ["--shadow", "--channel vcan0", "--interface socketcan"])
 def test_a_studio_with_a_bus_needs_linux(options: str) -> None:
     done = called("studio", "forwarder.yaml", *options.split())
@@ -119,6 +123,7 @@ def studio(file: str) -> Iterator[Page]:
         process.wait()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["forwarder-robust.yaml", "j1939-forwarder.yaml"])
 def test_the_studio_drives_its_simulated_cranes_on_any_system(file: str) -> None:
     """Both cranes move and stop, the shaped one swings less, and a slider changes a filter."""
@@ -140,6 +145,7 @@ def test_the_studio_drives_its_simulated_cranes_on_any_system(file: str) -> None
         assert not page.refused
 
 
+@pytest.mark.slow
 def test_a_first_deployment_of_eds_files_is_written_on_any_system(tmp_path: Path) -> None:
     for name, objects in (("joystick", JOYSTICK), ("valve", VALVE)):
         write(tmp_path / f"{name}.eds", objects)
@@ -154,6 +160,7 @@ def test_a_first_deployment_of_eds_files_is_written_on_any_system(tmp_path: Path
     assert load_deployment(file).axes["slew"].config.filter.kind == "robust"
 
 
+@pytest.mark.slow
 def test_a_bus_of_linux_is_an_error_of_one_line() -> None:
     done = called("sim", "config/forwarder.yaml")
     text = "bus crane: cannot open socketcan channel vcan0: it needs Linux, got darwin"

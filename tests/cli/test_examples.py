@@ -61,6 +61,7 @@ SOON = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", SOON)
 def test_an_example_of_desk_work_runs_as_it_is_pasted(tmp_path: Path, example: str) -> None:
     (tmp_path / "config").symlink_to(ROOT / "config")

@@ -66,6 +66,7 @@ def logs(out: Path) -> dict[str, Any]:
     return {f"{log['machine']}/{Path(log['log']).name}": log for log in rows}
 
 
+@pytest.mark.slow
 def test_every_log_is_replayed_through_both_and_a_bad_one_is_reported(
     fleet: Path, tmp_path: Path
 ) -> None:
@@ -89,6 +90,7 @@ def test_every_log_is_replayed_through_both_and_a_bad_one_is_reported(
     assert by_log["south/monday.log"]["rows"] == by_log["north/monday.log"]["rows"]
 
 
+@pytest.mark.slow
 def test_a_log_of_a_folder_says_the_same_as_alone(fleet: Path, tmp_path: Path) -> None:
     run("replay", str(fleet), "--config", ROBUST, "--out", str(tmp_path / "all"))
     one = fleet / "north" / "monday.log"
@@ -102,6 +104,7 @@ def test_a_log_of_a_folder_says_the_same_as_alone(fleet: Path, tmp_path: Path) -
         assert row["stops"] == alone[row["axis"]]["stops"]
 
 
+@pytest.mark.slow
 def test_periods_of_all_machines_and_where_one_has_drifted(fleet: Path, tmp_path: Path) -> None:
     done = run("identify", str(fleet), "--file", PLAIN, "--out", str(tmp_path))
     assert done.exit_code == 1  # one cannot be read
@@ -121,6 +124,7 @@ def test_a_folder_without_logs_is_reported(verb: tuple[str, str], tmp_path: Path
     assert (done.exit_code, done.output) == (2, text)
 
 
+@pytest.mark.slow
 def test_a_log_that_is_cut_off_is_reported_as_it_is_alone(fleet: Path, tmp_path: Path) -> None:
     whole = gzip.compress((fleet / "north" / "monday.log").read_bytes())
     (tmp_path / "logs").mkdir()
@@ -132,6 +136,7 @@ def test_a_log_that_is_cut_off_is_reported_as_it_is_alone(fleet: Path, tmp_path:
         assert re.search(r"note: cut\.log\.gz: .*: the log is cut off", done.output)
 
 
+@pytest.mark.slow
 def test_every_row_names_its_axis_on_a_narrow_terminal(fleet: Path, tmp_path: Path) -> None:
     arguments = ["replay", str(fleet / "north"), "--config", PLAIN, "--out", str(tmp_path)]
     done = CliRunner().invoke(app, [*arguments, "--processes", "1"], env={"COLUMNS": "50"})
@@ -143,6 +148,7 @@ def test_every_row_names_its_axis_on_a_narrow_terminal(fleet: Path, tmp_path: Pa
     assert max(map(len, lines[:-1])) <= 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -163,6 +169,7 @@ def test_what_says_nothing_of_many_logs_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_the_report_of_a_fleet_says_which_file_it_is_of(fleet: Path, tmp_path: Path) -> None:
     report = tmp_path / "fleet.html"
     arguments = ("--config", PLAIN, "--out", str(tmp_path), "--report", str(report))
@@ -170,6 +177,7 @@ def test_the_report_of_a_fleet_says_which_file_it_is_of(fleet: Path, tmp_path: P
     assert load_deployment(Path(PLAIN)).identity.lines()[0] in report.read_text()
 
 
+@pytest.mark.slow
 def test_a_part_that_the_log_does_not_have_is_reported(fleet: Path, tmp_path: Path) -> None:
     log = str(fleet / "north" / "monday.log")
     done = CliRunner().invoke(

@@ -19,6 +19,7 @@ def python(code: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_the_daemon_imports_nothing_heavy() -> None:
     code = f"""
 import sys
@@ -77,6 +78,7 @@ def test_without_the_tools_a_verb_says_what_to_install(
     assert (done.returncode, done.stdout, done.stderr) == (2, "", text)
 
 
+@pytest.mark.slow
 def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> None:
     arguments = ("demo", "--lockstep", "--script", "pulse-near_far")
     done = without(("casadi", "matplotlib", "numpy", "scipy"), tmp_path, *arguments)
@@ -85,6 +87,7 @@ def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.rglob("*.*")] == ["report.json"]
 
 
+@pytest.mark.slow
 def test_without_the_tools_a_first_deployment_has_the_filters_to_begin_with(
     tmp_path: Path,
 ) -> None:

@@ -36,6 +36,7 @@ def test_enter_throughout_gives_a_machine_with_what_was_found(tmp_path: Path) ->
     assert f"canshaper check {file}" in result.output
 
 
+@pytest.mark.slow
 def test_messages_of_can_fd_make_the_bus_one(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     arguments = ["init", str(file), "--dbc", str(ROOT / "dbc" / "canfd.dbc")]
@@ -61,6 +62,7 @@ def test_messages_that_cannot_be_used_are_shown_and_left_out(tmp_path: Path) -> 
     load_deployment(file)
 
 
+@pytest.mark.slow
 def test_sway_sensors_are_offered_and_watched_first(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     across, along = "GrappleSway.SwayPerpendicular", "GrappleSway.SwayParallel"
@@ -146,6 +148,7 @@ def test_a_crane_that_no_axis_turns_has_no_motion(tmp_path: Path) -> None:
     assert (config.axes["slew"].slewing, config.motion) == (None, {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", ["2.2", "85.7"])
 @pytest.mark.parametrize("channel", ["5", "true", "x'y", "a:b", "1e3", "größe"])
 def test_every_answer_that_is_accepted_makes_a_good_file(
@@ -186,6 +189,7 @@ def test_axes_and_switches_can_be_left_out(tmp_path: Path) -> None:
     assert config.joysticks["joystick_left"].reset is None
 
 
+@pytest.mark.slow
 def test_answers_out_of_a_file_give_the_same_machine_as_typed_ones(tmp_path: Path) -> None:
     typed, filed = tmp_path / "typed", tmp_path / "filed"
     typed.mkdir()

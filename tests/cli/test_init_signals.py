@@ -142,6 +142,7 @@ def test_a_message_with_too_few_steps_or_the_switch_of_a_joystick_is_no_valve(
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.slow
 def test_one_enter_takes_the_whole_proposal(tmp_path: Path) -> None:
     """It is shown first, and gives the machine of Enter for each question."""
     whole, each = tmp_path / "whole.yaml", tmp_path / "each.yaml"

@@ -110,6 +110,7 @@ def test_a_table_of_the_terminal_becomes_one_of_the_page() -> None:
     assert '<td>&lt;slew&gt;</td><td class="right">1.5</td><td>██</td>' in text
 
 
+@pytest.mark.slow
 def test_report_of_a_demo(tmp_path: Path) -> None:
     report, picture = tmp_path / "report.html", tmp_path / "demo.svg"
     words = ["demo", "--lockstep", "--out", str(tmp_path), "--report", str(report)]
@@ -123,6 +124,7 @@ def test_report_of_a_demo(tmp_path: Path) -> None:
     assert picture.read_text(encoding="utf-8").startswith("<?xml")
 
 
+@pytest.mark.slow
 def test_robust_as_json_and_as_a_report(tmp_path: Path) -> None:
     words = ["robust", str(FORWARDER), "--axis", "near_far"]
     done = CliRunner().invoke(app, [*words, "--json", "--report", str(tmp_path / "r.html")])

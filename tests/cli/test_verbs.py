@@ -129,6 +129,7 @@ def test_the_daemon_does_not_load_asammdf_through_python_can(tmp_path: Path) -> 
     assert subprocess.run(load, check=False, env=environment).returncode == 99
 
 
+@pytest.mark.slow
 def test_the_work_would_be_seen() -> None:
     assert {"cantools", "pydantic", "rich", "yaml"} <= loaded_by("check", "forwarder.yaml")
 

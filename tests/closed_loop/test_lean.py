@@ -20,6 +20,7 @@ from tests.faults.shipped import NAMES
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_valves_and_crane_do_the_same_whether_anybody_listens(
     name: str, monkeypatch: pytest.MonkeyPatch

@@ -103,6 +103,7 @@ def tilt_deg(recording: Recording) -> list[float]:
     return [math.hypot(a, b) for a, b in zip(slew, near_far, strict=True)]
 
 
+@pytest.mark.slow
 def test_both_joysticks_at_once_leave_little_swing_whatever_the_timing() -> None:
     deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
     apart = dataclasses.replace(deployment, motions={})
@@ -135,6 +136,7 @@ def test_a_reversal_brakes_along_the_filter(
     assert max(tilt) < peak_deg
 
 
+@pytest.mark.slow
 def test_slew_moves_itself_back_a_little_with_its_joystick_in_neutral() -> None:
     """The added part outlives the run-on of a short press; the figure of docs/safety.md."""
     deployment = load_deployment(FILE.with_name("forwarder-sensor.yaml"))
@@ -162,6 +164,7 @@ def restless_slewing(seed: int) -> Script:
     return Script("restless", tuple(strokes), 30.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path_m", [0.02, 0.05])
 @pytest.mark.parametrize("name", ["forwarder-sensor", "forwarder-robust"])
 def test_near_far_is_moved_no_farther_than_check_says(

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
@@ -105,6 +107,7 @@ def test_every_drive_is_bit_identical() -> None:
     assert drive(deployment, script) == drive(deployment, script)
 
 
+@pytest.mark.slow
 def test_demo_command_in_lock_step_writes_table_picture_and_report(tmp_path: Path) -> None:
     command = [
         sys.executable,

@@ -110,6 +110,7 @@ def test_it_is_trusted_and_damps_with_a_length_that_is_30_percent_wrong(
     assert damped.swing_deg < 1.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length_pct", [0.0, 30.0])
 def test_the_shortest_fusion_that_check_takes_damps_and_a_short_one_would_not(
     tmp_path: Path, length_pct: float

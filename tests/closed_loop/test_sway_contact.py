@@ -68,7 +68,7 @@ def test_a_grapple_that_leans_on_something_hardly_changes_the_travel(
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @KINDS
 @pytest.mark.parametrize("contact", [still, Dragged])
 def test_contact_with_twelve_seeds_of_noise(sensor: Setup, contact: Holding) -> None:

@@ -12,6 +12,7 @@ from tests.closed_loop.sensor_drives import ENCODER, GYRO, KINDS, PLAIN, residua
 from tests.rigs.sensed import LENGTH_M, MODE, SCRIPTS, TICK_S, Setup
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("setup", "within_15_deg", "within_30_deg"),
     [
@@ -40,7 +41,7 @@ def test_a_wrong_length_leaves_a_sixth_of_the_swing(
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("setup", "within_15_deg", "within_30_deg", "at_start_deg"),
     [(ENCODER, 0.6, 1.5, 0.4), (GYRO, 0.65, 1.6, 0.4), (replace(ENCODER, every=5), 0.8, 1.8, 0.5)],
@@ -91,6 +92,7 @@ def test_another_load_is_damped() -> None:
     assert replace(ENCODER, length_m=1.6).drive("pulse").residual_deg < 1.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", [0.05, 0.15])
 def test_the_lag_of_the_valve_may_be_wrong(lag_s: float) -> None:
     assert max(residuals(replace(ENCODER, lag_s=lag_s), (-30, 0, 30)).values()) < 1.5
@@ -103,7 +105,7 @@ LAGS |= {0.15: (1.05, 1.4), 0.2: (1.9, 2.4)}
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", LAGS)
 def test_what_a_wrong_lag_costs_by_length(lag_s: float) -> None:
     """With the right length a valve 25 ms slower is worse than no sensor: docs/sensor.md."""
@@ -120,7 +122,7 @@ def test_what_a_wrong_lag_costs_by_length(lag_s: float) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @KINDS
 @pytest.mark.parametrize("lag_s", [0.05, 0.15])
 def test_what_a_wrong_lag_and_a_wrong_length_cost_together(sensor: Setup, lag_s: float) -> None:

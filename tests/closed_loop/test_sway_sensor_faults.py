@@ -38,6 +38,7 @@ def faults(sensor: Setup, fault: str, times_s: list[float], seeds: int = 1) -> t
     return beyond, worst - open_worst
 
 
+@pytest.mark.slow
 @KINDS
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_leaves_little_more_than_no_sensor(sensor: Setup, fault: str) -> None:
@@ -48,7 +49,7 @@ def test_a_fault_leaves_little_more_than_no_sensor(sensor: Setup, fault: str) ->
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @KINDS
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_at_any_instant(sensor: Setup, fault: str) -> None:
@@ -89,6 +90,7 @@ def beyond_no_sensor(
     return beyond, path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", Measured)
 def test_a_long_log_whose_second_swing_is_known(measured: Measured) -> None:
     beyond, path = beyond_no_sensor(measured, (8.0,), 1.0)
@@ -100,7 +102,7 @@ def test_a_long_log_whose_second_swing_is_known(measured: Measured) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", Measured)
 @pytest.mark.parametrize("share", [None, 0.8, 1.0, 1.2])
 def test_every_long_log(measured: Measured, share: float | None) -> None:
@@ -110,7 +112,7 @@ def test_every_long_log(measured: Measured, share: float | None) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @KINDS
 def test_what_a_second_swing_that_is_not_there_costs(sensor: Setup) -> None:
     two_modes = replace(sensor, second_s=0.63)

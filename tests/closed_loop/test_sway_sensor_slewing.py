@@ -37,6 +37,7 @@ def tilt_deg(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: fl
     return max(recording.crane.sway_deg[-150:])
 
 
+@pytest.mark.slow
 def test_a_slew_is_damped_in_its_plane(tmp_path: Path) -> None:
     reversal = (Stroke("slew", 0.5, 1.5, 1.0, 0.1), Stroke("slew", 2.0, 1.5, -1.0, 0.1))
     damped, watched = load_deployment(FILE), watching(tmp_path)
@@ -81,7 +82,7 @@ def test_what_slewing_swings_along_the_boom_is_damped(slew: str, tmp_path: Path)
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 def test_twelve_seeds_of_slewing(tmp_path: Path) -> None:
     damped, watched, worst = load_deployment(FILE), watching(tmp_path), {}
     for length_pct in (0.0, -15.0, 15.0, -30.0, 30.0):
@@ -97,6 +98,7 @@ def test_twelve_seeds_of_slewing(tmp_path: Path) -> None:
     assert max(worst.values()) < 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late_s", [-1.2, 0.0, 0.6])
 def test_both_joysticks_at_once_are_better_with_a_wrong_length_and_as_good_with_the_right_one(
     tmp_path: Path, late_s: float

@@ -114,11 +114,12 @@ def test_a_reversal(axis: str, most: float, peak: float) -> None:
     judged(f"reversal {axis}", figures(shipped(), [reversal(axis)]), most, most, peak)
 
 
+@pytest.mark.slow
 def test_both_axes_at_fourteen_timings() -> None:
     judged("14 timings", figures(shipped(), TIMINGS), 0.4, 0.8, 17.0)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "mean"), [("G_FF", 1.5), ("limit-aware ZV", 0.8)])
 def test_other_filters_at_fourteen_timings(tmp_path: Path, kind: str, mean: float) -> None:
     def other(section: dict[str, Any]) -> None:
@@ -131,13 +132,13 @@ def test_other_filters_at_fourteen_timings(tmp_path: Path, kind: str, mean: floa
     judged(f"14 timings, {kind}", figures(machine(tmp_path, other), TIMINGS), mean, 90.0)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_far_out() -> None:
     residuals = figures(shipped(), FAR_OUT, TwinCrane(radius_m=6.8))
     judged("6.8 to 9 m", residuals, 1.8, 1.8)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_twenty_operators(tmp_path: Path) -> None:
     def stops(section: dict[str, Any]) -> None:
         section["limits"]["reversal"] = "stop"
@@ -147,21 +148,21 @@ def test_twenty_operators(tmp_path: Path) -> None:
     judged("20 operators", figures(shipped(), OPERATORS), 0.5, 1.5, 0.65 * stopped[2])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [0.85, 1.15])
 def test_a_length_that_is_wrong(length: float) -> None:
     residuals = figures(shipped(), TIMINGS, TwinCrane(length=length))
     judged(f"length x {length}", residuals, 3.0, 90.0)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", [(0.2, 0.1), (0.1, 0.2)], ids=["slew", "near_far"])
 def test_a_valve_that_is_slow(lag_s: tuple[float, float]) -> None:
     residuals = figures(shipped(), TIMINGS, TwinCrane(lag_s=lag_s))
     judged(f"valves of {lag_s} s", residuals, 1.5, 1.5)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_radius_that_is_lost_in_motion() -> None:
     residuals = figures(shipped(), TIMINGS, TwinCrane(radius_until_s=2.0))
     judged("radius lost after 2 s", residuals, 0.6, 0.6)

@@ -28,6 +28,7 @@ def test_flags_bind(machine: Machine) -> None:
     assert commands == {"Slew": pytest.approx(-0.251), "NearFar": 0.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flags", "says"),
     [

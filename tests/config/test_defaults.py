@@ -133,6 +133,7 @@ def test_any_text_of_yaml_signs_loads_or_says_why(file: Path, text: str) -> None
     loads_or_says_why(file, text.encode())
 
 
+@pytest.mark.slow
 @noise
 @given(
     cuts=st.lists(
@@ -161,6 +162,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @noise
 @given(data=st.data(), value=values)
 def test_any_value_in_any_place_loads_or_says_why(

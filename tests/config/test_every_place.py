@@ -114,6 +114,7 @@ def test_a_wrong_key_in_every_section(tmp_path: Path, schema: type[Section], kin
     assert all(p.message.startswith("expected one of the keys ") for p in problem_at.values())
 
 
+@pytest.mark.slow
 @files
 def test_a_wrong_type_at_every_place(tmp_path: Path, schema: type[Section], kind: str) -> None:
     deepest = max(len(place) for place, _ in places(whole(schema, kind)))

@@ -83,6 +83,7 @@ def machine(directory: Path, window_s: str) -> tuple[Path, int]:
     return file, text[: text.index("moving_average")].count("\n") + 1
 
 
+@pytest.mark.slow
 def test_it_is_in_the_schema_and_in_the_table(packages: Path) -> None:
     schema = json.loads(canshaper(packages, "config-schema").stdout)
     kinds = schema["$defs"]["AxisConfig"]["properties"]["filter"]["discriminator"]["mapping"]
@@ -96,6 +97,7 @@ def test_it_is_in_the_schema_and_in_the_table(packages: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_check_knows_its_parameters(packages: Path, tmp_path: Path) -> None:
     file, line = machine(tmp_path, "2.4")
     done = canshaper(packages, "check", str(file))
@@ -113,6 +115,7 @@ def test_check_knows_its_parameters(packages: Path, tmp_path: Path) -> None:
         assert done.stderr.splitlines()[1:] in ([], ["1 problem"])
 
 
+@pytest.mark.slow
 def test_it_drives_an_axis_and_is_compared(packages: Path, tmp_path: Path) -> None:
     file, _ = machine(tmp_path, "2")
     done = python(packages, "-c", WORK, str(file))
@@ -130,6 +133,7 @@ def test_it_drives_an_axis_and_is_compared(packages: Path, tmp_path: Path) -> No
     assert result["residual_deg"][0] < 2.0  # off leaves 16 degrees
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "says", "verb"),
     [

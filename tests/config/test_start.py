@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from canshaper.config.input import Input
 from canshaper.config.limits import Limits
 from canshaper.config.schema import AxisConfig, DeploymentConfig, Feedback
@@ -18,6 +20,7 @@ load_deployment(deployment_path("forwarder-robust.yaml"))
 """
 
 
+@pytest.mark.slow
 def test_a_start_does_not_read_its_own_source() -> None:
     subprocess.run([sys.executable, "-c", START], check=True)
 

@@ -8,6 +8,7 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
@@ -129,6 +130,7 @@ def left(joystick: int, count: int) -> Frame:
     return Frame("crane", 0x110, False, struct.pack("<hhBBBB", joystick, 0, 1, 0, 0, count))
 
 
+@pytest.mark.slow
 @settings(max_examples=4 * settings().max_examples)
 @given(script=st.lists(steps, max_size=25), armed=st.booleans())
 def test_no_frames_move_a_valve_unasked(
@@ -138,6 +140,7 @@ def test_no_frames_move_a_valve_unasked(
     event("moved" if drive(start + script) else "still")
 
 
+@pytest.mark.slow
 @settings(max_examples=2 * settings().max_examples)
 @given(script=st.lists(st.tuples(st.lists(any_frames), st.just(0), st.just(1)), max_size=60))
 def test_noise_moves_nothing_that_is_not_asked(
@@ -146,6 +149,7 @@ def test_noise_moves_nothing_that_is_not_asked(
     drive(script)
 
 
+@pytest.mark.slow
 @settings(max_examples=2 * settings().max_examples)
 @given(script=st.lists(steps, max_size=25), switch=st.sampled_from([0, 2, 3]))
 def test_nothing_moves_while_no_joystick_is_enabled(

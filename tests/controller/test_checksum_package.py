@@ -114,6 +114,7 @@ IN_SLEW = (
 )
 
 
+@pytest.mark.slow
 def test_a_machine_drives_by_it(installed: Installed) -> None:
     installed.package()
     file = installed.machine("forwarder.yaml", IN_SLEW)
@@ -134,6 +135,7 @@ def test_a_machine_drives_by_it(installed: Installed) -> None:
     assert seen["reason"] == "JOYSTICK_UNTRUSTED"
 
 
+@pytest.mark.slow
 def test_schema_and_table_have_it(installed: Installed) -> None:
     installed.package()
     schema = json.loads(installed.canshaper("config-schema"))
@@ -144,6 +146,7 @@ def test_schema_and_table_have_it(installed: Installed) -> None:
     assert rows[-1].endswith("| no |")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["check", "gateway"])
 def test_the_kernel_is_not_left_alone_with_it(installed: Installed, command: str) -> None:
     installed.package()
@@ -178,6 +181,7 @@ def ours(installed: Installed) -> None:
     installed.package(entry_points=installed.entry_points.replace("crc16_id =", "crc8_sae_j1850 ="))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "kind", "says"),
     [

@@ -117,6 +117,7 @@ def test_an_adapter_that_takes_nothing_holds_neither_the_other_bus_nor_the_end(
     line.close()
 
 
+@pytest.mark.slow
 def test_two_daemons_share_a_bus_of_datagrams(tmp_path: Path) -> None:
     def without(*axes: str) -> Callable[[dict], None]:  # type: ignore[type-arg]
         def change(content: dict) -> None:  # type: ignore[type-arg]

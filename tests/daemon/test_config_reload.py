@@ -136,6 +136,7 @@ def test_a_reader_that_takes_the_memory_is_a_refusal() -> None:
     assert read(load) == "its reader took more than 140 MB"
 
 
+@pytest.mark.slow
 def test_a_reader_that_takes_the_processor_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading_module, "MOST_CPU_S", 1)
 

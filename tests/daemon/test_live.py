@@ -76,6 +76,7 @@ def canshaper(*arguments: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
+@pytest.mark.slow
 def test_set_shows_and_changes_and_a_reload_takes_it_back(daemon: Daemon) -> None:
     file = str(daemon.file)
     status, shown = canshaper("set", file)
@@ -94,6 +95,7 @@ def test_set_shows_and_changes_and_a_reload_takes_it_back(daemon: Daemon) -> Non
     assert table[PERIOD]["now"] == 2.356
 
 
+@pytest.mark.slow
 def test_set_writes_when_asked(daemon: Daemon) -> None:
     """What was measured before is gone, and where it came from."""
     speed, origin = "full_speed_m_s: 1.5", ", origin: { date: 2026-11-23, by: me }"
@@ -105,6 +107,7 @@ def test_set_writes_when_asked(daemon: Daemon) -> None:
     )
 
 
+@pytest.mark.slow
 def test_set_reports_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
     status, reported = canshaper("set", str(daemon.file), f"{PERIOD}=4", "--write")
     assert (status, reported) == (1, f"{PERIOD}: expected 1.8 to 3, got 4\n")
@@ -114,6 +117,7 @@ def test_set_reports_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
     assert (status, reported.splitlines()[0][:23]) == (2, "expected KEY=NUMBER, as")
 
 
+@pytest.mark.slow
 def test_set_without_a_daemon_or_a_section(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path)
     daemon.logged("started file=")
@@ -125,6 +129,7 @@ def test_set_without_a_daemon_or_a_section(tmp_path: Path) -> None:
     assert (status, "has no control section" in reported) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_daemon_whose_socket_cannot_be_says_so_and_runs(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path, "--control", str(tmp_path / "nowhere" / "control.sock"))
     daemon.logged("started file=")
@@ -141,6 +146,7 @@ def test_an_option_without_a_section_is_an_error() -> None:
     )
 
 
+@pytest.mark.slow
 def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> None:
     """Next to another controller on the same bus, whose frames have the ids of our valves."""
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")

@@ -101,6 +101,7 @@ def daemon(tmp_path: Path) -> Iterator[Daemon]:
     started.close()
 
 
+@pytest.mark.slow
 def test_a_good_file_is_a_short_reload(daemon: Daemon) -> None:
     daemon.file.write_text(daemon.text.replace("tick_ms: 20", "tick_ms: 10"), encoding="utf-8")
     daemon.reload()
@@ -138,6 +139,7 @@ def test_a_bus_that_cannot_be_opened_ends_the_reload_as_before(daemon: Daemon) -
     assert daemon.goes_on()
 
 
+@pytest.mark.slow
 def test_the_loop_never_waits_for_files(daemon: Daemon) -> None:
     """A reader that hangs is given up for the next reload, and at the end."""
     slow = daemon.text + "".join(f"key{i}: 1\n" for i in range(9000))  # so that it is caught

@@ -24,6 +24,7 @@ def figures() -> dict[tuple[str, str], dict[str, float]]:
     return {(one["axis"], one["profile"]): one for one in json.loads(output)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["slew", "near_far"])
 def test_quick_stops_sooner_and_fine_swings_less(
     figures: dict[tuple[str, str], dict[str, float]], axis: str
@@ -36,6 +37,7 @@ def test_quick_stops_sooner_and_fine_swings_less(
     assert max(one["residual_deg"] for one in (normal, quick, fine)) < 0.35
 
 
+@pytest.mark.slow
 def test_the_file_has_these_figures(figures: dict[tuple[str, str], dict[str, float]]) -> None:
     text = (ROOT / "config" / "j1939-profiles.yaml").read_text(encoding="utf-8")
     rows = re.findall(r"^#  (\w+), (\w+) +([\d. ]+)$", text, re.MULTILINE)

@@ -100,7 +100,7 @@ def test_every_page_with_commands_is_pasted_or_says_why_not() -> None:
     assert all(counts[page] >= least for page, least in PASTED.items()), counts
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.processes
 @pytest.mark.parametrize("page", PASTED)
 def test_the_commands_of_a_page_run_as_they_are_pasted(page: str, tmp_path: Path) -> None:
@@ -123,6 +123,7 @@ def test_the_commands_of_a_page_run_as_they_are_pasted(page: str, tmp_path: Path
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "command", "shown"), OUTPUTS)
 def test_a_page_shows_what_the_command_prints(
     page: str, command: str, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -67,6 +67,7 @@ def recorded(file: Path, log: Path, change: str) -> None:
     log.write_text("\n".join(rows) + "\n", encoding="ascii")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_guide_leads_to_a_calm_grapple(
     seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

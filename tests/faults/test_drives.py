@@ -14,15 +14,36 @@ from tests.faults.drive import Drive, plan
 from tests.faults.fields import CHECKSUMS
 from tests.faults.inputs import Input
 from tests.faults.judge import Violation
-from tests.faults.liars import LIARS, Honest
+from tests.faults.liars import LIARS, Honest, SecondSenderUnseen, SendFailureUnseen, StopUnseen
 from tests.faults.variants import NAMES, machine
 
 DRIVES = 10_000
 CHUNK = 250
-# So many in every run; the others in ``make test-studies``.
-OFTEN = 2_500
+# So many in ``make test``, in chunks of 20, and with the tests marked slow; the others are a study.
+QUICK, OFTEN = 240, 2_500
+# Seen after many drives.
+RARE = {SecondSenderUnseen, SendFailureUnseen, StopUnseen}
 
 
+def driven(first: int, count: int) -> Counter[str]:
+    """What the drives of these seeds did; fails for wrong moves."""
+    stats: Counter[str] = Counter()
+    wrong = []
+    for seed in range(first, first + count):
+        try:
+            stats += Drive(seed).run()
+        except Violation as violation:
+            wrong.append(str(violation))
+    assert not wrong, f"{len(wrong)} of {count} drives:\n" + "\n".join(wrong[:5])
+    return stats
+
+
+@pytest.mark.parametrize("first", range(0, QUICK, 20))
+def test_no_fault_makes_a_wrong_move(first: int) -> None:
+    assert driven(first, 20)["moves"]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "first",
     [
@@ -30,27 +51,21 @@ OFTEN = 2_500
         *(pytest.param(i, marks=pytest.mark.study) for i in range(OFTEN, DRIVES, CHUNK)),
     ],
 )
-def test_no_fault_makes_a_wrong_move(first: int) -> None:
-    stats: Counter[str] = Counter()
-    wrong = []
-    for seed in range(first, first + CHUNK):
-        try:
-            stats += Drive(seed).run()
-        except Violation as violation:
-            wrong.append(str(violation))
-    assert not wrong, f"{len(wrong)} of {CHUNK} drives:\n" + "\n".join(wrong[:5])
+def test_no_fault_of_many_makes_a_wrong_move(first: int) -> None:
+    stats = driven(first, CHUNK)
     # The drives were drives: things moved, stopped and tripped.
     assert stats["moves"] > 0.15 * stats["frames"]
     assert stats["stops"] > 20
     assert stats["trips"] > 100
 
 
+@pytest.mark.slow
 def test_every_fault_is_among_them_often() -> None:
     kinds: Counter[str] = Counter()
     at_once = 0
     for seed in range(DRIVES):
-        driven, _ = machine(NAMES[seed % len(NAMES)])
-        ticks, faults = plan(driven, random.Random(f"canshaper faults {seed}"))
+        one, _ = machine(NAMES[seed % len(NAMES)])
+        ticks, faults = plan(one, random.Random(f"canshaper faults {seed}"))
         kinds.update(f.kind for f in faults)
         at_once += any(sum(f.active(t) for f in faults) > 1 for t in range(ticks))
     assert kinds.keys() == {*inject.KINDS} - {*inject.SENSOR}  # those machines have no sensors
@@ -58,7 +73,11 @@ def test_every_fault_is_among_them_often() -> None:
     assert at_once > DRIVES / 4
 
 
-@pytest.mark.parametrize("liar", LIARS, ids=lambda liar: liar.__name__)
+@pytest.mark.parametrize(
+    "liar",
+    [pytest.param(one, marks=pytest.mark.slow) if one in RARE else one for one in LIARS],
+    ids=lambda liar: liar.__name__,
+)
 def test_the_judge_catches(liar: type[Honest]) -> None:
     """Each of these does one thing wrong; an honest one in the same drives does nothing wrong."""
     for seed in itertools.count():
@@ -73,8 +92,8 @@ def test_the_judge_catches(liar: type[Honest]) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_bits_are_read_as_cantools_reads_them(name: str) -> None:
     rng = random.Random(name)
-    driven, deployment = machine(name)
-    for source in driven.inputs.values():
+    one, deployment = machine(name)
+    for source in one.inputs.values():
         message = next(
             entry[1]
             for entry in map(deployment.messages.find, _message_names(deployment))

@@ -58,6 +58,7 @@ except ConfigError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -85,6 +86,7 @@ def test_a_length_with_digits_too_many_is_refused(tmp_path: Path, old: str, new:
     assert f"machine.dbc:{line}: " in done.stdout
 
 
+@pytest.mark.slow
 @many
 @given(name=names, change=changes(YAML_WORDS))
 def test_any_change_of_a_deployment_file(
@@ -94,6 +96,7 @@ def test_any_change_of_a_deployment_file(
     event("loaded" if load(changed(yaml, change), dbc) else "refused")
 
 
+@pytest.mark.slow
 @many
 @given(name=names, change=changes(DBC_WORDS))
 def test_any_change_of_a_dbc_file(
@@ -103,6 +106,7 @@ def test_any_change_of_a_dbc_file(
     event("loaded" if load(yaml, changed(dbc, change)) else "refused")
 
 
+@pytest.mark.slow
 @many
 @given(text=st.text(max_size=200) | st.text(alphabet='BO_SGVAL:|@+-()[]"; \n019ab', max_size=200))
 def test_any_text_as_a_dbc_file(load: Load, text: str) -> None:

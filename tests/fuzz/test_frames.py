@@ -3,6 +3,7 @@
 The judge is that of the random drives with faults; here the frames are anything at all.
 """
 
+import pytest
 from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
@@ -36,6 +37,7 @@ moving = bytes([HEALTHY, 0, HEALTHY, 0, HEALTHY, 0]) + bytes([HEALTHY, 90]) * 8
 machines = st.integers(0, len(NAMES) - 1).map(lambda n: bytes([n]))
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(name=machines, armed=st.booleans(), script=st.lists(steps, max_size=60))
 @example(name=b"\0", armed=True, script=[])

@@ -57,6 +57,7 @@ def test_a_joystick_whose_zero_is_in_the_middle(raw: int, command: float) -> Non
     assert bits.command(struct.pack("<H", raw)) == pytest.approx(command)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("raw", "steps"),
     [

@@ -21,7 +21,7 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
 from tests.faults import shipped, variants
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 MOMENTS = 6  # of each kind, on each deployment
 BEGIN_S, MOVE_S, REST_S = 5.0, 8.0, 7.0

@@ -21,13 +21,19 @@ from tests.hil.machine import (
 HERE = Path(__file__).parent
 
 
+# The others take minutes: make test-socketcan-all, test-machines, test-faults.
+IN_MAKE_TEST = ("test_socketcan.py", "test_joystick_moves_valve_and_everything_ends_neutral")
+
+
+@pytest.hookimpl(tryfirst=True)  # before marks select
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    if "CANSHAPER_LANE" in os.environ:
-        return
     skip = pytest.mark.skip(reason="needs SocketCAN: run python -m tests.lane.hil")
     for item in items:
         if HERE in item.path.parents:  # this hook sees the items of all directories
-            item.add_marker(skip)
+            if not {item.path.name, item.name} & {*IN_MAKE_TEST}:
+                item.add_marker(pytest.mark.slow)
+            if "CANSHAPER_LANE" not in os.environ:
+                item.add_marker(skip)
 
 
 @pytest.fixture

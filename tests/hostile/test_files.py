@@ -11,6 +11,7 @@ MOST_MB = 200
 BAD_DEPLOYMENT = 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_it_is_refused(name: str) -> None:
     ran = run(FILES[name])

@@ -11,6 +11,7 @@ MOST_MB = 200
 BAD_LOG = 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_it_is_refused(name: str) -> None:
     ran = run(LOGS[name])

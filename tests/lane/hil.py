@@ -1,8 +1,8 @@
 """``python -m tests.lane.hil [--steady] [pytest arguments]``: tests/hil where SocketCAN exists.
 
-With --steady in a machine whose time does not run while the host is busy: tests that measure time
-hold there whatever else runs. Ends with pytest's status; where no lane can be had, it says why and
-ends with 0.
+With --steady in a machine that has its own time: tests that measure time hold there whatever else
+runs. Ends with pytest's status; where no lane can be had, it says why and
+ends with 77.
 """
 
 import sys

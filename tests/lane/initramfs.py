@@ -101,6 +101,7 @@ def for_run(job: Job, kernel: Kernel, ports: Mapping[str, str]) -> bytes:
     can = can_names(job.kvaser)
     settings = {"MODULES": str(kernel.modules.resolve()), "IP": ip, **ports}
     settings["NEXT"] = "systemd.sh" if job.systemd else "run.sh"
+    settings["NEVER_IDLE"] = "1" if job.steady else ""
     command = 'echo "$$" >/run/lane/pid\n' + job.script("tcg", can)
     files = {
         "settings": "".join(f"{name}={shlex.quote(value)}\n" for name, value in settings.items()),

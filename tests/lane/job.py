@@ -36,7 +36,7 @@ class Job:
     kernel: str = "std"  # or "rt", PREEMPT_RT
     systemd: bool = False  # a real systemd is PID 1, the command a service
     bench: bool = False  # clocks count executed instructions: repeatable latencies
-    steady: bool = False  # the same, but idle time passes as on the host
+    steady: bool = False  # clocks count instructions, and the processor is never idle
     kvaser: int = 2  # emulated controllers; each pair shares one bus
     kernel_args: tuple[str, ...] = ()
     verbose: bool = False

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from . import cli
-from .outcome import NO_LANE, say
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT_S = 3600  # for all tests together, on an emulated processor that shares its core
@@ -16,19 +15,11 @@ KVASER = 4  # two buses: joystick and valves apart
 def run(folder: str, arguments: Sequence[str], options: Sequence[str] = ()) -> int:
     """Run pytest on ``folder``, or on the paths among ``arguments``, in a lane with ``options``.
 
-    Return pytest's status; 0 where no lane can be had.
+    Return pytest's status; NO_LANE where no lane can be had.
     """
     os.chdir(ROOT)
     given = any(Path(word.partition("::")[0]).exists() for word in arguments)
     pytest = [sys.executable, "-m", "pytest", *([] if given else [folder])]
     pytest += ["-p", "no:cacheprovider", *arguments]
     limits = ["--timeout", str(TIMEOUT_S), "--kvaser", str(KVASER)]
-    return verdict(folder, cli.main([*limits, *options, "--", *pytest]))
-
-
-def verdict(folder: str, status: int) -> int:
-    """Return the lane's ``status``; 0, with a word about ``folder``, where no lane can be had."""
-    if status == NO_LANE:
-        say(f"{folder} NOT run, for the reason above")
-        return 0
-    return status
+    return cli.main([*limits, *options, "--", *pytest])

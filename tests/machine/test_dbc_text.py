@@ -85,7 +85,7 @@ def compare(path: Path, names: set[str]) -> None:
 
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(p, marks=pytest.mark.long) if p.name.startswith("j1939") else p for p in FILES],
+    [pytest.param(p, marks=pytest.mark.slow) if p.name.startswith("j1939") else p for p in FILES],
     ids=lambda path: path.name,
 )
 def test_each_message_is_that_of_the_whole_file(path: Path) -> None:

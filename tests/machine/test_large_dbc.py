@@ -20,6 +20,7 @@ def text() -> str:
     return large(COUNT)
 
 
+@pytest.mark.slow
 @pytest.mark.processes
 def test_a_deployment_starts_in_little_memory(text: str) -> None:
     """benchmarks/large_dbc.py shows what cantools takes for all of them."""
@@ -38,6 +39,7 @@ def test_only_its_messages_are_parsed(machine: Machine, text: str) -> None:
     assert (0x0CF00000 + COUNT - 1, True) in messages.ids()
 
 
+@pytest.mark.slow
 def test_a_fault_is_at_its_line(machine: Machine, text: str) -> None:
     machine.dbc = text
     line = machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 1")

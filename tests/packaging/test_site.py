@@ -51,6 +51,7 @@ def opened(context: "BrowserContext", page: Path, faults: list[str]) -> "Page":
     return tab
 
 
+@pytest.mark.slow
 def test_every_page_of_the_repository_is_in_it(site: Path) -> None:
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md"]
     for page in pages:
@@ -58,6 +59,7 @@ def test_every_page_of_the_repository_is_in_it(site: Path) -> None:
         assert (site / page.relative_to(ROOT)).with_name(f"{name}.html").exists(), page
 
 
+@pytest.mark.slow
 def test_the_reference_has_every_public_name_and_every_verb(site: Path) -> None:
     names = (site / "reference.html").read_text(encoding="utf-8")
     for name in canshaper.__all__:
@@ -91,6 +93,7 @@ class Parts(HTMLParser):
             self.scripts.add(re.sub(r"\.\./", "", data))
 
 
+@pytest.mark.slow
 def test_no_page_requests_anything_outside_of_it(offline: "BrowserContext") -> None:
     """All pages by what they name; of those with the same scripts, one in the browser."""
     pages = sorted(SITE.rglob("*.html"))
@@ -114,6 +117,7 @@ def test_no_page_requests_anything_outside_of_it(offline: "BrowserContext") -> N
     assert faults == []
 
 
+@pytest.mark.slow
 def test_search_and_diagram_work_in_files(offline: "BrowserContext") -> None:
     faults: list[str] = []
     tab = opened(offline, SITE / "index.html", faults)
@@ -130,6 +134,7 @@ def test_search_and_diagram_work_in_files(offline: "BrowserContext") -> None:
     assert faults == []
 
 
+@pytest.mark.slow
 def test_broken_links_fail(tmp_path: Path) -> None:
     """In a tree of its own, of the repository's files but one page."""
     for name in ("CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md", "canshaper", "config"):

@@ -40,11 +40,13 @@ def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return hatch(inside, "wheel", tmp_path_factory.mktemp("wheel"))
 
 
+@pytest.mark.slow
 def test_the_tree_gives_the_same_bytes(sdist: Path, wheel: Path, tmp_path: Path) -> None:
     assert hatch(ROOT, "sdist", tmp_path / "sdist").read_bytes() == sdist.read_bytes()
     assert hatch(ROOT, "wheel", tmp_path / "wheel").read_bytes() == wheel.read_bytes()
 
 
+@pytest.mark.slow
 def test_the_wheel_has_pages_manuals_and_licences(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     assert "canshaper/data/site/index.html" in names
@@ -56,6 +58,7 @@ def test_the_wheel_has_pages_manuals_and_licences(wheel: Path) -> None:
     assert all(any(name.endswith(one) for name in licences) for one in of)
 
 
+@pytest.mark.slow
 def test_it_runs_without_the_repository(wheel: Path, tmp_path: Path) -> None:
     """In an empty directory; what it depends on is that of these tests."""
     library, empty = tmp_path / "library", tmp_path / "empty"

@@ -36,6 +36,7 @@ def test_a_log_goes_through_the_controller(tmp_path: Path) -> None:
     assert (tmp_path / "replay.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_new_log_can_be_replayed(tmp_path: Path) -> None:
     """What was sent is in it, and is that of another daemon."""
     again = tmp_path / "again"
@@ -48,6 +49,7 @@ def test_the_new_log_can_be_replayed(tmp_path: Path) -> None:
     assert sent(again / "forwarder.log") == sent(tmp_path / "forwarder.log")
 
 
+@pytest.mark.slow
 def test_two_deployments_side_by_side(tmp_path: Path) -> None:
     out = tmp_path / "out"
     both = ("--config", "forwarder.yaml", "--config", "forwarder-robust.yaml")
@@ -61,6 +63,7 @@ def test_two_deployments_side_by_side(tmp_path: Path) -> None:
     assert (out / "forwarder-robust.log").exists()
 
 
+@pytest.mark.slow
 def test_the_same_file_twice_has_two_names(tmp_path: Path) -> None:
     called(DRIVE, "--config", "forwarder.yaml", "--config", "forwarder.yaml", "--out", tmp_path)
     one, two = (tmp_path / f"forwarder-{n}.log" for n in (1, 2))
@@ -118,6 +121,7 @@ def assert_inside(drawn: Figure) -> None:
     assert max(box.x1 for box in boxes) <= drawn.bbox.x1
 
 
+@pytest.mark.slow
 def test_the_picture_has_both_deployments_states_and_reasons_and_leaves_out_what_is_idle(
     tmp_path: Path,
 ) -> None:

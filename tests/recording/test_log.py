@@ -190,6 +190,7 @@ def test_frames_of_two_sockets_may_stand_in_the_wrong_order(tmp_path: Path) -> N
 # -- large ones --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_large_log_takes_no_more_memory(tmp_path: Path) -> None:
     def peak(count: int) -> int:
         rows = (

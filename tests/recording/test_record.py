@@ -44,6 +44,7 @@ def running(
         process.wait(ANSWER_S)
 
 
+@pytest.mark.slow
 def test_what_a_daemon_does_is_recorded(tmp_path: Path) -> None:
     recording = Recording(loader("forwarder.yaml", "udp_multicast", [GROUP])())
     until = time.monotonic() + 2 * ANSWER_S
@@ -59,6 +60,7 @@ def test_what_a_daemon_does_is_recorded(tmp_path: Path) -> None:
     assert recording.frames[""] > 20
 
 
+@pytest.mark.slow
 def test_a_running_daemon_writes_its_last_minute(tmp_path: Path) -> None:
     """A real one, with a clock, a bus and a control socket; what it did is played the same."""
     shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
@@ -93,6 +95,7 @@ def test_a_running_daemon_writes_its_last_minute(tmp_path: Path) -> None:
     assert data["received"]["crane 0x110"] > 100
 
 
+@pytest.mark.slow
 def test_the_command_makes_a_bundle_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     out = tmp_path / "bundle.zip"
     mine = tmp_path / "bundle.log"

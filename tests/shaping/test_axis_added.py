@@ -6,6 +6,7 @@ The oracle knows inputs and outputs only. Time is in ticks, missed ones included
 import copy
 import math
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
@@ -234,4 +235,4 @@ AddedByAnother.TestCase.settings = settings(
     stateful_step_count=25,
     suppress_health_check=list(HealthCheck),
 )
-TestAddedByAnother = AddedByAnother.TestCase
+TestAddedByAnother = pytest.mark.slow(AddedByAnother.TestCase)

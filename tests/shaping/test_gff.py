@@ -171,7 +171,7 @@ def test_a_step_comes_out_as_equation_13_says(poles: tuple[float, float]) -> Non
     assert np.max(np.abs(got - expected)) < 2e-3 * got[0]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_ten_million_steps_stay_bounded() -> None:
     """An undamped model at a short tick: the case in which rounding would pile up first."""
     sway = SwayModel(SwayMode(2.86, 0.0), 0.001)

@@ -117,7 +117,7 @@ def test_a_slow_valve_gets_feedback_that_it_can_follow(mode: SwayMode, rate: flo
     assert residual(aware=True) < 0.8 * residual(aware=False)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @modes
 def test_a_million_restless_ticks_stay_bounded(mode: SwayMode) -> None:
     sway = SwayModel(mode, TICK_S)

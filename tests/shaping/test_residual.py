@@ -97,7 +97,7 @@ def axis_with(shaper: Shaper, sway: SwayModel | None) -> Axis:
     return Axis(TICK_S, LIMITS, sway=sway, shaper=shaper, grid_steps=125)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("length_m", [0.6, 1.0, 1.5])
 def test_residual_swing_behind_a_real_valve(length_m: float) -> None:
     mode = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), DAMPING)

@@ -113,6 +113,7 @@ def test_allowed_is_shorter_the_quicker_it_falls() -> None:
     assert allowed(5.0, 0.4) == pytest.approx(0.8 * (0.42 + 0.51) + 0.4 * 0.8 / 2.0)
 
 
+@pytest.mark.slow
 @given(
     limits=st.builds(
         OutputLimits,

@@ -202,7 +202,7 @@ def test_the_equilibrium_at_constant_speed_is_kept_exactly(
     assert (model.angle, model.rate) == (0.0, -velocity)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_an_undamped_pendulum_keeps_its_energy() -> None:
     mode = SwayMode(2.9, 0.0)
     model = SwayModel(mode, 0.001)

@@ -8,6 +8,7 @@ from canshaper_sim.grapple import Grapple
 from tests.sim.drives import LINEAR, TICK_S, all_valves, drive
 
 
+@pytest.mark.slow
 def test_internal_step_has_converged_at_end_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the tip meets its stop within a step, 10 ms and 0.2 ms still agree."""
 

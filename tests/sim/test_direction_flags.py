@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -28,6 +30,7 @@ def flagged(directory: Path) -> Deployment:
     return load_deployment(directory / "flags.yaml")
 
 
+@pytest.mark.slow
 def test_a_joystick_with_flags_drives_as_a_signed_one(tmp_path: Path) -> None:
     script = random_script(3, 20.0)
     signed = drive(load_deployment(ROOT / "config" / "forwarder.yaml"), script)

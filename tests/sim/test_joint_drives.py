@@ -35,6 +35,7 @@ def test_near_far_pulse_through_the_tip_controller() -> None:
     assert reduction_pct <= residual_reduction_pct("forwarder.yaml", "pulse-near_far", "near_far")
 
 
+@pytest.mark.slow
 def test_slew_pulse_is_the_same_with_and_without_joints() -> None:
     """One joint and one valve in both."""
     with_joints = residual_reduction_pct("forwarder.yaml", "pulse-slew", "slew", "tip-controller")
@@ -53,6 +54,7 @@ def test_pulse_of_each_joint(axis: str, least_pct: float) -> None:
     assert residual_reduction_pct("forwarder-joints.yaml", f"pulse-{axis}", axis) >= least_pct
 
 
+@pytest.mark.slow
 def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
     """Why the shipped deployment has no motion: it knows nothing of lift and knuckle."""
     shipped = CONFIG / "forwarder-joints.yaml"

@@ -78,6 +78,7 @@ def test_tip_follows_the_joints() -> None:
         assert before.time_s < middle.time_s
 
 
+@pytest.mark.slow
 def test_tip_accelerations_are_the_change_of_the_tip_speed() -> None:
     """J q'' + J' q' at the end of a step; start and middle against a run in much finer steps."""
     p = CraneParameters(joints=JointParameters(LINEAR, LINEAR, LINEAR, start_extension_m=0.4))
@@ -170,6 +171,7 @@ def test_end_stops_hold_a_joint_and_let_it_go(axis: str, command: float, limit: 
     assert (boom_of(crane).joints[index] - limit) * command < -0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["lift_cylinder", "knuckle", "extension"])
 def test_internal_step_has_converged_at_end_stops(
     monkeypatch: pytest.MonkeyPatch, axis: str

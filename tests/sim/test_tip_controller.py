@@ -134,6 +134,7 @@ def test_slew_slows_down_before_its_stop() -> None:
     assert states[-1].theta1_rate_rad_s < 1e-3
 
 
+@pytest.mark.slow
 def test_no_command_ever_drives_a_joint_into_its_stop() -> None:
     """Random commands for 5 min, most of them at the edge of the work space."""
     for seed in range(3):

@@ -37,14 +37,20 @@ def free_groups() -> tuple[str, str]:
     return f"239.250.{port // 256}.{port % 256}", f"239.251.{port // 256}.{port % 256}"
 
 
+# The others take minutes: make test-browser-all.
+IN_MAKE_TEST = ("test_it_loads_without", "test_keys_drive_both_cranes")
+
+
+@pytest.hookimpl(tryfirst=True)  # before marks select
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    if "CANSHAPER_BROWSER" in os.environ:
-        return
-    skip = pytest.mark.skip(reason="takes minutes in a real browser: run make test-studio")
+    skip = pytest.mark.skip(reason="needs a browser: run make test-browser-all")
     for item in items:
         # This hook sees the items of all directories.
         if item.path.parent == HERE and item.path.name.startswith("test_browser"):
-            item.add_marker(skip)
+            if not item.name.startswith(IN_MAKE_TEST):
+                item.add_marker(pytest.mark.slow)
+            if "CANSHAPER_BROWSER" not in os.environ:
+                item.add_marker(skip)
 
 
 class Studio:
@@ -199,9 +205,9 @@ class Page:
         return [event[3] for event in self.events]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def shared() -> Iterator[Studio]:
-    """One studio for the tests that leave it as it was."""
+    """One studio for the tests of a module that leave it as it was."""
     studio = Studio()
     try:
         yield studio

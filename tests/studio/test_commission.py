@@ -77,7 +77,7 @@ def step(shown: Any, name: str) -> Any:
     return next(one for one in shown["steps"] if one["name"] == name)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_page_and_terminal_have_one_state(machine: Path, served: Callable[..., Request]) -> None:
     before, request = machine.read_bytes(), served()
     assert b"<title>Commissioning" in request("")
@@ -99,7 +99,7 @@ def test_page_and_terminal_have_one_state(machine: Path, served: Callable[..., R
     assert step(request("/skip/swing", "POST"), "swing")["status"] == "skipped"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_cannot_be_done_is_said(machine: Path, served: Callable[..., Request]) -> None:
     request = served()
     assert request("/accept/check", "POST")["error"] == "check: nothing to accept; run it first"
@@ -126,6 +126,7 @@ def test_no_other_page_and_no_other_file(machine: Path, served: Callable[..., Re
     assert not Path("machine.rehearsal.yaml").exists()
 
 
+@pytest.mark.slow
 def test_that_of_a_machine_is_only_shown(machine: Path, served: Callable[..., Request]) -> None:
     request = served(shadow=True)
     shown = request("/state")

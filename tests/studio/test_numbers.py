@@ -58,6 +58,7 @@ class Hand:
         return [(one["who"], one["numbers"]) for one in self.numbers["changes"]]
 
 
+@pytest.mark.slow
 def test_a_number_is_changed_undone_and_compared_with_the_one_before(machine: Machine) -> None:
     with machine.studio.page() as page:
         hand = Hand(page, "Aino")
@@ -82,6 +83,7 @@ def test_a_number_is_changed_undone_and_compared_with_the_one_before(machine: Ma
         assert f"{PERIOD} {before:g} -> 2.5 (Aino)" in page.texts()
 
 
+@pytest.mark.slow
 def test_the_second_writer_gets_the_name_of_the_first(machine: Machine) -> None:
     with machine.studio.page() as one, machine.studio.page() as two:
         first, second = Hand(one, "Aino"), Hand(two, "Björn")
@@ -94,6 +96,7 @@ def test_the_second_writer_gets_the_name_of_the_first(machine: Machine) -> None:
         assert machine.now(PERIOD) == 2.5
 
 
+@pytest.mark.slow
 def test_what_is_not_allowed_changes_nothing(machine: Machine) -> None:
     with machine.studio.page() as page:
         hand = Hand(page, "")
@@ -117,6 +120,7 @@ def test_what_is_not_allowed_changes_nothing(machine: Machine) -> None:
         assert hand.changes()[-1][0] == f"page {page.hello['page']}"  # who gives no name
 
 
+@pytest.mark.slow
 def test_what_others_change_is_seen(machine: Machine) -> None:
     with machine.studio.page() as page:
         hand = Hand(page, "Aino")
@@ -128,6 +132,7 @@ def test_what_others_change_is_seen(machine: Machine) -> None:
         assert hand.numbers["undo"] == 0  # the way back is no longer known
 
 
+@pytest.mark.slow
 def test_the_file_gets_what_is_in_force_once_its_difference_was_seen(machine: Machine) -> None:
     before = machine.file.read_text()
     with machine.studio.page() as page:
@@ -157,6 +162,7 @@ def test_the_file_gets_what_is_in_force_once_its_difference_was_seen(machine: Ma
         assert hand.difference["text"] == ""
 
 
+@pytest.mark.slow
 def test_a_daemon_that_is_gone_is_reported_and_its_return_too(machine: Machine) -> None:
     with machine.studio.page() as page:
         hand = Hand(page, "Aino")

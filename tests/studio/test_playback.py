@@ -117,6 +117,7 @@ def test_of_a_long_log_the_first_pictures_or_those_of_a_window_are_kept(
     assert any("only the first ten minutes" in note for note in playback.notes)
 
 
+@pytest.mark.slow
 def test_a_drive_of_a_campaign_is_the_one_of_demo(tmp_path: Path) -> None:
     """The same seed, the same peak: to the resolution of the pictures."""
     playback, cranes = opened("forwarder.yaml", "forwarder-robust.yaml", seeds=(3,))
@@ -131,6 +132,7 @@ def test_a_drive_of_a_campaign_is_the_one_of_demo(tmp_path: Path) -> None:
         assert peak == pytest.approx(report["axes"]["slew"][key]["peak_deg"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_worst_drives_of_a_campaign_can_be_chosen(tmp_path: Path) -> None:
     deployment = loader("forwarder.yaml")()
     source = Source.of(deployment, deployment.config.uncertainty)
@@ -167,6 +169,7 @@ def test_what_cannot_be_opened_is_reported(tmp_path: Path) -> None:
     assert "No such file" in missing
 
 
+@pytest.mark.slow
 def test_each_drive_is_made_when_it_is_requested() -> None:
     studio = Opened("forwarder.yaml", "--seed", "3", "--seed", "4")
 

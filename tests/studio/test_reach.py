@@ -24,6 +24,7 @@ def test_all_addresses_are_named_by_one_of_this_machine() -> None:
     assert reachable("10.11.12.13") == "10.11.12.13"
 
 
+@pytest.mark.slow
 def test_what_is_printed_on_a_terminal_can_be_opened_and_is_a_qr_code() -> None:
     segno = pytest.importorskip("segno", reason="the extra studio is of an older checkout")
     master, slave = pty.openpty()

@@ -38,6 +38,7 @@ def test_it_shows_both_cranes(shared: Studio) -> None:
             assert crane["measured"] and len(crane["pose"]) == 3
 
 
+@pytest.mark.slow
 def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
     own: Callable[..., Studio],
 ) -> None:
@@ -62,6 +63,7 @@ def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
         assert "anti-sway switched off" in page.texts()
 
 
+@pytest.mark.slow
 def test_the_page_chooses_a_profile_through_the_joystick(own: Callable[..., Studio]) -> None:
     with own(file="j1939-profiles.yaml").page() as page:
         page.drive()
@@ -89,6 +91,7 @@ def test_without_profiles_there_is_no_button(shared: Studio) -> None:
         assert page.shown["cranes"]["shaped"]["axes"]["slew"]["profile"] is None
 
 
+@pytest.mark.slow
 def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> None:
     with own().page() as page:
         page.drive()
@@ -166,6 +169,7 @@ def test_the_page_may_load_from_here_only(shared: Studio) -> None:
     assert "//" not in text.replace("<!doctype", "")
 
 
+@pytest.mark.slow
 def test_from_other_machines_a_token_is_needed(own: Callable[..., Studio]) -> None:
     studio = own("--host", "0.0.0.0")
     token = studio.url.partition("token=")[2]
@@ -190,7 +194,7 @@ def test_from_other_machines_a_token_is_needed(own: Callable[..., Studio]) -> No
         assert page.look()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_shipped_machine_is_driven_with_all_its_axes(
     own: Callable[..., Studio], name: str

@@ -15,6 +15,7 @@ from canshaper_sim.hand import Hand, Held
 from tests.studio.conftest import ROOT, WAIT_S, Listener, Studio, command_of
 
 
+@pytest.mark.slow
 def test_a_daemon_that_ends_is_reported_and_starts_again(own: Callable[..., Studio]) -> None:
     studio = own()
     with studio.page() as page:
@@ -31,6 +32,7 @@ def test_a_daemon_that_ends_is_reported_and_starts_again(own: Callable[..., Stud
         page.until(lambda _: page.states() == {"ready"}, "ready again")
 
 
+@pytest.mark.slow
 def test_the_processes_end_with_a_studio_that_is_killed(own: Callable[..., Studio]) -> None:
     studio = own()
     with studio.page() as page:
@@ -44,6 +46,7 @@ def test_the_processes_end_with_a_studio_that_is_killed(own: Callable[..., Studi
         assert time.monotonic() < limit
 
 
+@pytest.mark.slow
 def test_the_shadow_shows_a_machine_and_never_sends(
     own: Callable[..., Studio], listen: Callable[[str], Listener]
 ) -> None:
@@ -66,6 +69,7 @@ def test_the_shadow_shows_a_machine_and_never_sends(
     assert machine.frames() == []
 
 
+@pytest.mark.slow
 def test_a_channel_of_a_real_machine_is_refused() -> None:
     """Loopback is no CAN interface, and no virtual bus either."""
     command = [sys.executable, "-m", "canshaper", "studio", "--channel", "lo"]
@@ -74,6 +78,7 @@ def test_a_channel_of_a_real_machine_is_refused() -> None:
     assert "would move a real machine" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_port_in_use_is_reported(shared: Studio) -> None:
     command = [sys.executable, "-m", "canshaper", "studio", "--port", str(shared.port)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -81,6 +86,7 @@ def test_a_port_in_use_is_reported(shared: Studio) -> None:
     assert f"cannot serve at 127.0.0.1 port {shared.port}" in done.stderr
 
 
+@pytest.mark.slow
 def test_nothing_is_left_in_the_temporary_directory(
     own: Callable[..., Studio], tmp_path: Path
 ) -> None:
@@ -94,6 +100,7 @@ def test_nothing_is_left_in_the_temporary_directory(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_of_two_cranes_the_named_one_is_driven(own: Callable[..., Studio]) -> None:
     with own("--crane", "rear", file="two-cranes.yaml", groups=()).page() as page:
         page.drive()
@@ -102,6 +109,7 @@ def test_of_two_cranes_the_named_one_is_driven(own: Callable[..., Studio]) -> No
         assert any("rear" in name for name in names) and not any("front" in n for n in names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "says"),
     [

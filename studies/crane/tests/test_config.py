@@ -108,6 +108,7 @@ def test_all_faults_are_reported_at_once(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_daemon_does_not_load_casadi() -> None:
     code = "import sys, canshaper.daemon.daemon; sys.exit('casadi' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -99,6 +99,7 @@ def test_at_rest_four_of_six_are_zero_and_no_dc_gain_is_left(grapple: GrappleDat
         assert (size < 1e-12) if (i, j) in zero else (size > 1.0)
 
 
+@pytest.mark.slow
 def test_while_slewing_the_joints_are_coupled(grapple: GrappleData) -> None:
     """Figures of studies/README.md at 3 m and 0.5 rad/s."""
     point = OperatingPoint(3.0, 0.5)

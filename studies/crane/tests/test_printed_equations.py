@@ -81,6 +81,7 @@ def test_frequency_of_printed_equation_7(grapple: GrappleData) -> None:
     assert omega("l2") == pytest.approx(2.474, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_printed_equation_7_makes_energy(undamped: GrappleData) -> None:
     """Undamped, tip at rest, from 34 and 40 deg; the same steps keep it when corrected."""
     dynamics = SwayDynamics(undamped)

@@ -21,6 +21,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     return out, run("--out", str(out))
 
 
+@pytest.mark.slow
 def test_everything_is_written(done: tuple[Path, Result]) -> None:
     out, result = done
     assert result.exit_code == 0, result.output
@@ -34,6 +35,7 @@ def no_constant(text: str) -> NoReturn:
     raise AssertionError(text)
 
 
+@pytest.mark.slow
 def test_json_is_strict_and_has_the_findings(done: tuple[Path, Result]) -> None:
     out, _ = done
     for path in out.glob("*.json"):
@@ -44,6 +46,7 @@ def test_json_is_strict_and_has_the_findings(done: tuple[Path, Result]) -> None:
     assert table["reductions"][1]["ours_pct"]["linear"]["residual"] > 67.0
 
 
+@pytest.mark.slow
 def test_table_fits_80_columns_and_says_it_plainly(done: tuple[Path, Result]) -> None:
     _, result = done
     assert max(map(len, result.stdout.splitlines())) <= 80

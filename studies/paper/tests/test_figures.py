@@ -28,6 +28,7 @@ def figures(study: Study) -> dict[int, Figure]:
     return {n: drawn(study, n) for n in FIGURES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", FIGURES)
 def test_png_of_the_right_size(figures: dict[int, Figure], number: int, tmp_path: Path) -> None:
     path = tmp_path / "figure.png"
@@ -44,6 +45,7 @@ def headline(fig: Figure) -> str:
     return title
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "plane"), [(3, "perpendicular"), (4, "parallel")])
 def test_pole_titles_carry_the_peaks(
     figures: dict[int, Figure], study: Study, number: int, plane: str
@@ -54,6 +56,7 @@ def test_pole_titles_carry_the_peaks(
         assert reported in headline(figures[number])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [7, 8])
 def test_optimum_titles_carry_every_reading(
     figures: dict[int, Figure], study: Study, number: int
@@ -66,6 +69,7 @@ def test_optimum_titles_carry_every_reading(
     assert ("in every reading" in title) == (number == 8)
 
 
+@pytest.mark.slow
 def test_bode_title_and_names(figures: dict[int, Figure]) -> None:
     assert headline(figures[6]) == (
         "The two swings lie 7 % apart: 2.67 rad/s across the boom, 2.86 rad/s along it"
@@ -74,6 +78,7 @@ def test_bode_title_and_names(figures: dict[int, Figure]) -> None:
     assert {"G11", "G22", "G11 as printed", "G22 as printed"} <= texts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [3, 4, 7, 8])
 def test_panels_have_units_and_numbers_in_the_colour_of_their_plant(
     figures: dict[int, Figure], study: Study, number: int
@@ -94,6 +99,7 @@ def test_panels_have_units_and_numbers_in_the_colour_of_their_plant(
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", FIGURES)
 def test_nothing_leaves_the_picture(figures: dict[int, Figure], number: int) -> None:
     fig = figures[number]

@@ -34,6 +34,7 @@ def test_a_joint_has_room_for_the_ramp_that_is_proposed(axis: str) -> None:
         assert direction.full == pytest.approx(valve.positive.full, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["knuckle", "extension"])
 def test_a_ramp_that_reaches_the_end_of_a_joint_is_no_measurement(axis: str) -> None:
     """On the way up or down: what is left of the ramp would make a wrong curve."""

@@ -38,6 +38,7 @@ def doctor(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_the_numbers() -> None:
     """Of both runs, as JSON and nothing else."""
     done = doctor(SHIPPED, "--seconds", "1", "--json")
@@ -60,6 +61,7 @@ def test_the_numbers() -> None:
         assert run["valve_us"]["p50"] <= run["joystick_us"]["max"]
 
 
+@pytest.mark.slow
 def test_what_people_read() -> None:
     done = doctor(SHIPPED, "--seconds", "1")
     out = done.stdout
@@ -75,6 +77,7 @@ def test_what_people_read() -> None:
     assert verdict.startswith("Not fit for" if "bad" in levels else "Fit for")
 
 
+@pytest.mark.slow
 def test_without_load_there_is_one_run() -> None:
     done = doctor("forwarder.yaml", "--seconds", "0.5", "--no-load", "--json")
     assert done.returncode in (0, 1)
@@ -131,6 +134,7 @@ def running(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "status"),
     [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)],

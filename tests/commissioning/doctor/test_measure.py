@@ -123,6 +123,7 @@ def test_no_process_outlives_its_block() -> None:
     assert children() == before
 
 
+@pytest.mark.slow
 def test_a_process_that_fails_says_why_and_leaves_no_other() -> None:
     before = children()
     gone = replace(load_deployment(SHIPPED), path=Path("gone.yaml"))
@@ -131,6 +132,7 @@ def test_a_process_that_fails_says_why_and_leaves_no_other() -> None:
     assert children() == before
 
 
+@pytest.mark.slow
 def test_two_buses_with_all_that_a_deployment_may_have(two_buses: Path) -> None:
     reported: list[float] = []
     run = measure(load_deployment(two_buses), 0.5, reported.append, load=False)

@@ -61,7 +61,7 @@ def test_two_degrees_in_noise(grapple: Grapple, direction: int, seed: int) -> No
     assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.2)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_interval_holds_the_truth() -> None:
     """Of sixty logs with noise whose neighbours are alike, nineteen in twenty, with some luck."""
     time, angle = swung(EMPTY, 3.0, NEAR_FAR, 20.0)
@@ -139,7 +139,7 @@ def test_full_speed_by_single_strokes(kind: Kind) -> None:
     assert finding.free.segments[0].segment.start_s > 2.7 + 0.5  # not while it was driven
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
 def test_never_free_but_driven(kind: Kind) -> None:
     finding = identify("near_far", "", [drive(BUSY, 41.0, kind, 2)])
@@ -195,6 +195,7 @@ def test_a_hole_in_the_log_parts_a_swing() -> None:
     assert finding.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.005)
 
 
+@pytest.mark.slow
 def test_several_logs_count_together() -> None:
     time, angle = swung(EMPTY, 2.0, SLEW, 20.0)
     logs = [noisy(time, angle, seed, 0.2, memory=0.9) for seed in range(4)]
@@ -204,6 +205,7 @@ def test_several_logs_count_together() -> None:
     assert all_.period_s.half < 0.8 * one.period_s.half
 
 
+@pytest.mark.slow
 def test_swings_that_differ_widen_the_interval() -> None:
     """Another pose, another rope, wind: what one log cannot know."""
     grapples = [Grapple(l2_m=length) for length in (1.14, 1.2, 1.26)]

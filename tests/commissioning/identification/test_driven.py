@@ -16,6 +16,7 @@ from tests.commissioning.identification.driven import drive
 from tests.commissioning.identification.machine import Push
 
 
+@pytest.mark.slow
 @given(
     omega=st.floats(0.5, 20.0),
     ratio=st.floats(0.0, 0.6),
@@ -36,6 +37,7 @@ def test_the_sampled_model_is_that_of_scipy(
     assert ours == pytest.approx(theirs, abs=1e-6 * np.abs(theirs).max())
 
 
+@pytest.mark.slow
 def test_a_part_of_the_stretches_first_finds_what_all_of_them_do(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -53,6 +55,7 @@ def test_a_part_of_the_stretches_first_finds_what_all_of_them_do(
     assert fewer.period_s.half == pytest.approx(every.period_s.half, rel=0.1)
 
 
+@pytest.mark.slow
 def test_driven_motion_of_two_directions_reports_no_damping_that_it_cannot_know() -> None:
     """A heavy tool that is hardly damped takes swing from the other direction and gives it back."""
     heavy = Grapple(l2_m=2.2, m2_kg=900.0, c5_n_m_s_rad=125.0, c6_n_m_s_rad=125.0)

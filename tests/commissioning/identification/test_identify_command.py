@@ -49,6 +49,7 @@ def said(result: Result) -> str:
     return " ".join(result.output.split())
 
 
+@pytest.mark.slow
 def test_a_speed_with_which_the_tip_stops_too_late_is_not_written(
     tmp_path: Path, file: Path, logs: Path
 ) -> None:
@@ -63,6 +64,7 @@ def test_a_speed_with_which_the_tip_stops_too_late_is_not_written(
     assert file.read_text() == before
 
 
+@pytest.mark.slow
 def test_both_axes_of_a_log_are_written(tmp_path: Path, file: Path, logs: Path) -> None:
     before = file.read_text().splitlines()
     result = run(tmp_path, logs / "empty.log", "--file", file, "--write")
@@ -95,6 +97,7 @@ def test_both_axes_of_a_log_are_written(tmp_path: Path, file: Path, logs: Path) 
     assert picture.stat().st_size > 30_000
 
 
+@pytest.mark.slow
 def test_empty_and_loaded(tmp_path: Path, file: Path, logs: Path) -> None:
     labelled = f"empty={logs / 'empty.log'}", f"loaded={logs / 'loaded.log'}"
     result = run(tmp_path, *labelled, "--file", file, "--json", "--write")
@@ -124,6 +127,7 @@ def test_empty_and_loaded(tmp_path: Path, file: Path, logs: Path) -> None:
     assert sway and sway.period_s == near["sway"]["period_s"]
 
 
+@pytest.mark.slow
 def test_sets_where_the_deployment_knows_the_grapple(
     tmp_path: Path, file: Path, logs: Path
 ) -> None:
@@ -147,6 +151,7 @@ def test_a_log_without_a_deployment(tmp_path: Path, logs: Path) -> None:
     assert "Boom: period 2.20" in result.output
 
 
+@pytest.mark.slow
 def test_a_phone(tmp_path: Path, file: Path, logs: Path) -> None:
     phone_ = logs / "Gyroscope.csv"
     result = run(tmp_path, phone_, "--file", file, "--axis", "slew", "--write")
@@ -182,6 +187,7 @@ def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: 
     assert file.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_one_state_that_is_too_poor_keeps_the_axis_from_being_written(
     tmp_path: Path, file: Path, logs: Path
 ) -> None:
@@ -260,6 +266,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BAD)
 def test_what_is_wrong_is_reported(tmp_path: Path, file: Path, logs: Path, name: str) -> None:
     before = file.read_bytes()

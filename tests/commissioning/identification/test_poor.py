@@ -153,6 +153,7 @@ def test_dry_friction_is_reported() -> None:
     assert any("dry friction" in note for note in finding.notes), finding.notes
 
 
+@pytest.mark.slow
 def test_viscous_damping_is_not_taken_for_friction() -> None:
     time = times(25.0)
     for seed in range(20):

@@ -94,6 +94,7 @@ class Terminal:
         return self.process.wait(ANSWER_S)
 
 
+@pytest.mark.slow
 def test_a_drive_on_the_terminal(tmp_path: Path) -> None:
     terminal = Terminal()
     try:
@@ -117,6 +118,7 @@ def test_a_drive_on_the_terminal(tmp_path: Path) -> None:
     assert terminal.seen.rstrip().endswith("\x1b[?1049l")  # the terminal is as it was
 
 
+@pytest.mark.slow
 def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
     with LocalMulticastBus(GROUP) as bus:
         monitor = subprocess.Popen(

@@ -40,6 +40,7 @@ def procedure(changes: list[str] | None = None) -> Procedure:
     return Procedure(Files(COPY), bench, load_deployment, STEPS, origin=Path("machine.yaml"))
 
 
+@pytest.mark.slow
 def test_a_rehearsal_writes_into_its_copy_alone(machine: Path) -> None:
     before = machine.read_bytes()
     shown = commission(*CRANE, "--step", "swing", "--yes")
@@ -51,6 +52,7 @@ def test_a_rehearsal_writes_into_its_copy_alone(machine: Path) -> None:
     assert Path("machine.rehearsal.commission/swing.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_same_command_goes_on_at_the_first_open_step(machine: Path) -> None:
     shown = commission(*CRANE, answers="\nskip\nstop\n", code=1)
     assert "swing stays open" in shown
@@ -70,6 +72,7 @@ def test_another_crane_than_before_is_refused(machine: Path) -> None:
     assert "expected the crane grapple.l2_m=1.55, got grapple.l2_m=1.2" in shown
 
 
+@pytest.mark.slow
 def test_a_poor_swing_leaves_the_step_open_and_says_what_to_do(machine: Path) -> None:
     crane = ("--set", "slew.deadband=0.5")  # more than max_pct: 40, so the axis does not move
     shown = commission(*crane, "--step", "swing", "--yes", code=1)
@@ -87,6 +90,7 @@ def exchanged(text: str) -> str:
     return text.replace("signal: X,", "signal: NearFar,")
 
 
+@pytest.mark.slow
 def test_a_joystick_of_another_axis_is_put_right(machine: Path) -> None:
     text = machine.read_text()
     swapped = text.replace("signal: Slew,", "signal: X,").replace(
@@ -117,6 +121,7 @@ class _WrongHand(Simulated):
         super().drive(load_deployment(right), log, task)
 
 
+@pytest.mark.slow
 def test_a_file_that_was_changed_between_steps_is_named_and_kept(machine: Path) -> None:
     commission(*CRANE, "--step", "buses", "--yes")
     COPY.write_text(COPY.read_text() + "# a note of mine\n")
@@ -126,6 +131,7 @@ def test_a_file_that_was_changed_between_steps_is_named_and_kept(machine: Path) 
     assert "period_s: 2.637" in COPY.read_text()
 
 
+@pytest.mark.slow
 def test_a_file_that_was_changed_while_a_step_was_looked_at_is_not_written(machine: Path) -> None:
     one = procedure(["grapple.l2_m=1.55"])
     proposal = one.run(one.step("swing"))
@@ -145,6 +151,7 @@ class _Edited(Simulated):
         COPY.write_text(COPY.read_text() + "# a note of theirs\n")
 
 
+@pytest.mark.slow
 def test_a_file_that_was_changed_in_the_middle_of_a_step_is_noticed(machine: Path) -> None:
     one = procedure()
     one.accept(one.run(one.step("check")))
@@ -158,6 +165,7 @@ def test_a_file_that_was_changed_in_the_middle_of_a_step_is_noticed(machine: Pat
     assert two.state.of("check").status is Status.OPEN
 
 
+@pytest.mark.slow
 def test_the_machine_has_changed_since_the_copy_was_made(machine: Path) -> None:
     commission("--step", "buses", "--yes")
     machine.write_text(machine.read_text() + "# a note\n")
@@ -166,6 +174,7 @@ def test_the_machine_has_changed_since_the_copy_was_made(machine: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_second_commissioning_of_a_file_is_reported(machine: Path) -> None:
     commission("--step", "buses", "--yes")
     before = STATE.read_bytes()
@@ -204,6 +213,7 @@ def test_a_damaged_state_is_named_and_left(machine: Path, text: str) -> None:
     assert STATE.read_text() == text
 
 
+@pytest.mark.slow
 def test_answers_come_from_a_file(machine: Path) -> None:
     Path("answers.txt").write_text("buses: accept = skip\njoysticks: accept = stop\n")
     commission("--answers", "answers.txt", code=1)

@@ -29,8 +29,9 @@ NAMES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "length_m", [1.55, *(pytest.param(one, marks=pytest.mark.long) for one in (0.85, 1.9))]
+    "length_m", [1.55, *(pytest.param(one, marks=pytest.mark.slow) for one in (0.85, 1.9))]
 )
 def test_from_init_to_the_report(machine: Path, length_m: float) -> None:
     before = machine.read_bytes()
@@ -65,6 +66,7 @@ def test_from_init_to_the_report(machine: Path, length_m: float) -> None:
     assert digest in report
 
 
+@pytest.mark.slow
 def test_a_valve_that_was_changed_opens_what_rests_on_it(machine: Path) -> None:
     def run(*words: str) -> None:
         arguments = ["commission", "machine.yaml", "--simulated", "--yes", *words]
@@ -81,6 +83,7 @@ def test_a_valve_that_was_changed_opens_what_rests_on_it(machine: Path) -> None:
     assert steps["filter"]["why"] == "valve has changed the file"
 
 
+@pytest.mark.slow
 def test_the_first_motion_waits_for_reduced_speed(machine: Path) -> None:
     machine.write_text(machine.read_text().replace("max_pct: 40", "max_pct: 100"))
     words = ["commission", "machine.yaml", "--simulated", "--yes", "--step"]
@@ -95,6 +98,7 @@ def test_the_first_motion_waits_for_reduced_speed(machine: Path) -> None:
     assert slow.exit_code == 0, slow.output
 
 
+@pytest.mark.slow
 def test_a_file_that_got_faster_needs_no_second_first_motion(machine: Path) -> None:
     words = ["commission", "machine.yaml", "--simulated", "--yes", "--step"]
     for name in ("check", "motion"):

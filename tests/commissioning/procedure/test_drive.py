@@ -92,6 +92,7 @@ def only(mode: Mode, change: Callable[[Stroke], list[Stroke]]) -> Change:
     return changed
 
 
+@pytest.mark.slow
 def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path) -> None:
     driver = Driver()
     one, proposal = drive(machine, driver, SIGNALS)
@@ -109,6 +110,7 @@ def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path
     assert one.state.of("drive").why == ""
 
 
+@pytest.mark.slow
 def test_a_filter_that_takes_no_swing_away_is_too_poor(machine: Path) -> None:
     text = machine.read_text()
     lines = [
@@ -147,6 +149,7 @@ def test_nothing_measured_and_nothing_seen_is_no_yes(machine: Path, saw: str, te
     assert one.state.of("drive").status is Status.OPEN
 
 
+@pytest.mark.slow
 def test_one_of_two_planes_is_measured_the_other_judged_by_eye(machine: Path) -> None:
     driver = Driver("less")
     one, proposal = drive(machine, driver, {"slew": SIGNALS["slew"]})
@@ -157,6 +160,7 @@ def test_one_of_two_planes_is_measured_the_other_judged_by_eye(machine: Path) ->
     assert one.state.of("drive").why == "near_far judged by eye"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [Mode.RAW, Mode.SHAPED])
 def test_a_drive_in_which_nothing_moved(machine: Path, mode: Mode) -> None:
     """Neither measured nor by eye."""
@@ -172,6 +176,7 @@ def test_a_drive_in_which_nothing_moved(machine: Path, mode: Mode) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_drive_without_enable(machine: Path) -> None:
     _, proposal = drive(
         machine, Driver("less"), {}, lambda task: replace(task, released=(0.0, 99.0))
@@ -182,6 +187,7 @@ def test_a_drive_without_enable(machine: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_another_drive_with_the_filters_than_without(machine: Path) -> None:
     change = only(Mode.SHAPED, lambda one: [replace(one, level=0.4 * one.level)])
     _, proposal = drive(machine, Driver(), SIGNALS, change)
@@ -189,6 +195,7 @@ def test_another_drive_with_the_filters_than_without(machine: Path) -> None:
     assert len(proposal.poor) == 2
 
 
+@pytest.mark.slow
 def test_a_drive_without_a_rest(machine: Path) -> None:
     def changed(task: Task) -> Task:
         end_s = task.script.duration_s - 1.0
@@ -199,6 +206,7 @@ def test_a_drive_without_a_rest(machine: Path) -> None:
     assert proposal.poor[0].startswith("no rest of 3.5 s after all joysticks were let go")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", [BEFORE, AFTER])
 def test_a_sensor_that_falls_silent_is_no_grapple_that_hangs_still(machine: Path, log: str) -> None:
     def without(name: str, time_s: float) -> bool:
@@ -216,6 +224,7 @@ def test_a_speed_is_no_swing(machine: Path) -> None:
     assert len(driver.questions) == 1
 
 
+@pytest.mark.slow
 def test_without_the_step_swing_the_sway_sensor_measures(machine: Path) -> None:
     text = (ROOT / "config" / "forwarder-sensor.yaml").read_text()
     text = text.replace("../dbc", f"{ROOT}/dbc").replace("limits: {", "limits: { max_pct: 40,")

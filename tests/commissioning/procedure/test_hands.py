@@ -57,6 +57,7 @@ def both(one: Stroke) -> list[Stroke]:
     return [replace(one, axis="slew"), replace(one, axis="near_far")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -74,21 +75,25 @@ def test_joysticks_moved_otherwise(machine: Path, change: Any, text: str) -> Non
     assert machine.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_joysticks_without_enable(machine: Path) -> None:
     outcome = run(machine, "joysticks", lambda task: replace(task, released=(0.0, 9.0)))
     assert outcome.poor[0].startswith("slew: the enable switch was not seen held")
 
 
+@pytest.mark.slow
 def test_a_dry_drive_without_one_axis(machine: Path) -> None:
     outcome = run(machine, "dry", strokes(lambda one: [one] if one.axis == "slew" else []))
     assert [fault.partition(":")[0] for fault in outcome.poor] == ["near_far", "lift"]
 
 
+@pytest.mark.slow
 def test_a_dry_drive_without_enable(machine: Path) -> None:
     outcome = run(machine, "dry", lambda task: replace(task, released=(0.0, 100.0)))
     assert "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_OFF)" in outcome.poor[0]
 
 
+@pytest.mark.slow
 def test_a_first_motion_to_one_side(machine: Path) -> None:
     change = strokes(lambda one: [replace(one, level=abs(one.level))])
     outcome = run(machine, "motion", change)
@@ -96,6 +101,7 @@ def test_a_first_motion_to_one_side(machine: Path) -> None:
     assert "its valve did not follow its joystick in both directions" in outcome.poor[0]
 
 
+@pytest.mark.slow
 def test_a_first_motion_with_the_enable_held_all_the_time(machine: Path) -> None:
     outcome = run(machine, "motion", lambda task: replace(task, released=None))
     assert outcome.poor == [
@@ -130,6 +136,7 @@ class Renamed(Simulated):
         super().drive(load_deployment(Path("machine.yaml")), log, replace(task, script=script))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["joysticks", "dry", "motion"])
 def test_an_axis_has_whatever_name_the_file_gives_it(machine: Path, step: str) -> None:
     names = {"boom": "slew", "front_slew": "near_far", "hoist": "lift"}
@@ -153,6 +160,7 @@ def renamed(machine: Path, names: dict[str, str]) -> Path:
     return other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["joysticks", "dry", "motion"])
 def test_a_rotator_with_a_rocker_of_two_signals(machine: Path, step: str) -> None:
     add_rotator(machine)
@@ -191,6 +199,7 @@ class Listening(Renamed):
         super().__init__({"slew": "slew", "near_far": "near_far", "lift": "lift"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["buses", "joysticks", "swing", "dry", "motion", "drive"])
 def test_each_step_says_how_long_it_records(machine: Path, step: str) -> None:
     bench = Listening()
@@ -201,6 +210,7 @@ def test_each_step_says_how_long_it_records(machine: Path, step: str) -> None:
         assert f" {task.script.duration_s:.0f} s" in task.words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["joysticks", "dry"])
 def test_where_the_old_controller_may_move_the_crane_the_person_is_warned(
     machine: Path, step: str

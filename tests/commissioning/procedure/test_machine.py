@@ -77,7 +77,7 @@ def task(mode: Mode) -> Task:
     return Task("Move it.", Script("moves", (), 12.0), mode)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "sends"), [(Mode.SHAPED, True), (Mode.DRY, False)])
 def test_a_drive_is_recorded_and_its_daemon_ended(
     deployment: Deployment, mode: Mode, sends: bool
@@ -92,7 +92,7 @@ def test_a_drive_is_recorded_and_its_daemon_ended(
     assert (NEUTRAL in Path("drive.txt").read_bytes()) is sends
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_ctrl_c_leaves_neutral_valves_and_no_file(deployment: Deployment) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
@@ -105,7 +105,7 @@ def test_ctrl_c_leaves_neutral_valves_and_no_file(deployment: Deployment) -> Non
     assert not Path("machine.commission.raw.yaml").exists()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_daemon_that_dies_is_reported(deployment: Deployment) -> None:
     def killed(*_: object) -> None:
         for pid in children("run"):
@@ -124,7 +124,7 @@ def children(verb: str) -> list[int]:
     return pids
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_daemon_ends_with_us(deployment: Deployment, tmp_path: Path) -> None:
     """We are killed in the middle of a drive: the valves are sent neutral all the same."""
     code = (
@@ -145,7 +145,7 @@ def test_the_daemon_ends_with_us(deployment: Deployment, tmp_path: Path) -> None
         tail.terminate()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_ctrl_c_ends_a_measurement_and_is_ctrl_c_again(deployment: Deployment) -> None:
     def interrupted(*_: object) -> None:
         os.kill(os.getpid(), signal.SIGINT)
@@ -190,6 +190,7 @@ class Alone(Hand):
         self.prompts.append(words)
 
 
+@pytest.mark.slow
 def test_a_bus_that_cannot_be_opened(machine: Path) -> None:
     with pytest.raises(BusError, match=r"canshaper run ended with status 3:\n.*bus "):
         drive = Machine(Hand(), ["--channel", "nowhere9"]).drive

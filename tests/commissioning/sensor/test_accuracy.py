@@ -46,7 +46,7 @@ def test_a_rate(case: Sequence[float], axis: str) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("case", EVERY)
 def test_every_combination(axis: str, case: Sequence[float]) -> None:
@@ -54,6 +54,7 @@ def test_every_combination(axis: str, case: Sequence[float]) -> None:
     judge(Drive(machine(*GYRO), axis, case[-1]), case, 3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", AXES)
 def test_an_inclinometer_of_j1939_leads_by_what_corrects_its_gyro(axis: str) -> None:
     """Delay and lead come as one, which is what the observer needs."""
@@ -66,6 +67,7 @@ def test_an_inclinometer_of_j1939_leads_by_what_corrects_its_gyro(axis: str) -> 
         assert abs(finding.delay_s.value - (0.1 - lead_s)) < 0.02
 
 
+@pytest.mark.slow
 def test_the_period_and_the_full_speed_are_those_of_the_crane() -> None:
     longer = Drive(machine(), length_pct=20.0).finding()
     assert longer.period_s.value == pytest.approx(2.2 * math.sqrt(1.2), rel=0.01)
@@ -74,6 +76,7 @@ def test_the_period_and_the_full_speed_are_those_of_the_crane() -> None:
     assert not Drive(machine()).finding().notes
 
 
+@pytest.mark.slow
 def test_what_is_written() -> None:
     deployment = machine()
     bound = deployment.axes["near_far"]

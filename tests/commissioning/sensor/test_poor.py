@@ -78,6 +78,7 @@ def test_another_axis_moves_all_the_time(other: str) -> None:
     refused(Drive(machine(), script=script).series(), "expected near_far driven alone")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "axis"), [(0, "near_far"), (10, "near_far")])
 def test_a_drive_of_all_axes_is_refused_or_shows_the_truth(seed: int, axis: str) -> None:
     """Those that showed a delay 20 ms too large while a lift next to it counted as none."""

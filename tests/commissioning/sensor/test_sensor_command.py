@@ -68,6 +68,7 @@ def test_on_the_simulated_crane(tmp_path: Path) -> None:
     assert "Written" not in text
 
 
+@pytest.mark.slow
 def test_what_a_log_shows_is_written_and_then_trusted(tmp_path: Path, file: Path) -> None:
     assert "TRUSTED" not in trust(file)
     log = tmp_path / "drive.log"
@@ -94,6 +95,7 @@ def test_what_is_too_poor_is_not_written(tmp_path: Path, file: Path) -> None:
     assert file.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_one_axis_that_is_good_is_written_without_the_other(tmp_path: Path, file: Path) -> None:
     log = tmp_path / "drive.log"
     log_simulated(log, load_deployment(file), REAL, hand_driven(["slew"]))
@@ -102,12 +104,14 @@ def test_one_axis_that_is_good_is_written_without_the_other(tmp_path: Path, file
     assert "signal: Along" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["j1939-sensor.yaml", "canopen-sensor.yaml"])
 def test_sensors_of_other_protocols(tmp_path: Path, name: str) -> None:
     text = sensor(ROOT / "config" / name, "--axis", "near_far", "--out", tmp_path)
     assert "100 % explained" in text or "99 % explained" in text
 
 
+@pytest.mark.slow
 def test_of_j1939_the_address_of_the_file_counts(tmp_path: Path) -> None:
     """Another inclinometer on the bus, that of the cab, sends the same message."""
     name = ROOT / "config" / "j1939-sensor.yaml"

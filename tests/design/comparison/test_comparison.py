@@ -21,6 +21,7 @@ from canshaper_sim.operator import SCRIPTS
 from tests.design.comparison.candidates import CONFIG, FILE, ROBUST, task
 
 
+@pytest.mark.slow
 def test_every_filter_of_the_registry_takes_part_on_both_axes(deployment: Deployment) -> None:
     every = candidates(deployment)
     for axis in ("slew", "near_far"):
@@ -186,6 +187,7 @@ app(["compare", sys.argv[1], "--out", sys.argv[2], "--processes", "2"])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to_all", [True, False], ids=["terminal", "parent"])
 def test_ctrl_c_leaves_no_process_behind(to_all: bool, tmp_path: Path) -> None:
     process = subprocess.Popen(

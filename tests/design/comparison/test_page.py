@@ -42,6 +42,7 @@ def outcomes(deployment: Deployment) -> list[Outcome]:
     return [measure(deployment, robust, task, 0) for task in manoeuvres()]
 
 
+@pytest.mark.slow
 def test_residuals(outcomes: list[Outcome]) -> None:
     works = dict.fromkeys(o.work for o in outcomes)
     worst = [max(o.residual_deg for o in outcomes if o.work == work) for work in works]
@@ -49,6 +50,7 @@ def test_residuals(outcomes: list[Outcome]) -> None:
     assert given == dict(zip(works, (f"{deg:.2f}" for deg in worst), strict=True))
 
 
+@pytest.mark.slow
 def test_what_is_felt(outcomes: list[Outcome]) -> None:
     slew, near_far = (o for o in outcomes if o.work == "pulse")
     felt = (near_far.rise_s, near_far.stop_s, near_far.run_on_m, slew.run_on_m)
@@ -58,6 +60,7 @@ def test_what_is_felt(outcomes: list[Outcome]) -> None:
     assert row[8] == str(max(o.movements or 0 for o in outcomes))
 
 
+@pytest.mark.slow
 def test_limits(deployment: Deployment) -> None:
     head = "limit, % of swing"
     rows = {}

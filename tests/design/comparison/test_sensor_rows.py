@@ -31,6 +31,7 @@ def test_a_sensor_that_only_watches_has_none(tmp_path: Path) -> None:
     assert not [one for one in candidates(load_deployment(path)) if one.sensor]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length_pct", [-30, 30])
 def test_with_it_a_wrong_length_leaves_little(length_pct: int) -> None:
     deployment = load_deployment(FILE)

@@ -87,6 +87,7 @@ def test_the_tables_fit_80_columns(
     assert " 1.2 s               50.0    25.0   12.5    90.0" in printed
 
 
+@pytest.mark.slow
 def test_limits_lie_below_what_was_measured(
     deployment: Deployment, by_name: dict[str, Candidate]
 ) -> None:
@@ -113,6 +114,7 @@ def test_limits_lie_below_what_was_measured(
     assert all(limit < 0.99 * one for limit, one in zip(left[1:4], floor, strict=True))
 
 
+@pytest.mark.slow
 def test_the_table_of_limits(deployment: Deployment) -> None:
     """Each gives up what the one before is bound to; some figures are known from elsewhere."""
     limits = least(deployment)
@@ -125,6 +127,7 @@ def test_the_table_of_limits(deployment: Deployment) -> None:
     assert limits[3].no_dip_30 == pytest.approx(0.124, abs=0.003)
 
 
+@pytest.mark.slow
 def test_picture_has_every_name_once_in_each_panel() -> None:
     points = [
         Point(f"filter {i}", i % 2 == 0, 1.0 + 0.01 * i, 1.1 + 0.01 * i, 5.0 + 0.1 * i)
@@ -136,6 +139,7 @@ def test_picture_has_every_name_once_in_each_panel() -> None:
         assert all(texts.count(p.name) == 1 for p in points)
 
 
+@pytest.mark.slow
 def test_no_line_to_a_name_goes_through_another_name() -> None:
     """Names and dots of the shipped deployment: run-on in s, swing left in degrees."""
     spots = {

@@ -16,6 +16,7 @@ from canshaper.shaping.sway import SwayMode
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 
 
+@pytest.mark.slow
 def test_run_on_against_output_within_the_command() -> None:
     with pytest.raises(InfeasibleError) as caught:
         tune(Task(MODE, require=Requirements(max_run_on_s=1.2)))

@@ -70,6 +70,7 @@ def test_known_optima(known: tuple[Weights, str, bool]) -> None:
     assert tuning.converged == tuning.starts == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "weights", [PAPER_SLEW, PAPER_NEAR_FAR, Weights((0.0, 5.0), 0.5, 1.0, 8.0)]
 )
@@ -88,6 +89,7 @@ def test_a_search_with_other_means_finds_nothing_better(weights: Weights) -> Non
     assert _turned(tuning.poles_rad_s) == pytest.approx(poles, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_every_one_of_25_random_starts_converges() -> None:
     random = np.random.default_rng(7)
     starts = [tuple(-np.exp(random.uniform(math.log(0.7), math.log(45.0), 2))) for _ in range(25)]
@@ -116,6 +118,7 @@ def _turned(poles: tuple[float, float]) -> tuple[float, float]:
 # -- requirements ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_active_requirements_are_reported_and_no_others() -> None:
     double = "real poles (14d)"
     expected: dict[Requirements, set[str]] = {
@@ -157,6 +160,7 @@ def test_pole_distance_in_both_senses() -> None:
     assert printed.poles_rad_s == pytest.approx((far, far), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_each_requirement_is_kept_by_the_running_filter() -> None:
     cases = (
         Requirements(max_jump=0.5),
@@ -238,6 +242,7 @@ def test_least_worst_swing_over_a_range_of_length(range_pct: float) -> None:
 # -- flatness ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_ranges_are_where_the_cost_is_one_percent_higher() -> None:
     tuning = tune(Task(MODE, require=FREE))
     assert tuning.cost is not None

@@ -50,6 +50,7 @@ def test_one_pendulum_does_not_give_both() -> None:
     assert as_printed(SLEW, PAPER_NEAR_FAR).a2 < 0.5 * 0.12
 
 
+@pytest.mark.slow
 def test_the_best_single_pendulum_is_a_quarter_off() -> None:
     printed = ((PAPER_SLEW, (0.42, 0.043)), (PAPER_NEAR_FAR, (0.708, 0.12)))
 

@@ -47,6 +47,7 @@ def test_a_least_tap_makes_one_movement_of_a_tap_for_a_little_more_residual() ->
     assert 0.0 < floor.residual - free.residual < 0.012
 
 
+@pytest.mark.slow
 def test_no_other_taps_of_that_kind_do_better() -> None:
     """The programme claims a limit: random feasible taps never pass it."""
     best = least_residual(MODE, duration_s=1.6, range_pct=15.0, **VALVE)
@@ -61,6 +62,7 @@ def test_no_other_taps_of_that_kind_do_better() -> None:
             assert left >= best.residual * 0.99
 
 
+@pytest.mark.slow
 def test_shortest_is_as_short_as_can_be() -> None:
     design = shortest(MODE, residual_pct=5.0, range_pct=30.0, **VALVE)
     assert design.residual <= 0.05

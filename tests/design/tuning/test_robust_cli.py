@@ -59,6 +59,7 @@ def test_write_changes_the_filter_and_nothing_else(file: Path) -> None:
     assert len(line) < 280  # no one reads a line of a hundred taps
 
 
+@pytest.mark.slow
 def test_write_lengthens_a_tail_that_is_too_short(file: Path) -> None:
     words = (str(file), "--axis", "near_far", "--duration", "2.4", "--write")
     status, output = run(*words)

@@ -166,6 +166,7 @@ def test_the_pendulum_keeps_its_energy_and_swings_with_its_modes() -> None:
         assert end == pytest.approx(small, abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("upper_m", [0.3, 0.4, 0.5])
 def test_the_second_mode_is_left_in_peace_within_its_range_at_no_run_on(
     file: Path, upper_m: float
@@ -188,6 +189,7 @@ def test_the_second_mode_is_left_in_peace_within_its_range_at_no_run_on(
         assert first < first_before + 0.15
 
 
+@pytest.mark.slow
 def test_no_allowed_second_mode_spoils_the_first() -> None:
     """Compared with a swing that has died away, a damped one took the first from 0.1 to 6.8."""
     first = SwayMode.from_period(2.4, 0.02)
@@ -202,6 +204,7 @@ def test_no_allowed_second_mode_spoils_the_first() -> None:
             assert covering.mean_delay_s < alone.mean_delay_s + 0.01
 
 
+@pytest.mark.slow
 def test_the_shortest_keeps_both_modes_below_the_residual() -> None:
     first = LOGS.modes()[0]
     second = second_mode(first, 0.645, 0.09, 20.0, **VALVE)

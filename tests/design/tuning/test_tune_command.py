@@ -41,6 +41,7 @@ def run(file: Path, *options: str) -> Result:
     return CliRunner().invoke(app, ["tune", str(file), "--out", str(out), *options])
 
 
+@pytest.mark.slow
 def test_result_and_picture(file: Path) -> None:
     before = file.read_bytes()
     result = run(file, "--axis", "near_far")
@@ -63,6 +64,7 @@ def test_result_and_picture(file: Path) -> None:
     assert file.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_json(file: Path) -> None:
     result = run(file, "--axis", "slew", "--json", "--third-pole", "--max-run-on", "2.2")
     assert result.exit_code == 0, result.output
@@ -77,6 +79,7 @@ def test_json(file: Path) -> None:
     assert report["written"] is None
 
 
+@pytest.mark.slow
 def test_write_and_write_back(file: Path) -> None:
     before = file.read_text()
     result = run(file, "--axis", "slew", "--third-pole", "--write")
@@ -101,6 +104,7 @@ def test_write_and_write_back(file: Path) -> None:
     assert file.read_text() == expected
 
 
+@pytest.mark.slow
 def test_the_tail_is_written_where_the_stopping_distance_allows_it(file: Path) -> None:
     file.write_text(file.read_text().replace(*ROOM))
     before = file.read_text().splitlines()
@@ -122,6 +126,7 @@ def test_the_tail_is_written_where_the_stopping_distance_allows_it(file: Path) -
     assert file.read_text().splitlines() == after
 
 
+@pytest.mark.slow
 def test_the_longer_tail_leaves_less_swing_at_the_same_stop(file: Path) -> None:
     measured = {}
     for room in (False, True):
@@ -151,6 +156,7 @@ def test_a_tail_that_the_stopping_distance_forbids_stays_and_check_warns(file: P
     assert f"{file}:{line}: axes.near_far.filter.designed_for.duration_s: {says}" in checked.output
 
 
+@pytest.mark.slow
 def test_limits_that_the_file_leaves_out_get_a_section(file: Path) -> None:
     text = file.read_text()
     block = next(row for row in text.splitlines(keepends=True) if "stop_distance_m: 2.2" in row)
@@ -226,7 +232,10 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow) if n == "conflict" else n for n in BAD],
+)
 def test_errors_leave_the_file_alone(file: Path, name: str) -> None:
     before = file.read_bytes()
     options, text = BAD[name]

@@ -194,6 +194,7 @@ def test_stall_drops_what_the_valve_sent(rig: CanopenRig) -> None:
     assert rig.axis()[0] == "TRIPPED"
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(

@@ -222,6 +222,7 @@ any_frame = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(st.lists(any_frame, max_size=5), max_size=40))
 def test_whatever_comes_we_speak_under_our_address_only_and_not_when_it_is_lost(
     ticks: list[list[Frame]],

@@ -1,0 +1,190 @@
+"""Keeps `make test` short: a test that needs a second of a processor belongs to `make test-all`.
+
+With ``--budget`` the run fails for a test whose own and child processes take longer, unless LISTED
+names it with a reason, and for a list that takes longer than a minute. What takes longer gets the
+mark ``slow``, which those of LISTED lose. A fixture that several tests share is a row of its own,
+"fixture NAME".
+
+A second is one of the machine that the rule was made on: it is scaled by a loop of Python that is
+measured where a test seems too slow, so that neither a slow machine nor its other work breaks the
+rule. The libraries that take long to import are loaded before the first test.
+"""
+
+import importlib
+import resource
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pytest
+
+LIMIT_S = 1.0
+LISTED_S = 60.0
+# Slow tests that every run of `make test` has, by the beginning of their names.
+STUDIO = "tests/studio/test_server.py::test_every_shipped_machine_is_driven_with_all_its_axes"
+FAMILIES = ("forwarder-robust", "j1939-forwarder", "canopen-forwarder", "two-cranes")
+LISTED: Mapping[str, str] = {
+    "tests/blackbox/test_sequences.py::test_what_is_played_is_the_same[forwarder-robust": "replay",
+    "tests/campaign/test_cli.py::test_drives_are_summed_up_and_kept": "a campaign",
+    "tests/closed_loop/test_motion.py::test_slew_moves_itself_back": "both axes as one motion",
+    "tests/closed_loop/test_sway_sensor_slewing.py::test_a_slew_is_damped": "with a sensor",
+    "tests/closed_loop/test_twin.py::test_both_axes_at_fourteen": "a crane that shares no code",
+    "tests/commissioning/identification/test_identify_command.py::test_empty_and_loaded": "swings",
+    "tests/commissioning/procedure/test_commission.py::test_answers_come_from_a_file": "the whole",
+    "tests/controller/test_any_frames.py": "whatever frames come, nothing moves unasked",
+    "tests/docs/test_commands.py::test_a_page_shows_what_the_command_prints[README": "read first",
+    "tests/shaping/test_axis_properties.py::TestAxisUnderWatch": "the promises of an axis",
+    "tests/studio/test_browser.py": "the live page in a browser",
+    **{f"{STUDIO}[{name}": "one machine of a family" for name in FAMILIES},
+}
+# The loop took so long on the machine that LIMIT_S was chosen on.
+LOOP_S = 0.025
+IMPORTED = ("scipy.signal", "scipy.optimize", "matplotlib.pyplot", "casadi", "cantools", "mujoco")
+PROPERTY = "processor_s"
+
+
+def speed() -> float:
+    """Time of the loop here, as a multiple of LOOP_S; at least 1."""
+    best = min(_loop() for _ in range(3))
+    return max(1.0, best / LOOP_S)
+
+
+def _loop() -> float:
+    begin = time.process_time()
+    total = 0.0
+    for number in range(400_000):
+        total += number * 0.5
+    return time.process_time() - begin
+
+
+def used() -> float:
+    """Processor time of this process and of its children that have ended, s."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+class Meter:
+    """Measures each test; runs in every process that runs tests."""
+
+    def __init__(self) -> None:
+        self._begin = 0.0
+        self._shared: dict[str, float] = {}  # since the begin of this test, by fixture
+
+    def pytest_sessionstart(self) -> None:
+        for name in IMPORTED:
+            try:
+                importlib.import_module(name)
+            except ImportError:  # an extra that is not installed: its tests say so
+                continue
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_logstart(self) -> None:
+        self._begin = used()
+        self._shared = {}
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(
+        self, fixturedef: pytest.FixtureDef[Any], request: pytest.FixtureRequest
+    ) -> Iterator[None]:
+        if fixturedef.scope == "function":
+            return (yield)
+        name, ended = fixturedef.argname, 0.0
+
+        # Finalizers run last in, first out: this one last, `ending` first.
+        fixturedef.addfinalizer(lambda: self._charge(name, used() - ended))
+        begin, inner = used(), sum(self._shared.values())
+        try:
+            return (yield)
+        finally:
+            self._charge(name, used() - begin - (sum(self._shared.values()) - inner))
+
+            def ending() -> None:
+                nonlocal ended
+                ended = used()
+
+            fixturedef.addfinalizer(ending)
+
+    def _charge(self, fixture: str, seconds: float) -> None:
+        self._shared[fixture] = self._shared.get(fixture, 0.0) + seconds
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
+        report = yield
+        if call.when == "teardown":
+            own = used() - self._begin - sum(self._shared.values())
+            rows = {item.nodeid: own}
+            place = item.nodeid.partition("::")[0]
+            rows |= {f"{place}::fixture {name}": s for name, s in self._shared.items()}
+            factor = speed() if max(rows.values()) > LIMIT_S else 1.0
+            scaled = {name: seconds / factor for name, seconds in rows.items()}
+            report.user_properties.append((PROPERTY, scaled))
+        return report
+
+
+class Judge:
+    """Collects what the meters measured and judges it at the end; runs in the first process."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, float] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        for name, value in report.user_properties:
+            if name == PROPERTY:
+                for row, seconds in value.items():
+                    self._rows[row] = self._rows.get(row, 0.0) + seconds
+
+    def findings(self) -> list[str]:
+        """Lines that say which tests break the rule."""
+        listed = {row: s for row, s in self._rows.items() if row.startswith(tuple(LISTED))}
+        lines = [
+            f"{row} takes {seconds:.2f} s of a processor, {LIMIT_S:g} are allowed: mark it slow"
+            for row, seconds in self._rows.items()
+            if seconds > LIMIT_S and row not in listed
+        ]
+        if sum(listed.values()) > LISTED_S:
+            lines.append(f"tests of the list take {sum(listed.values()):.0f} s of {LISTED_S:g}")
+        files = {row.partition("::")[0] for row in self._rows}
+        absent = [
+            name
+            for name in LISTED
+            if name.partition("::")[0] in files and not any(r.startswith(name) for r in self._rows)
+        ]
+        return lines + [f"{name} of the list is no test that ran" for name in absent]
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        if self.findings() and session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        total = sum(self._rows.values())
+        listed = sum(s for row, s in self._rows.items() if row.startswith(tuple(LISTED)))
+        terminalreporter.write_line(
+            f"processor time {total:.0f} s, of it {listed:.0f} s of the list in tests/budget.py"
+        )
+        for line in self.findings():
+            terminalreporter.write_line(line, red=True)
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m selects
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Take the mark off the tests of the list: they are part of `make test`."""
+    for item in items:
+        if item.nodeid.startswith(tuple(LISTED)):
+            item.own_markers = [mark for mark in item.own_markers if mark.name != "slow"]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add --budget."""
+    parser.addoption("--budget", action="store_true", help="fail for tests of a second and more")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Measure in every process, judge in the first."""
+    if not config.getoption("--budget"):
+        return
+    first = not hasattr(config, "workerinput")
+    if first:
+        config.pluginmanager.register(Judge(), "canshaper-budget-judge")
+    if not first or not config.getoption("numprocesses", None):
+        config.pluginmanager.register(Meter(), "canshaper-budget-meter")

@@ -1,0 +1,162 @@
+"""The parts of the test suite: what each runs, and what it needs of the machine."""
+
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from tests.lane.outcome import NoLane  # noqa: E402
+from tests.lane.packages import cache_lock, install, missing  # noqa: E402
+
+BIN = Path(sys.executable).parent
+JOBS = os.environ.get("JOBS") or str(len(os.sched_getaffinity(0)))
+SPREAD = ("-n", JOBS, "--dist", "loadfile")
+# Rooms of what decides whether a valve moves.
+GATE = "codec machine shaping inputs guard bus protocols controller daemon"
+COUNTED = re.compile(r"(\d+) (passed|failed|skipped|error)")
+SKIPPED = re.compile(r"^SKIPPED \[(\d+)\] [^ ]+ (.+)$")
+FAILED = re.compile(r"^(FAILED|ERROR) ")
+
+Command = list[str]
+
+
+def pytest(*arguments: str) -> Command:
+    """Return the command of a run of pytest; without paths of all tests that need no kernel."""
+    paths = [] if any(word.startswith("tests/") for word in arguments) else ["tests", "studies"]
+    ignored = ["--ignore=tests/hil", "--ignore=tests/systemd"]
+    ignored = [*ignored, "--ignore-glob=*/test_browser*.py"] if paths else []
+    return [sys.executable, "-m", "pytest", "-q", *arguments, *ignored, *paths]
+
+
+def hil(names: str, *arguments: str) -> Command:
+    """Return the command that runs files of tests/hil, in the machine that has its own time."""
+    files = [f"tests/hil/test_{name}.py" for name in names.split()]
+    return [sys.executable, "-m", "tests.lane.hil", "--steady", "-q", *arguments, *files]
+
+
+def browser(*arguments: str) -> Command:
+    """Return the command that runs the tests of the live page in Chromium."""
+    files = sorted((ROOT / "tests/studio").glob("test_browser*.py"))
+    return pytest(*arguments, *(str(file.relative_to(ROOT)) for file in files))
+
+
+def no_lane() -> str | None:
+    """Prepare the lane of SocketCAN; return why there is none, if so."""
+    command = [sys.executable, "-m", "tests.lane", "--prepare"]
+    done = subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, check=False)
+    print(done.stderr, end="", flush=True)
+    return done.stderr.strip().split("\n")[-1].removeprefix("lane: ") if done.returncode else None
+
+
+def no_chromium() -> str | None:
+    """Install Chromium where it is absent; return why there is none, if so."""
+    try:
+        with cache_lock():
+            install(missing({"chromium": "chromium"}))
+    except NoLane as error:
+        return str(error)
+    return None
+
+
+@dataclass
+class Part:
+    """Commands that belong together, and what became of them.
+
+    ``absent`` prepares what the part needs and returns why that cannot be had here.
+    """
+
+    name: str
+    shows: str
+    commands: Sequence[Command]
+    absent: Callable[[], str | None] = lambda: None
+    environment: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+    status: int | None = None
+    not_run: str | None = None
+    counts: Counter[str] = field(default_factory=Counter)
+    skipped: Counter[str] = field(default_factory=Counter)
+    failed: list[str] = field(default_factory=list)
+
+    @property
+    def result(self) -> str:
+        """Word for the table."""
+        if self.not_run is not None:
+            return "not run"
+        return "not ended" if self.status is None else "FAILED" if self.status else "ok"
+
+    def note(self, line: str) -> None:
+        """Take from a line of output what the table shows."""
+        if skipped := SKIPPED.match(line):
+            self.skipped[skipped[2].partition(": ")[2] or skipped[2]] += int(skipped[1])
+        elif FAILED.match(line):
+            self.failed.append(line)
+        elif re.search(r" in [\d.]+s\b", line):  # the last line of pytest
+            self.counts.update({word: int(number) for number, word in COUNTED.findall(line)})
+
+
+WINDOW = {"CANSHAPER_BROWSER": "1"}
+TOGETHER = "socketcan daemon closed_loop doctor"
+MACHINES = (
+    "j1939 j1939_read canopen canopen_shipped canfd calibrate gateway gateway_rules commission"
+)
+FAULTS = "faults process_faults interface_faults"
+
+
+def rows_of_test() -> list[list[Part]]:
+    """Return what `make test` runs, in order; the parts of a row run side by side."""
+    style = [[f"{BIN}/ruff", "check"], [f"{BIN}/ruff", "format", "--check"]]
+    fast = pytest(*SPREAD, "--budget", "-m", "not slow and not study")
+    few = browser("--budget", "-m", "not slow")
+    kernel = hil("socketcan daemon", "-m", "not slow")
+    return [
+        [Part("lint", "style and format", style)],
+        [Part("fast", "all tests of less than a second of a processor", [fast])],
+        [
+            Part(
+                "socketcan", "ports and a drive of the daemon on a real kernel", [kernel], no_lane
+            ),
+            Part("browser", "the live page in Chromium", [few], no_chromium, WINDOW),
+        ],
+    ]
+
+
+def rows_of_more() -> list[list[Part]]:
+    """Return what `make test-all` runs besides, in order."""
+    types = [[f"{BIN}/mypy"], [f"{BIN}/lint-imports"]]
+    gate = [f"tests/{room}" for room in GATE.split()]
+    cover = [pytest(*SPREAD, "--cov", "--cov-report=term", *gate)]
+    core = [[sys.executable, "tools/mutation.py", f"-j{JOBS}", "core"]]
+    service = [[sys.executable, "-m", "tests.lane.services", "-q"]]
+    slow, study = (pytest(*SPREAD, "-m", mark) for mark in ("slow and not study", "study"))
+    return [
+        [Part("types", "mypy, import contracts", types)],
+        [Part("coverage", "every line and branch of what decides whether a valve moves", cover)],
+        [Part("mutation-core", "a test notices every small change of the core", core)],
+        [Part("slow", "tests of a second and more", [slow])],
+        [
+            Part(
+                "socketcan-all",
+                "daemon, closed loop, doctor on a real kernel",
+                [hil(TOGETHER)],
+                no_lane,
+            ),
+            Part(
+                "browser-all", "the whole live page in Chromium", [browser()], no_chromium, WINDOW
+            ),
+        ],
+        [
+            Part("machines", "foreign nodes and tools, CAN FD, gateway", [hil(MACHINES)], no_lane),
+            Part(
+                "faults", "every fault of docs/safety.md on a real kernel", [hil(FAULTS)], no_lane
+            ),
+        ],
+        [Part("service", "the Debian package under a real systemd", service, no_lane)],
+        [Part("studies", "every seed of noise, every instant of a fault", [study])],
+    ]
