@@ -1,0 +1,26 @@
+"""Parts of pages that a command writes: ``<!-- KIND: NAME -->`` to ``<!-- end: NAME -->``."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+
+def marked(page: str, kind: str) -> list[str]:
+    """Names of the sections of a kind, ``generated`` or ``measured``, in their order."""
+    return re.findall(rf"^<!-- {kind}: (.*?) -->$", page, re.MULTILINE)
+
+
+def section_lines(page: str, kind: str, name: str) -> list[str]:
+    """Lines of one section, without empty ones; none where its end is missing."""
+    _, _, rest = page.partition(f"<!-- {kind}: {name} -->\n")
+    lines, end, _ = rest.partition(f"<!-- end: {name} -->\n")
+    return [line for line in lines.splitlines() if line] if end else []
+
+
+def with_sections(page: str, sections: Mapping[str, Iterable[str]], kind: str = "generated") -> str:
+    """Text of a page with the lines of its sections of a kind, by their names."""
+    for name, lines in sections.items():
+        begin, end = f"<!-- {kind}: {name} -->\n", f"<!-- end: {name} -->\n"
+        before, _, rest = page.partition(begin)
+        _, _, after = rest.partition(end)
+        page = before + begin + "\n" + "".join(f"{line}\n" for line in lines) + "\n" + end + after
+    return page
