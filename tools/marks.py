@@ -17,10 +17,16 @@ def section_lines(page: str, kind: str, name: str) -> list[str]:
 
 
 def with_sections(page: str, sections: Mapping[str, Iterable[str]], kind: str = "generated") -> str:
-    """Text of a page with the lines of its sections of a kind, by their names."""
+    """Text of a page with the lines of its sections of a kind, by their names.
+
+    Raises:
+        ValueError: a section has no begin or no end.
+    """
     for name, lines in sections.items():
         begin, end = f"<!-- {kind}: {name} -->\n", f"<!-- end: {name} -->\n"
         before, _, rest = page.partition(begin)
-        _, _, after = rest.partition(end)
+        _, there, after = rest.partition(end)
+        if not there:
+            raise ValueError(f"expected {begin.strip()} and after it {end.strip()}")
         page = before + begin + "\n" + "".join(f"{line}\n" for line in lines) + "\n" + end + after
     return page
