@@ -2,11 +2,12 @@
 
 A table of README.md or docs/ between the marks
 
-    <!-- measured: python benchmarks/figures.py NAME ... -->
-    <!-- end: python benchmarks/figures.py NAME ... -->
+    <!-- measured: make bench -->
+    <!-- end: make bench -->
 
-holds the figures of these benchmarks, and the commit and the machine that gave them. --write takes
-no tree with changes: the commit would not say what was measured. Write on a quiet machine.
+holds the figures of the quick benchmarks (make bench-realtime: of the slow ones), and the commit
+and the machine that gave them. --write takes no tree with changes: the commit would not say what
+was measured. Write on a quiet machine.
 
     .venv/bin/python benchmarks/figures.py                      those that take minutes together
     .venv/bin/python benchmarks/figures.py tick                 one benchmark
@@ -27,11 +28,11 @@ from pathlib import Path
 
 from measure import CONDITIONS, HEADS, Row, print_table, progress
 
-from tools.marks import marked, section_lines, with_sections
+from tools.marks import STAMP, marked, section_lines, stamped, with_sections
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMAND = "python benchmarks/figures.py "
 MOST_CHANGE = 0.1
+ELSEWHERE = ("stops and silence",)  # tests/hil/stops.py writes it
 # Options of each; those of the pages first.
 QUICK: Mapping[str, Sequence[str]] = {
     "frames": (),
@@ -47,8 +48,8 @@ SLOW: Mapping[str, Sequence[str]] = {
     "gateway": (),
     "memory": ("--vcan", "--minutes", "60", "--every", "30"),
 }
+TABLES = {"make bench": QUICK, "make bench-realtime": SLOW}
 OTHERS = ("path", "logs", "identify", "tune", "hostile", "control", "campaign")
-STAMP = re.compile(r"Commit `[0-9a-f]{7,40}`")
 NUMBER = re.compile(r"(.*?)(-?\d+(?:\.\d+)?)?")
 SOURCES = ("canshaper", "sim", "benchmarks", "config", "dbc", "pyproject.toml")
 
@@ -74,7 +75,7 @@ class Table:
     @property
     def names(self) -> list[str]:
         """Its benchmarks."""
-        return self.command.removeprefix(COMMAND).split()
+        return [*TABLES[self.command]]
 
     @property
     def rows(self) -> list[list[str]]:
@@ -84,8 +85,8 @@ class Table:
     def faults(self) -> list[str]:
         """What is not as the benchmarks would write it."""
         where = f"{self.page.name}: {self.command}"
-        if unknown := [n for n in self.names if n not in {**QUICK, **SLOW}]:
-            return [f"{where}: no benchmark of figures.py: {', '.join(unknown)}"]
+        if self.command not in TABLES:
+            return [f"{where}: expected a mark of {' or '.join(TABLES)}"]
         faults = []
         if [cells_of(line) for line in self.lines[:1]] != [list(HEADS)]:
             faults.append(f"{where}: expected the columns {', '.join(HEADS)}")
@@ -115,7 +116,7 @@ def tables(root: Path) -> list[Table]:
     found = []
     for page in (root / "README.md", *sorted((root / "docs").rglob("*.md"))):
         text = page.read_text(encoding="utf-8")
-        names = [name for name in marked(text, "measured") if name.startswith(COMMAND)]
+        names = [name for name in marked(text, "measured") if name not in ELSEWHERE]
         found += [Table(page, name, section_lines(text, "measured", name)) for name in names]
     return found
 
@@ -181,7 +182,7 @@ def moved(table: Table, results: Mapping[str, Measured]) -> list[Row]:
     return found
 
 
-def written(table: Table, results: Mapping[str, Measured], commit: str) -> list[str]:
+def written(table: Table, results: Mapping[str, Measured], stamp: str) -> list[str]:
     """Lines of a table with what was measured now."""
     rows = [line for name in table.names for line in results[name].lines]
     heads = [f"| {' | '.join(HEADS)} |", f"|{'---|' * len(HEADS)}"]
@@ -189,20 +190,7 @@ def written(table: Table, results: Mapping[str, Measured], commit: str) -> list[
     for name in table.names:
         machines.setdefault(results[name].conditions, []).append(name)
     conditions = [f"{', '.join(names)}: {machine}" for machine, names in machines.items()]
-    return [*heads, *rows, "", f"Commit `{commit}`; {'; '.join(conditions)}."]
-
-
-def commit_of_tree() -> str:
-    """Short hash of the commit; SystemExit where the sources are not as it has them."""
-
-    def git(*words: str) -> str:
-        return subprocess.run(
-            ["git", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True
-        ).stdout.strip()
-
-    if changes := git("status", "--porcelain", "--", *SOURCES):
-        raise SystemExit(f"commit these first, nothing is measured or written:\n{changes}")
-    return git("rev-parse", "--short", "HEAD")
+    return [*heads, *rows, "", f"{stamp}; {'; '.join(conditions)}."]
 
 
 def report(rows: Sequence[Row], failed: Mapping[str, str]) -> None:
@@ -238,10 +226,11 @@ def main(words: Sequence[str] | None = None) -> int:
     options = parser.parse_args(words)
     if unknown := sorted({*options.names} - known):
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(sorted(known))}")
-    names, shown = chosen(options, tables(ROOT))
-    if wrong := [fault for table in shown for fault in table.faults() if not options.write]:
+    every = tables(ROOT)
+    if wrong := [fault for table in every for fault in table.faults() if not options.write]:
         parser.error("\n".join(wrong))
-    commit = commit_of_tree() if options.write else ""
+    names, shown = chosen(options, every)
+    stamp = stamped(*SOURCES) if options.write else ""
     results, failed = measured_all(names)
     report([row for table in shown for row in moved(table, results)], failed)
     for table in shown if options.write else ():
@@ -249,7 +238,7 @@ def main(words: Sequence[str] | None = None) -> int:
             print(f"not written: {table.page.name}: {table.command}")
             continue
         text = table.page.read_text(encoding="utf-8")
-        lines = written(table, results, commit)
+        lines = written(table, results, stamp)
         table.page.write_text(with_sections(text, {table.command: lines}, "measured"), "utf-8")
         print(f"written: {table.page.name}: {table.command}")
     return 1 if failed else 0

@@ -1,7 +1,12 @@
 """Parts of pages that a command writes: ``<!-- KIND: NAME -->`` to ``<!-- end: NAME -->``."""
 
 import re
+import subprocess
 from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+STAMP = re.compile(r"Commit `[0-9a-f]{7,40}`")
 
 
 def marked(page: str, kind: str) -> list[str]:
@@ -30,3 +35,21 @@ def with_sections(page: str, sections: Mapping[str, Iterable[str]], kind: str = 
             raise ValueError(f"expected {begin.strip()} and after it {end.strip()}")
         page = before + begin + "\n" + "".join(f"{line}\n" for line in lines) + "\n" + end + after
     return page
+
+
+def stamped(*sources: str) -> str:
+    """The commit that a measured table was made at.
+
+    Raises:
+        SystemExit: these sources are not as the commit has them.
+    """
+
+    def git(*words: str) -> str:
+        done = subprocess.run(
+            ["git", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    if changes := git("status", "--porcelain", "--", *sources):
+        raise SystemExit(f"commit these first, for a table names its commit:\n{changes}")
+    return f"Commit `{git('rev-parse', '--short', 'HEAD')}`"

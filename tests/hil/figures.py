@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from tools.marks import with_sections
+from tools.marks import stamped, with_sections
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
 SECTION = "stops and silence"
@@ -98,6 +98,7 @@ def write(stops: Sequence[Stop], silences: Sequence[Silence], *, rewrite: bool) 
     for line in wrong:
         print(line)
     if rewrite and not wrong:
-        text = with_sections(PAGE.read_text("utf-8"), {SECTION: rows}, "measured")
+        lines = {SECTION: [*rows, "", f"{stamped('canshaper')}."]}
+        text = with_sections(PAGE.read_text("utf-8"), lines, "measured")
         PAGE.write_text(text, "utf-8")
     return 1 if wrong else 0
