@@ -83,30 +83,12 @@ j1939: .venv/test-ready
 	.venv/bin/python -m tests.lane --timeout 0 -- \
 		.venv/bin/python -m tests.hil.j1939_drive --minutes $(MINUTES)
 
+# Figures of the pages: measured again, what moved by more than 10 % shown. ARGS=--write writes them.
 bench: .venv/test-ready
-	.venv/bin/python benchmarks/tick.py
-	.venv/bin/python benchmarks/path.py
-	.venv/bin/python benchmarks/startup.py
-	.venv/bin/python benchmarks/large_dbc.py
-	.venv/bin/python benchmarks/lockstep.py
-	.venv/bin/python benchmarks/campaign.py
-	.venv/bin/python benchmarks/replay.py
-	.venv/bin/python benchmarks/logs.py
-	.venv/bin/python benchmarks/identify.py
-	.venv/bin/python benchmarks/tune.py
-	.venv/bin/python benchmarks/frames.py
-	.venv/bin/python benchmarks/hostile.py
-	.venv/bin/python benchmarks/kilohertz.py
-	.venv/bin/python benchmarks/kilohertz.py --vcan --seconds 3
-	.venv/bin/python benchmarks/memory.py --minutes 1 --every 5
+	.venv/bin/python benchmarks/figures.py $(ARGS)
 
-# The slow ones of docs/realtime.md, on both kernels.
 bench-realtime: .venv/test-ready
-	.venv/bin/python benchmarks/lateness.py --ticks 1000
-	.venv/bin/python benchmarks/lateness.py --ticks 1000 --kernel rt
-	.venv/bin/python benchmarks/frames.py --bus can
-	.venv/bin/python benchmarks/gateway.py
-	.venv/bin/python benchmarks/memory.py --minutes 60 --every 30
+	.venv/bin/python benchmarks/figures.py --slow $(ARGS)
 
 # And the manual pages, out/man.
 docs: .venv/docs-ready

@@ -14,9 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from canshaper.cli.common import (
-    loader,
-)
+from canshaper.cli.common import loader
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.daemon.control_server import (

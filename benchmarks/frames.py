@@ -5,10 +5,8 @@ joystick frames at every phase of the tick. "processing" has not: from the last 
 tick still takes a frame to the valve frame, which is wake-up, read, decode, filter, encode, send.
 The other gateways answer every frame at once.
 
-Times are the kernel's, from the gateway's interface to the valve's. "with client" adds what one
-in Python takes to send the joystick frame and to be handed the valve frame; that is measured with
-cangw, where nothing else runs between. "CPU" is that of the gateway's process for a frame or a
-tick. Gateways have FIFO priority 40, the client 30, everything else none.
+Times are the kernel's, from the gateway's interface to the valve's. "CPU" is that of the gateway's
+process for a frame or a tick. Gateways have FIFO priority 40, the client 30, everything else none.
 
     python benchmarks/frames.py                            vcan0
     python benchmarks/frames.py --bus can --kernel rt      two controllers on a bus, PREEMPT_RT
@@ -20,7 +18,6 @@ at their cycle; and how far its valve frames are apart.
 
 import argparse
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -29,20 +26,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from measure import Figure, Row, conditions, in_lane, print_table, progress, publish, quantile
 from rig import (
     DBC,
     LOADS,
     PEERS,
-    Row,
     as_client,
-    compiled,
     cpu_ns,
     daemon,
-    in_lane,
     load,
-    machine,
-    print_table,
-    quantile,
     run_in_lane,
     running,
     shipped,
@@ -56,8 +48,17 @@ ECHO_PERIOD_NS = 5_000_000
 JOYSTICK_NS = 20_000_000
 RIGHT_NS = 5_000_000  # the right joystick comes before the left
 AHEAD_NS = 100_000  # what the client needs from one exchange to the next
-PYTHON_ECHO, NOTIFIER, CANGW = "Python echo", "Notifier + cantools", "cangw, in the kernel"
-CANGW_SETS = "SET:I:200.0.0000000000000000"
+PYTHON_ECHO, NOTIFIER = "Python echo", "Notifier + cantools"
+ONE_AXIS, THREE_AXES = "canshaper, 1 axis, 1 ms", "canshaper, 3 axes, 20 ms"
+FOLLOWS = "ticks that follow, 3 axes, 20 ms"
+FIGURES = (
+    Figure("joystick frame to valve frame, 1 axis, virtual us", NOTIFIER, most_ratio=0.5),
+    Figure("joystick frame to valve frame, 3 axes, virtual us", NOTIFIER),
+    Figure("as the first, next to an echo, virtual us", PYTHON_ECHO, most_ratio=2.5),
+    Figure("with `follow` and the wait, median, virtual ms", "fixed ticks", most=1.6),
+    Figure("with `follow` and the wait, longest, virtual ms", "fixed ticks", most=2.0),
+    Figure("with `follow`, cycle of valve frames off by, virtual ms", most=0.3),
+)
 
 
 @dataclass
@@ -67,13 +68,12 @@ class Result:
     title: str
     times: list[float]
     cpu: float | None = None  # of the gateway's process, per frame or per tick
-    client: float | None = None  # what the client's own work adds
 
 
 class Answering:
     """A gateway that answers every joystick frame at once."""
 
-    def __init__(self, title: str, wire: Wire, pid: int | None, count: int) -> None:
+    def __init__(self, title: str, wire: Wire, pid: int, count: int) -> None:
         self.title, self.wire, self.pid, self.count = title, wire, pid, count
 
     def find_phase(self) -> None:
@@ -84,11 +84,10 @@ class Answering:
         self._exchanges(WARM_UP)
         while not at_work():
             self._exchanges(1)
-        before = cpu_ns(self.pid) if self.pid else 0
+        before = cpu_ns(self.pid)
         seen = self._exchanges(self.count)
-        cpu = (cpu_ns(self.pid) - before) / 1e3 / self.count if self.pid else None
-        client = statistics.median(e.client_us for e in seen)
-        return [Result(self.title, [e.gateway_us for e in seen], cpu, client)]
+        cpu = (cpu_ns(self.pid) - before) / 1e3 / self.count
+        return [Result(self.title, [e.gateway_us for e in seen], cpu)]
 
     def _exchanges(self, count: int) -> list[Exchange]:
         at = time.monotonic_ns()
@@ -215,25 +214,17 @@ def each_gateway(
 ) -> Iterator[Answering | Ticking | Following]:
     """Every gateway, each running while it is yielded."""
     near, log = wire.near, directory / "log"
-    echo = compiled(PEERS / "echo.c", directory)
     peers: dict[str, list[str | Path]] = {
         PYTHON_ECHO: [sys.executable, PEERS / "echo.py", near],
         NOTIFIER: [sys.executable, PEERS / "notifier.py", near, DBC],
     }
-    if echo:
-        peers = {"C echo": [echo, near], **peers}
     for title, command in peers.items():
         with running(command, log) as process:
             wait_for_text(process, log, "ready")
             yield Answering(title, wire, process.pid, count)
-    subprocess.run(["modprobe", "can-gw"], check=True)
-    rule = ["-s", near, "-d", near, "-i", "-e", "-f", "110:C00007FF", "-m", CANGW_SETS]
-    subprocess.run(["cangw", "-A", *rule], check=True)
-    yield Answering(CANGW, wire, None, count)
-    subprocess.run(["cangw", "-F"], check=True)
     deployments = {
-        "canshaper, 3 axes, 20 ms": (shipped(directory, near), 20),
-        "canshaper, 1 axis, 1 ms": (slew_only(directory, near, 1), 1),
+        THREE_AXES: (shipped(directory, near), 20),
+        ONE_AXIS: (slew_only(directory, near, 1), 1),
     }
     for title, (file, tick_ms) in deployments.items():
         with running(daemon(file), log) as process:
@@ -243,26 +234,38 @@ def each_gateway(
     file.write_text("tick: { follow: left }\n" + file.read_text("utf-8"), "utf-8")
     with running(daemon(file), log) as process:
         wait_for_frames(wire, process, log)
-        yield Following("ticks that follow, 3 axes, 20 ms", wire, process.pid, count)
+        yield Following(FOLLOWS, wire, process.pid, count)
 
 
 def print_results(results: list[Result]) -> None:
     """Print figures, and their ratios to the two peers in Python."""
     median = {r.title: statistics.median(r.times) for r in results}
-    client = next(r.client for r in results if r.title == CANGW) or 0.0
     rows = []
     for r in results:
         figures = [min(r.times), median[r.title], quantile(r.times, 0.99), max(r.times)]
         cells = [f"{f:.1f}" for f in figures]
-        for more in (0.0, client):
-            whole = median[r.title] + more
-            cells += [f"{whole:.1f}"] if more else []
-            cells += [f"{whole / (median[peer] + more):.2f}" for peer in (PYTHON_ECHO, NOTIFIER)]
+        cells += [f"{median[r.title] / median[peer]:.2f}" for peer in (PYTHON_ECHO, NOTIFIER)]
         cells.append("" if r.cpu is None else f"{r.cpu:.0f}")
         rows.append(Row(r.title, cells))
-    ratios = ["/ echo", "/ Notifier"]
-    heads = ["least", "median", "p99", "max", *ratios, "with client", *ratios, "CPU"]
-    print_table(heads, rows)
+    print_table(["least", "median", "p99", "max", "/ echo", "/ Notifier", "CPU"], rows)
+
+
+def publish_results(results: list[Result]) -> None:
+    """Print the figures of the page."""
+    by_title = {r.title: r for r in results}
+    median = {title: statistics.median(r.times) for title, r in by_title.items()}
+    one, three = (f"{title}: processing" for title in (ONE_AXIS, THREE_AXES))
+    follows, fixed = (by_title[f"{t}: from outside"].times for t in (FOLLOWS, THREE_AXES))
+    apart = by_title[f"{FOLLOWS}: valve frames apart"].times
+    values = [
+        (median[one], median[NOTIFIER]),
+        (median[three], median[NOTIFIER]),
+        (median[one], median[PYTHON_ECHO]),
+        (statistics.median(follows) / 1e3, statistics.median(fixed) / 1e3),
+        (max(follows) / 1e3, max(fixed) / 1e3),
+        (max(abs(us / 1e3 - JOYSTICK_NS / 1e6) for us in apart),),
+    ]
+    publish(FIGURES, values)
 
 
 def main() -> None:
@@ -289,11 +292,13 @@ def main() -> None:
             if options.load:
                 with load(Path(name), options.load) as at_work:
                     loaded += gateway.measure(at_work)
-    print(f"joystick frame to valve frame, us; {near} and {far}; {machine()}")
+            progress(f"{gateway.title}: done")
+    print(f"joystick frame to valve frame, us; {near} and {far}; {conditions()}")
     print_results(idle)
     if loaded:
         print(f"\nwith {', '.join(options.load)}")
         print_results(loaded)
+    publish_results(idle)
 
 
 if __name__ == "__main__":

@@ -26,20 +26,16 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import cantools
+from measure import Figure, Row, conditions, in_lane, print_table, progress, publish, quantile
 from rig import (
     DBC,
     LOADS,
     ROOT,
     START_S,
-    Row,
     as_client,
     cpu_ns,
     daemon,
-    in_lane,
     load,
-    machine,
-    print_table,
-    quantile,
     run_in_lane,
     running,
     wait_for_text,
@@ -60,6 +56,11 @@ FOREIGN = 0x7E0
 FRAME_TIME_US = 640.0  # the longest frame of 8 bytes with 29 bits, stuffed, at 250 kbit/s
 WARM_UP = 100
 CLIENT_FIFO = 45
+BRIDGE, OURS = "python-can bridge", "canshaper, passing: kernel"
+FIGURES = (
+    Figure("gateway, joystick frame, median, virtual us", BRIDGE),
+    Figure("gateway, other frames, p99.9, virtual us", BRIDGE),
+)
 
 
 class Line:
@@ -101,8 +102,8 @@ class Line:
             sleep_until(at + step * 3 // 4)  # all have passed; nothing of this delays a gateway
             at += step
             for can_id, delays_us in times.items():
-                _, in_ns, _ = receive_stamped(self._in[can_id])
-                _, out_ns, _ = receive_stamped(self._out[can_id])
+                _, in_ns = receive_stamped(self._in[can_id])
+                _, out_ns = receive_stamped(self._out[can_id])
                 delays_us.append((out_ns - in_ns) / 1e3)
         return times
 
@@ -146,7 +147,7 @@ def each_gateway(directory: Path) -> Iterator[tuple[str, int | None]]:
         bridge += [f"--bus{n}-interface", "socketcan", f"--bus{n}-channel", channel]
     with running(bridge, log) as process:
         wait_for_text(process, log, "CAN Bridge (Started")
-        yield "python-can bridge", process.pid
+        yield BRIDGE, process.pid
     for passing in ("kernel", "daemon"):
         text = CONFIG.read_text().replace("../dbc", str(ROOT / "dbc"))
         if passing == "daemon":
@@ -200,10 +201,14 @@ def main() -> None:
                 times = line.measure(at_work)
                 used = (cpu_ns(pid) - before) / (time.monotonic_ns() - begin) if pid else None
             results[title] = times, None if used is None else 100 * used
-            print(f"{title} done", file=sys.stderr, flush=True)
+            progress(f"{title}: done")
     loaded = f", with {', '.join(options.load)}" if options.load else ""
-    print(f"us from {NEAR} to {FAR}, {options.count} cycles{loaded}; {machine()}")
+    print(f"us from {NEAR} to {FAR}, {options.count} cycles{loaded}; {conditions()}")
     print_results(results)
+    ours, peer = (results[title][0] for title in (OURS, BRIDGE))
+    joystick = [statistics.median(times[JOYSTICK_LEFT]) for times in (ours, peer)]
+    others = [quantile(times[FOREIGN], 0.999) for times in (ours, peer)]
+    publish(FIGURES, [joystick, others])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from resource import RUSAGE_CHILDREN, getrusage
+
+from measure import cpu_s
 
 from tests.commissioning.identification.machine import FILE, Push, candump, driven
 
@@ -35,19 +36,16 @@ def strokes(seconds: float, seed: int) -> list[Push]:
     return pushes
 
 
-def cpu_s(*command: object) -> float:
-    """CPU time of a process that may find the data too poor."""
+def process_s(*command: object) -> float:
+    """Processor time of a process that may have not enough data, s."""
 
-    def used() -> float:
-        usage = getrusage(RUSAGE_CHILDREN)
-        return usage.ru_utime + usage.ru_stime
+    def run() -> None:
+        words = [sys.executable, *map(str, command)]
+        done = subprocess.run(words, stdout=subprocess.DEVNULL, check=False)
+        if done.returncode not in (0, 1):
+            raise SystemExit(done.returncode)
 
-    before = used()
-    words = [sys.executable, *map(str, command)]
-    done = subprocess.run(words, stdout=subprocess.DEVNULL, check=False)
-    if done.returncode not in (0, 1):
-        raise SystemExit(done.returncode)
-    return used() - before
+    return cpu_s(run)
 
 
 def main() -> None:
@@ -59,8 +57,8 @@ def main() -> None:
             log = candump(
                 Path(folder) / "drive.log", driven(lines / LINES_S, strokes(lines / LINES_S, 1))
             )
-            read = cpu_s("-c", READ, log)
-            ours = cpu_s("-m", "canshaper", "identify", log, "--file", FILE, "--out", folder)
+            read = process_s("-c", READ, log)
+            ours = process_s("-m", "canshaper", "identify", log, "--file", FILE, "--out", folder)
         print(f"{lines} lines: identify {ours:.1f} s, {ours / read:.1f} x of python-can's reading")
 
 

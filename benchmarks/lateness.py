@@ -1,9 +1,9 @@
 """How late ticks begin and how long they take, idle and under load, in virtual time.
 
-Next to the daemon, two loops that only sleep until their next deadline, in C and in Python. Load is
-cangen without a gap on another interface, candump reading it, two busy loops, a process that writes
-and syncs; with "same", a bus full of foreign frames for the daemon too. Loops have FIFO priority
-40, the joystick 30, everything else none.
+Next to the daemon, a loop in Python that only sleeps until its next deadline. Load is cangen
+without a gap on another interface, candump reading it, two busy loops, a process that writes and
+syncs; with "same", a bus full of foreign frames for the daemon too. Loops have FIFO priority 40,
+the joystick 30, everything else none.
 
     python benchmarks/lateness.py
     python benchmarks/lateness.py --kernel rt
@@ -19,19 +19,14 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from measure import Figure, Row, conditions, in_lane, print_table, progress, publish, quantile
 from rig import (
     GATEWAY_FIFO,
     LOADS,
     PEERS,
     ROOT,
-    Row,
     as_client,
-    compiled,
-    in_lane,
     load,
-    machine,
-    print_table,
-    quantile,
     run_in_lane,
     running,
     shipped,
@@ -44,6 +39,9 @@ JOYSTICK_NS = 20 * MS
 CHANNEL = "vcan0"
 # Of ticks of 20 ms a tenth as many: a second under load takes twenty.
 SHORTER = 10
+PEER, ONE_AXIS = "Python, sleeps only, 1 ms", "canshaper, 1 axis, 1 ms"
+# At most a tenth of the tick.
+FIGURES = (Figure("lateness under load, p99.9, tick of 1 ms, virtual us", PEER, most=100),)
 
 
 @dataclass
@@ -76,6 +74,7 @@ class Bench:
                     process.wait()
             late = [int(line.split()[1]) for line in log.read_text().splitlines()]
             self.results[loaded].append(Ticks(title, late))
+        progress(f"{title}: done")
 
     def daemon(self, title: str, file: Path, tick_ms: int, fifo: int | None) -> None:
         """The daemon with a joystick that moves all the time."""
@@ -101,6 +100,7 @@ class Bench:
                     ticks.work.append(work)
                     ticks.missed += missed
             self.results[loaded].append(ticks)
+        progress(f"{title}: done")
 
     def _drive(self, duration_ns: int, *, neutral: bool = False) -> tuple[int, int]:
         """Move the joystick for so long; begin and end.
@@ -154,18 +154,18 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         bench = Bench(directory, options.ticks, options.load)
-        if program := compiled(PEERS / "sleeper.c", directory):
-            bench.sleeper("C, sleeps only, 1 ms", [program])
-        bench.sleeper("Python, sleeps only, 1 ms", [sys.executable, PEERS / "sleeper.py"])
+        bench.sleeper(PEER, [sys.executable, PEERS / "sleeper.py"])
         one, three = slew_only(directory, CHANNEL, 1), shipped(directory, CHANNEL)
-        bench.daemon("canshaper, 1 axis, 1 ms", one, 1, GATEWAY_FIFO)
+        bench.daemon(ONE_AXIS, one, 1, GATEWAY_FIFO)
         bench.daemon("canshaper, 3 axes, 20 ms", three, 20, GATEWAY_FIFO)
-        bench.daemon("canshaper, 1 axis, 1 ms, no FIFO", one, 1, None)
-    print(f"lateness and work of ticks, us; {machine()}")
+        bench.daemon(f"{ONE_AXIS}, no FIFO", one, 1, None)
+    print(f"lateness and work of ticks, us; {conditions()}")
     print_ticks(bench.results[False])
     if options.load:
         print(f"\nwith {', '.join(options.load)}")
         print_ticks(bench.results[True])
+        us = {t.title: quantile(t.late, 0.999) / 1e3 for t in bench.results[True]}
+        publish(FIGURES, [(us[ONE_AXIS], us[PEER])])
 
 
 if __name__ == "__main__":

@@ -8,9 +8,8 @@ commands. The ratio to the plant alone hardly depends on the machine.
 """
 
 import argparse
-import statistics
-import time
-from collections.abc import Callable
+
+from measure import Figure, medians_s, publish
 
 from canshaper.design.lockstep import Simulation, drive
 from canshaper.machine.binding import load_deployment
@@ -18,12 +17,7 @@ from canshaper.shipped import deployment_path
 from canshaper_sim.crane import Crane
 from canshaper_sim.operator import SCRIPTS
 
-
-def cpu_s(work: Callable[[], object]) -> float:
-    """Processor time of one run."""
-    start = time.process_time()
-    work()
-    return time.process_time() - start
+FIGURES = (Figure("a drive of a campaign, ms", "its crane alone"),)
 
 
 def main() -> None:
@@ -48,17 +42,14 @@ def main() -> None:
             pass
 
     works = {"recorded": lambda: drive(deployment, script), "lean": lean, "plant alone": alone}
-    times: dict[str, list[float]] = {name: [] for name in works}
-    for _ in range(options.runs):
-        for name, work in works.items():
-            times[name].append(cpu_s(work))
-    plant_s = statistics.median(times["plant alone"])
-    for name, row in times.items():
-        median_s = statistics.median(row)
+    times = medians_s(works, options.runs)
+    plant_s = times["plant alone"]
+    for name, median_s in times.items():
         print(
             f"{name:12} {1 / median_s:6.1f} drives a second of CPU,"
             f" {script.duration_s / median_s:6.0f} x real time, {median_s / plant_s:5.2f} x plant"
         )
+    publish(FIGURES, [(1e3 * times["lean"], 1e3 * plant_s)])
 
 
 if __name__ == "__main__":

@@ -7,14 +7,15 @@ own table and candump -L). Above 1.5 is too slow.
 """
 
 import argparse
-import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Iterable
 from pathlib import Path
 from random import Random
 
 import can
+from measure import medians_s
 
 from canshaper.recording.log import read_log
 
@@ -56,14 +57,6 @@ def gvret(path: Path, frames: Iterable[can.Message]) -> None:
             file.write(frame.data.hex(",").upper() + ",\n")
 
 
-def cpu_s(read: Callable[[Path], Iterable[object]], path: Path) -> float:
-    """CPU time of reading all of it."""
-    begin = time.process_time()
-    for _ in read(path):
-        pass
-    return time.process_time() - begin
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -92,12 +85,12 @@ def main() -> None:
             write(path, frames)
             files[name] = path, files[like][1]
         for name, (ours, theirs) in files.items():
-            pairs = [
-                (cpu_s(read_log, ours), cpu_s(can.LogReader, theirs)) for _ in range(arguments.runs)
-            ]
-            first, second = (statistics.median(times) for times in zip(*pairs, strict=True))
-            ratio = statistics.median(one / other for one, other in pairs)
-            print(f"{name:7} {first:6.3f} s and {second:6.3f} s: {ratio:.2f} times")
+            works = {
+                "ours": lambda path=ours: deque(read_log(path), 0),
+                "theirs": lambda path=theirs: deque(can.LogReader(path), 0),
+            }
+            first, second = medians_s(works, arguments.runs).values()
+            print(f"{name:7} {first:6.3f} s and {second:6.3f} s: {first / second:.2f} times")
 
 
 if __name__ == "__main__":

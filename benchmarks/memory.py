@@ -22,16 +22,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from measure import Figure, Row, conditions, in_lane, print_table, progress, publish
 from rig import (
     GATEWAY_FIFO,
     ROOT,
-    Row,
     as_client,
     cpu_ns,
-    in_lane,
-    machine,
     on_channel,
-    print_table,
     run_in_lane,
     running,
     wait_for_text,
@@ -44,6 +41,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 
+FIGURES = (Figure("resident memory after an hour, MB", "after a quarter", most_ratio=1.01),)
 TICK_MS = 20
 MINUTE_MS = 60_000
 RELOAD_MS = 5 * MINUTE_MS
@@ -112,6 +110,8 @@ def main() -> None:
                     process.send_signal(signal.SIGHUP)
                 if at_ms and at_ms % (options.every * 1000) == 0:
                     samples.append((at_ms / MINUTE_MS, sample(process.pid, log)))
+                if at_ms and at_ms % RELOAD_MS == 0:
+                    progress(f"{at_ms // MINUTE_MS} of {options.minutes:g} minutes")
 
             joysticks = JoystickNode(
                 load_deployment(file), random_script(1, duration_ms / 1000 + 1.0)
@@ -120,8 +120,7 @@ def main() -> None:
             share = (cpu_ns(process.pid) - before) / (time.monotonic_ns() - begin)
         port.close()
         text = log.read_text()
-    if options.vcan:
-        print(machine())
+    print(conditions())
     shown = samples[:: max(1, len(samples) // 20)]
     rows = [Row(f"{minute:6.1f} min", [f"{n}" for n in figures]) for minute, figures in shown]
     print_table(HEADS, rows)
@@ -134,6 +133,8 @@ def main() -> None:
     reloads = len(re.findall("reload=applied", text))
     print(f"axes were set in motion {moved} times, reloads {reloads}")
     print(f"CPU of the daemon: {100 * share:.2f} % of a core")
+    if options.minutes == 60:
+        publish(FIGURES, [(samples[-1][1][0] / 1e3, settled[0][1][0] / 1e3)])
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from rig import Row, print_table, slew_only
+from measure import Row, print_table
+from rig import slew_only
 
 from canshaper.bus.packet import CAN_FRAME
 from canshaper.bus.raw import RawPort

@@ -9,14 +9,13 @@ daemon, every frame compared, and as a log at the ticks of a clock; without tabl
 
 import argparse
 import resource
-import statistics
 import tempfile
-import time
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
 import can
+from measure import Figure, medians_s, publish
 
 from canshaper.blackbox.file import SUFFIX, chunks
 from canshaper.blackbox.recorder import Recorder
@@ -35,6 +34,9 @@ from canshaper_sim.operator import script_named
 from canshaper_sim.plant import PlantNode
 
 TICK_NS = 20_000_000
+PEER = "python-can reads its log"
+BOX = "replay of the black box"
+FIGURES = (Figure("replay of a minute, s", PEER),)
 START_NS = 1_763_750_000_000_000_000
 
 
@@ -84,16 +86,6 @@ def write_drive(path: Path, box: Path, seconds: float, config: str) -> int:
     return lines
 
 
-def run_time_s(run: Callable[[], object], runs: int) -> float:
-    """Median time of a run, s of its processor: other work on the machine does not count."""
-    times = []
-    for _ in range(runs):
-        start = time.process_time()
-        run()
-        times.append(time.process_time() - start)
-    return statistics.median(times)
-
-
 def replay(path: Path, config: str) -> None:
     """Replay all of it; of a black box every frame has to be the same."""
     deployment = loader(config)()
@@ -119,16 +111,19 @@ def main() -> None:
         lines = write_drive(path, box, seconds, config)
         print(f"{arguments.minutes:g} minutes, {lines} frames, {path.stat().st_size / 1e6:.1f} MB")
         before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        for title, run in (
-            ("python-can reads it", lambda: sum(1 for _ in can.LogReader(path))),
-            ("canshaper reads it", lambda: sum(1 for _ in read_log(path))),
-            ("replay of the black box", lambda: replay(box, config)),
-            ("replay, ticks of a clock", lambda: replay(path, config)),
-        ):
-            time_s = run_time_s(run, arguments.runs)
+        works: dict[str, Callable[[], object]] = {
+            PEER: lambda: sum(1 for _ in can.LogReader(path)),
+            "canshaper reads it": lambda: sum(1 for _ in read_log(path)),
+            BOX: lambda: replay(box, config),
+            "replay, ticks of a clock": lambda: replay(path, config),
+        }
+        times = medians_s(works, arguments.runs)
+        for title, time_s in times.items():
             print(f"{title:33} {time_s:6.2f} s, {seconds / time_s:6.0f} x real time")
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb
         print(f"memory grown by {grown / 1024:.1f} MiB")
+    minute_s = {title: time_s / arguments.minutes for title, time_s in times.items()}
+    publish(FIGURES, [(minute_s[BOX], minute_s[PEER])])
 
 
 if __name__ == "__main__":

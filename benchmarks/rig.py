@@ -1,4 +1,4 @@
-"""What the real-time benchmarks share: machine with virtual time, deployments, processes, tables.
+"""What the real-time benchmarks share: machine with virtual time, deployments, processes.
 
 Latency is counted in virtual time: the benchmark runs in the lane of the HIL tests with
 ``--bench``, where one executed instruction, of the kernel too, takes one nanosecond. The figures
@@ -6,15 +6,12 @@ are repeatable on any host; they know no caches and no bus time.
 """
 
 import os
-import platform
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,21 +37,11 @@ START_S = 300.0  # virtual time runs ahead while a process waits for its files
 # -- the machine -------------------------------------------------------------------------------
 
 
-def in_lane() -> bool:
-    """Whether this is the virtual machine with CAN interfaces."""
-    return Path("/sys/class/net/vcan0").exists()
-
-
 def run_in_lane(kernel: str) -> int:
     """Run this same command in the machine with virtual time; return its exit status."""
     lane = [sys.executable, "-m", "tests.lane", "--bench", "--timeout", "0"]
     lane += ["--kernel", kernel, "--", sys.executable, *sys.argv]
     return subprocess.run(lane, cwd=ROOT, check=False).returncode
-
-
-def machine() -> str:
-    """Kernel and clock of this machine, for the head of a table."""
-    return f"kernel {platform.release()}, {os.cpu_count()} CPU, 1 instruction = 1 ns"
 
 
 def as_client() -> None:
@@ -158,16 +145,6 @@ def load(directory: Path, kinds: Sequence[str]) -> Iterator[Callable[[], bool]]:
 LOADS = ("flood", "same", "busy", "disk")
 
 
-def compiled(source: Path, directory: Path) -> Path | None:
-    """A program of C, built now; None, with a line that says so, where there is no gcc."""
-    if shutil.which("gcc") is None:
-        print(f"no gcc: without {source.name}")
-        return None
-    program = directory / source.stem
-    subprocess.run(["gcc", "-O2", "-Wall", "-o", program, source], check=True)
-    return program
-
-
 # -- deployments -------------------------------------------------------------------------------
 
 
@@ -218,30 +195,3 @@ def slew_only(directory: Path, channel: str, tick_ms: int) -> Path:
 def daemon(file: Path) -> list[str]:
     """Command that runs the daemon."""
     return [sys.executable, "-m", "canshaper", "run", str(file)]
-
-
-# -- figures -----------------------------------------------------------------------------------
-
-
-def quantile(values: Sequence[float], share: float) -> float:
-    """The value that this share of all does not exceed."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A title and cells of a table."""
-
-    title: str
-    cells: Sequence[str]
-
-
-def print_table(heads: Sequence[str], rows: Sequence[Row]) -> None:
-    """Print a plain table, titles to the left, figures to the right."""
-    left = max(len(row.title) for row in rows)
-    widths = [max(len(head), *(len(row.cells[i]) for row in rows)) for i, head in enumerate(heads)]
-    print(" " * left, *(h.rjust(w) for h, w in zip(heads, widths, strict=True)), sep="  ")
-    for row in rows:
-        cells = (c.rjust(w) for c, w in zip(row.cells, widths, strict=True))
-        print(row.title.ljust(left), *cells, sep="  ", flush=True)

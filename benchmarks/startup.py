@@ -4,9 +4,6 @@ The peer imports python-can and cantools, loads the same DBC and sends one frame
 processes on a multicast group of python-can, started in turn. Processor time until then as well:
 other work on the machine changes it less.
 
-Then the processor time of ``canshaper --help``, next to the same with what the work of the verbs
-imports: a deployment, its check, tables.
-
     python benchmarks/startup.py [--runs 7]
 """
 
@@ -20,10 +17,14 @@ import sys
 import time
 from pathlib import Path
 
+from measure import Figure, publish
+
 from canshaper.bus.port import Port, open_port
 from canshaper.config.bus import Bus
 from canshaper.shipped import data_directory
 
+PEER_TITLE = "python-can + cantools"
+FIGURES = (Figure("first frame after the start, s", PEER_TITLE, most_ratio=1.5),)
 PEER = """
 import sys, can, cantools
 from canshaper.bus.multicast import LocalMulticastBus
@@ -33,27 +34,6 @@ data = message.encode({"Velocity": 0, "AliveCounter": 0})
 with LocalMulticastBus(sys.argv[2]) as bus:
     bus.send(can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data))
 """
-
-
-HELP_RUNS = 20
-HELP = "import sys; sys.argv = ['canshaper', '--help']; from canshaper.cli.app import main; main()"
-WITH_ALL = "import canshaper.machine.binding, canshaper.bus.port, rich.progress, rich.table;" + HELP
-
-
-def cpu_s(code: str) -> float:
-    """Seconds of a processor, user and system, that a program takes."""
-    before = os.times()
-    subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL, check=True)
-    after = os.times()
-    return sum(after[2:4]) - sum(before[2:4])
-
-
-def help_share() -> float:
-    """Processor time of the help over that with all imports, medians of runs in turn."""
-    pairs = [(cpu_s(HELP), cpu_s(WITH_ALL)) for _ in range(HELP_RUNS)]
-    alone, with_all = (statistics.median(times) for times in zip(*pairs, strict=True))
-    print(f"canshaper --help         {alone:.3f} s of a processor, with all imports {with_all:.3f}")
-    return alone / with_all
 
 
 def first_frame_s(command: list[str], port: Port) -> tuple[float, float]:
@@ -85,7 +65,7 @@ def main() -> None:
     options = ["--interface", "udp_multicast", "--channel", group]
     commands = {
         "canshaper run": [sys.executable, "-m", "canshaper", "run", "forwarder.yaml", *options],
-        "python-can + cantools": [
+        PEER_TITLE: [
             *(sys.executable, "-c", PEER),
             *(str(data_directory() / "dbc" / "forwarder.dbc"), group),
         ],
@@ -102,7 +82,7 @@ def main() -> None:
             print(f"{name:24} median {median_s:.3f} s   max {max(row):.3f} s   {what}")
         ours, peer = (statistics.median(row) for row in rows.values())
         print(f"canshaper run / bare start: {ours / peer:.2f}")
-    print(f"canshaper --help / with all imports: {help_share():.2f}")
+    publish(FIGURES, [(ours, peer)])
 
 
 if __name__ == "__main__":

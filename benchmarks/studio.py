@@ -12,7 +12,6 @@ same cores.
 
 import argparse
 import os
-import platform
 import sys
 import tempfile
 import threading
@@ -23,7 +22,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rig import CONFIG, ROOT, Row, print_table, quantile
+from measure import Row, conditions, print_table, quantile
+from rig import CONFIG, ROOT
 
 sys.path.insert(0, str(ROOT))
 
@@ -245,7 +245,7 @@ def main() -> None:
             alone, shown = measure(options.seconds, options.rounds, Path(name))
         except NoBrowserError as error:
             raise SystemExit(f"not measured: {error}") from None
-    print(f"kernel {platform.release()}, {os.cpu_count()} CPU; lateness of ticks of 20 ms, us")
+    print(f"{conditions()}; lateness of ticks of 20 ms, us")
     rows = []
     for title, c in (("without page", alone), ("with page", shown)):
         late = [f"{quantile(c.late_us, q):.0f}" for q in (0.5, 0.99, 1.0)]

@@ -33,26 +33,17 @@ class Exchange:
     """One joystick frame and its answer, monotonic ns.
 
     Attributes:
-        send_ns: the client is about to send, by its own clock.
         in_ns: the frame has arrived at the gateway's interface, by the kernel.
         out_ns: the valve frame has arrived at the valve's interface, by the kernel.
-        back_ns: the client has it, by its own clock.
     """
 
-    send_ns: int
     in_ns: int
     out_ns: int
-    back_ns: int
 
     @property
     def gateway_us(self) -> float:
         """From frame to frame."""
         return (self.out_ns - self.in_ns) / 1e3
-
-    @property
-    def client_us(self) -> float:
-        """What the client's own send, wake-up and receive add to that."""
-        return (self.back_ns - self.send_ns) / 1e3 - self.gateway_us
 
 
 class Wire:
@@ -82,30 +73,28 @@ class Wire:
         self._count = 0
         self._steps = 0  # of the last valve frame
 
-    def send(self, at_ns: int, pct: float, right_before_ns: int = 0) -> int:
-        """Send the left joystick at this moment, the right one before if asked; when it was."""
+    def send(self, at_ns: int, pct: float, right_before_ns: int = 0) -> None:
+        """Send the left joystick at this moment, the right one before if asked."""
         self._count = (self._count + 1) % 256
         if right_before_ns:
             sleep_until(at_ns - right_before_ns)
             self._hand.send(FRAME.pack(JOYSTICK_RIGHT, 8, self._right[self._count]))
         frame = FRAME.pack(JOYSTICK_LEFT, 8, self._left[pct][self._count])
         sleep_until(at_ns)
-        now_ns = time.monotonic_ns()
         self._hand.send(frame)
-        return now_ns
 
     def exchange(self, at_ns: int, pct: float, right_before_ns: int = 0, *, jump: bool) -> Exchange:
         """Send, and wait for the answer: the next valve frame, or the next that jumps as asked."""
         self.drain()
-        send_ns = self.send(at_ns, pct, right_before_ns)
+        self.send(at_ns, pct, right_before_ns)
         for _ in range(MOST_UNMOVED):
-            out_ns, back_ns, rise = self._valve()
+            out_ns, rise = self._valve()
             if not jump or (abs(rise) >= LEAST_STEPS and (rise > 0) is (pct == HIGH_PCT)):
                 break
         else:
             raise SystemExit(f"the valve does not follow the joystick: it stays at {self._steps}")
-        _, in_ns, _ = receive_stamped(self._in)
-        return Exchange(send_ns, in_ns, out_ns, back_ns)
+        _, in_ns = receive_stamped(self._in)
+        return Exchange(in_ns, out_ns)
 
     def drain(self) -> int:
         """Drop what waits; how many of it were valve frames."""
@@ -121,12 +110,12 @@ class Wire:
             port.settimeout(START_S)
         return dropped
 
-    def _valve(self) -> tuple[int, int, int]:
-        """Take a valve frame: when it came, when we had it, its steps against the one before."""
-        data, at_ns, back_ns = receive_stamped(self._out)
+    def _valve(self) -> tuple[int, int]:
+        """Take a valve frame: when it came, its steps against the one before."""
+        data, at_ns = receive_stamped(self._out)
         steps = int.from_bytes(data[8:9], signed=True)
         rise, self._steps = steps - self._steps, steps
-        return at_ns, back_ns, rise
+        return at_ns, rise
 
 
 def stamped_port(channel: str, can_id: int) -> socket.socket:
@@ -140,12 +129,11 @@ def stamped_port(channel: str, can_id: int) -> socket.socket:
     return port
 
 
-def receive_stamped(port: socket.socket) -> tuple[bytes, int, int]:
-    """A frame, when it arrived, and when we had it."""
+def receive_stamped(port: socket.socket) -> tuple[bytes, int]:
+    """A frame, and when it arrived."""
     data, extra, _, _ = port.recvmsg(16, ROOM)
-    back_ns = time.monotonic_ns()
     seconds, ns = TIMESPEC.unpack(next(d for _, kind, d in extra if kind == SO_TIMESTAMPNS))
-    return data, seconds * 1_000_000_000 + ns - WALL_NS, back_ns
+    return data, seconds * 1_000_000_000 + ns - WALL_NS
 
 
 def sleep_until(at_ns: int) -> None:

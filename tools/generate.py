@@ -26,10 +26,10 @@ from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
+from tools.marks import marked, with_sections
 
 Key = TypeVar("Key", bound=IntEnum)
 ROOT = Path(__file__).parents[1]
-MARK = re.compile(r"^<!-- generated: (.*?) -->$", re.MULTILINE)
 TABLES: Mapping[str, type[IntEnum]] = {
     "State": State,
     "Reason": Reason,
@@ -51,16 +51,6 @@ def with_value_tables(dbc: str, tables: Mapping[str, type[IntEnum]]) -> str:
         table = re.compile(rf'^(VAL_ \d+ {signal}) {int(first)} "{first.name}" .*;$', re.MULTILINE)
         dbc = table.sub(lambda match, rows=rows: f"{match[1]} {rows} ;", dbc)  # type: ignore[misc]
     return dbc
-
-
-def with_sections(page: str, sections: Mapping[str, Iterable[str]]) -> str:
-    """Text of a page with the lines of its generated sections, by their names."""
-    for name, lines in sections.items():
-        begin, end = f"<!-- generated: {name} -->\n", f"<!-- end: {name} -->\n"
-        before, _, rest = page.partition(begin)
-        _, _, after = rest.partition(end)
-        page = before + begin + "\n" + "".join(f"{line}\n" for line in lines) + "\n" + end + after
-    return page
 
 
 def state_rows() -> Iterator[str]:
@@ -241,7 +231,7 @@ def generated(root: Path) -> dict[Path, str]:
             name: f"{'' if one == page else one.name}#{anchor}"
             for name, (one, anchor) in places.items()
         }
-        if names := MARK.findall(text):
+        if names := marked(text, "generated"):
             sections = {name: section_rows(name, links) for name in names}
             files[page] = with_sections(text, sections)
     return files

@@ -1,4 +1,4 @@
-"""The same as sleeper.c in Python.
+"""A loop that only sleeps until its next deadline; prints each and how late it was, ns.
 
 sleeper.py PERIOD_NS COUNT
 """

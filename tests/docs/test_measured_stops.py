@@ -3,16 +3,15 @@
 import pytest
 
 from tests.hil.figures import (
-    BEGIN,
-    END,
     PAGE,
+    SECTION,
     Silence,
     Stop,
-    in_page,
     table,
     wrong_silences,
     wrong_stops,
 )
+from tools.marks import STAMP, marked, section_lines
 
 TRIPPED, WENT_ON = (True, True, True), (False, False, False)
 
@@ -42,9 +41,8 @@ def test_a_command_falls_within_the_age_limit_and_a_tick(falls_ms: float, right:
 
 
 def test_the_page_has_a_place_for_what_was_measured() -> None:
-    page = PAGE.read_text("utf-8")
-    assert page.count(BEGIN) == page.count(END) == 1
+    assert marked(PAGE.read_text("utf-8"), "measured") == [SECTION]
+    assert STAMP.match(section_lines(PAGE.read_text("utf-8"), "measured", SECTION)[-1])
     silences = [Silence(101.0, stopped=False), Silence(119.0, stopped=True)]
     rows = table([Stop(120, 121.0, *TRIPPED)], silences)
-    assert "1 of 1 stops, 0 went on" in rows
-    assert BEGIN + rows + END in in_page(page, rows)
+    assert "1 of 1 stops, 0 went on" in rows[2]

@@ -1,12 +1,13 @@
 """What was measured of stops and silence: whether it is right, and the table of docs/safety.md."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from tools.marks import stamped, with_sections
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
-BEGIN, END = "<!-- measured: stops and silence -->\n", "<!-- end of measured -->\n"
+SECTION = "stops and silence"
 # Of the shipped machine: age limit of its joysticks, tick.
 T_MS, TICK_MS = 100, 20
 # From the clock to the kernel's time of the frame.
@@ -61,8 +62,8 @@ def wrong_silences(silences: Sequence[Silence]) -> list[str]:
     return [f"too late: {one}" for one in silences if one.falls_ms > longest_ms]
 
 
-def table(stops: Sequence[Stop], silences: Sequence[Silence]) -> str:
-    """The table of the page."""
+def table(stops: Sequence[Stop], silences: Sequence[Silence]) -> list[str]:
+    """Lines of the table of the page."""
     beyond = [s for s in stops if s.gap_ms > T_MS + MARGIN_MS]
     within = [s for s in stops if s.gap_ms < T_MS - TICK_MS]
     wrong = wrong_stops(stops)
@@ -82,7 +83,7 @@ def table(stops: Sequence[Stop], silences: Sequence[Silence]) -> str:
             f" | {T_MS} + {TICK_MS} + {MARGIN_MS:g} ms"
             f" | {len(falls)} times, {min(falls):.1f} to {max(falls):.1f} ms |"
         )
-    return "\n".join(rows) + "\n"
+    return rows
 
 
 def write(stops: Sequence[Stop], silences: Sequence[Silence], *, rewrite: bool) -> int:
@@ -91,18 +92,13 @@ def write(stops: Sequence[Stop], silences: Sequence[Silence], *, rewrite: bool) 
     Returns:
         0 where all is right.
     """
-    text = table(stops, silences)
-    print(text)
+    rows = table(stops, silences)
+    print("\n".join(rows))
     wrong = wrong_stops(stops) + wrong_silences(silences)
     for line in wrong:
         print(line)
     if rewrite and not wrong:
-        PAGE.write_text(in_page(PAGE.read_text("utf-8"), text), "utf-8")
+        lines = {SECTION: [*rows, "", f"{stamped('canshaper')}."]}
+        text = with_sections(PAGE.read_text("utf-8"), lines, "measured")
+        PAGE.write_text(text, "utf-8")
     return 1 if wrong else 0
-
-
-def in_page(page: str, text: str) -> str:
-    """The page with another table."""
-    pattern = re.compile(re.escape(BEGIN) + ".*?" + re.escape(END), re.DOTALL)
-    assert pattern.search(page), f"no {BEGIN.strip()} in the page"
-    return pattern.sub(lambda _: BEGIN + text + END, page)
