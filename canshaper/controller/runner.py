@@ -124,8 +124,8 @@ class AxisRunner:
         assert bound is not None
         assert sway is not None  # checked with the deployment
         self._sway_signal = SwaySignal(message, bound)
-        damps, timing = bound.config.use == "damp", bound.timing(self.period_s)
-        self.axis.sensed = SensedSway(sway, timing, bound.limits, damps=damps)
+        damps = bound.config.use == "damp"
+        self.axis.sensed = SensedSway(sway, bound.timing, bound.limits, bound.gains, damps=damps)
 
     def add_radius(self, radius: ValueInput | None) -> None:
         """Of an axis that turns: the speed of its tip is by this radius, where it is measured."""

@@ -1,6 +1,7 @@
 """A sway sensor on frames: what the controller makes of it, says of it, and sends."""
 
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -254,3 +255,9 @@ def test_it_measures_while_its_node_works(said: tuple[Frame, ...], trust: Trust)
         controller.receive(frame, 0)
     assert list(controller.tick(0))
     assert [controller.axes[name].trust for name in ("slew", "near_far")] == [trust, trust]
+
+
+def test_no_loop_waits_for_the_gains_of_an_observer(monkeypatch: pytest.MonkeyPatch) -> None:
+    handed_over = pickle.loads(pickle.dumps(load_deployment(FILE)))
+    monkeypatch.delattr("canshaper.shaping.free_swing.kalman_gains")
+    assert Controller(handed_over).axes["near_far"].axis.sensed is not None
