@@ -2,19 +2,22 @@
 
 from typing import Any
 
-from cantools.database.can import Signal
+from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame, new_frame
+from canshaper.codec.protection import Protection
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits, special_codes
-from canshaper.codec.valve import ValveMessage
 
 
-class RewrittenMessage(ValveMessage):
+class RewrittenMessage(SentMessage):
     """The message of a joystick as it leaves on the other bus.
 
     Args:
-        sender: its place on that bus, and its protection, which is computed again.
+        bus: name of that bus.
+        message: its definition.
+        source: its source address, where it is one of J1939.
+        protection: that of its frames, computed again.
         enable: name of its enable switch.
         ours: names of the signals that the axes put in.
 
@@ -24,25 +27,32 @@ class RewrittenMessage(ValveMessage):
         ours_mask: bits of the velocities, byte 0 the lowest.
     """
 
-    def __init__(self, sender: Sender, enable: str, ours: frozenset[str]) -> None:
-        super().__init__(sender)
+    def __init__(
+        self,
+        bus: str,
+        message: Message,
+        source: int | None,
+        protection: Protection,
+        *,
+        enable: str,
+        ours: frozenset[str],
+    ) -> None:
+        super().__init__(bus, message, source, protection)
         self.ours = ours
         self._enable = enable
-        self._protector = sender.protector
-        self._layout = sender.fields.layout
-        self._start = sender.fields.start[enable]
-        message = sender.fields.message
+        self._layout = self.fields.layout
+        self._start = self.fields.start[enable]
         self._length = message.length
         for signal in message.signals:
             self.raw[signal.name] = _at_rest(signal, self.raw[signal.name])
         self.ours_mask = self._mask(ours)
-        counter = sender.protection.counter
+        counter = protection.counter
         self._mask_of_all = self.ours_mask | (self._mask({counter}) if counter else 0)
 
     def _mask(self, names: frozenset[str] | set[str]) -> int:
         """Bits of these signals."""
         zeros: dict[str, Any] = dict.fromkeys(self.raw, 0)
-        message = self.sender.fields.message
+        message = self.fields.message
         ones = {
             s.name: -1 if s.is_signed else raw_limits(s)[1]
             for s in message.signals
@@ -57,14 +67,14 @@ class RewrittenMessage(ValveMessage):
 
     def onto(self, data: bytes) -> Frame:
         """The next frame: this one of the joystick with our velocities, protected again."""
-        ours = int.from_bytes(self._protector.without_check(self.raw), "little") & self._mask_of_all
+        ours = int.from_bytes(self.protector.without_check(self.raw), "little") & self._mask_of_all
         word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
-        protected = self._protector.add_check(word.to_bytes(self._length, "little"))
-        return new_frame(Frame, (self.bus, self._id, self._extended, protected))
+        protected = self.protector.add_check(word.to_bytes(self._length, "little"))
+        return new_frame(Frame, (*self.key, protected))
 
     def instead(self, frame: Frame) -> Frame:
         """The same frame with what the axes have put in now, and with the same count."""
-        self._protector.take_back()
+        self.protector.take_back()
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:

@@ -184,7 +184,7 @@ class Controller:
                 if rule is not None:
                     if (own := rule.own(now_ns)) is not None:
                         yield own
-                elif message is not None and message.bus not in silent:
+                elif message is not None and message.key[0] not in silent:
                     yield message.frame()
                 runner.axis.advance()
                 if runner.feedback is not None or runner.axis.sensed is not None:

@@ -9,7 +9,7 @@ from canshaper.inputs.radius import radius_input
 from canshaper.inputs.sway_sensor import SwaySensorInput
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundSwitch
+from canshaper.machine.inputs import Bound, BoundInput, Choosing
 from canshaper.machine.routing import Routing
 from canshaper.protocols.interface import MessageKey
 
@@ -86,7 +86,7 @@ class MachineInputs:
         having = [self.joysticks[n] for n, one in config.joysticks.items() if one.next_profile]
         return ProfileButtons(having, profile_names(config)) if having else None
 
-    def _switch(self, bound: BoundSwitch | None) -> ValueInput | None:
+    def _switch(self, bound: Bound[Choosing] | None) -> ValueInput | None:
         if bound is None:
             return None
         one = ValueInput(bound, bound.config.signal)

@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.valve import ValveMessage
+from canshaper.codec.sent import SentMessage
 from canshaper.controller.runner import AxisRunner
 from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
-Turn = tuple[str, AxisRunner, ValveMessage | None, ForwardingRule | None]
+Turn = tuple[str, AxisRunner, SentMessage | None, ForwardingRule | None]
 """An axis with its name, and what goes out when it has moved: a message, or by a rule."""
 
 
@@ -33,7 +33,7 @@ class ValveOutputs:
         turns: list[Turn] = []
         for name, runner in order:
             message = runner.bound.valve.message
-            key = message.sender.key
+            key = message.key
             if self._axes[key][-1] is runner:
                 turns.append((name, runner, message, self._forwarding.get(key)))
             else:
@@ -58,7 +58,7 @@ class ValveOutputs:
         runners = self._axes[frame[:3]]
         if not any(runner.axis.raw for runner in runners):
             return False
-        runners[-1].bound.valve.message.sender.protector.take_back()
+        runners[-1].bound.valve.message.protector.take_back()
         return True
 
     def refused(self, frame: Frame) -> Frame:

@@ -34,7 +34,7 @@ def parts(
             bus, *message = sender.key
             yield ("sender", *places[bus], *message), sender.protector
         for name, runner in axes.items():
-            bus, *message = runner.bound.valve.message.sender.key
+            bus, *message = runner.bound.valve.message.key
             signal = runner.bound.config.valve.signal
             yield ("valve", *places[bus], *message, signal), runner
             yield ("axis", name), runner

@@ -269,7 +269,7 @@ class Daemon:
         """The digest of what runs, where a message carries it and its bus may be used."""
         deployment = self._controller.deployment
         status = deployment.identity_status
-        if status and status.sender.key[0] not in self._controller.silent_buses:
+        if status and status.message.key[0] not in self._controller.silent_buses:
             frame = status.frame(deployment.identity.digest)
             if not self._ports[frame.bus].send(frame):
                 self._guarded.send_failed(frame)

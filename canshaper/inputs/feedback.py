@@ -6,8 +6,9 @@ from enum import Enum
 from typing import Self
 
 from canshaper.codec.signals import find_signal
+from canshaper.config.schema import Feedback as FeedbackConfig
 from canshaper.inputs.value import ValueInput, measurable
-from canshaper.machine.inputs import BoundFeedback
+from canshaper.machine.inputs import Bound
 
 
 class Following(Enum):
@@ -32,7 +33,7 @@ class Feedback(ValueInput):
         following: what it says.
     """
 
-    def __init__(self, bound: BoundFeedback, period_s: float) -> None:
+    def __init__(self, bound: Bound[FeedbackConfig], period_s: float) -> None:
         config = bound.config
         signal = find_signal(bound.message, config.signal)
         assert signal is not None  # checked with the deployment

@@ -62,7 +62,7 @@ def _bind_axis(
     return BoundAxis(
         name,
         axis,
-        codec.message.sender.fields.message,
+        codec.message.fields.message,
         codec,
         ticks,
         *status,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
@@ -10,7 +10,7 @@ from canshaper.config.input import Input
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
 from canshaper.config.sway_sensor import SwaySensor
-from canshaper.machine.inputs import BoundInput, bind_input, check_source
+from canshaper.machine.inputs import Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
 from canshaper.shaping.free_swing import SensorGains, sensor_gains
@@ -40,7 +40,7 @@ _OF_MESSAGE = (*Input.model_fields, "node")
 
 
 @dataclass(frozen=True)
-class SensorMessage(BoundInput):
+class SensorMessage(Bound[SwaySensor]):
     """A message with measurements of sway.
 
     Attributes:
@@ -48,8 +48,8 @@ class SensorMessage(BoundInput):
         merits: names of their figures of merit, by their own; of those that have one.
     """
 
-    signals: tuple[Signal, ...] = ()
-    merits: Mapping[str, str] = field(default_factory=dict)
+    signals: tuple[Signal, ...]
+    merits: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -127,9 +127,9 @@ def _bind_message(
     for other in others:
         text = f"axes.{first}.sway_sensor, which reads the message too"
         lookup.diagnostics.check_same(_place(other), sensors[other], _OF_MESSAGE, config, text)
-    if (result := bind_input(lookup, SensorMessage, _place(first), config)) is None:
+    if (result := bind_input(lookup, _place(first), config)) is None:
         return {}
-    used, message = result
+    used, bound = result
     check_source(used, "a sway sensor")
     lookup.check_node(_place(first), config.bus, config.node)
     factors = {name: _factor(used, name, one) for name, one in sensors.items()}
@@ -137,19 +137,19 @@ def _bind_message(
         _check(lookup, used, name, one)
     merits = {s.signal: merit for name, s in sensors.items() if (merit := _merit(used, name, s))}
     signals = tuple(signal for signal, _ in filter(None, factors.values()))
-    message = replace(message, signals=signals, merits=merits)
+    message = SensorMessage(**vars(bound), signals=signals, merits=merits)
     cycle_s = (used.message.cycle_time or 0) / 1000.0
-    bound = {}
+    complete = {}
     for name, signal_factor in factors.items():
         period_s, sway = periods.get(name), lookup.config.axes[name].sway
         if signal_factor and period_s and sway:
             limits = sensor_limits(sensors[name])
             timing = sensor_timing(sensors[name], cycle_s, period_s)
             gains = sensor_gains(sway.mode(), period_s, timing, limits)
-            bound[name] = BoundSwaySensor(
+            complete[name] = BoundSwaySensor(
                 sensors[name], message, *signal_factor, cycle_s, timing, limits, gains
             )
-    return bound
+    return complete
 
 
 def _place(axis: str) -> Place:

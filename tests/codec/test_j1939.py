@@ -279,7 +279,7 @@ def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:
     deployment = machine.load()
     protections = {
         "joystick": (deployment.joysticks["left"].protection, (int(BJM1) & 0x1FFFFF00) | 0x21),
-        "valve": (deployment.axes["slew"].valve.message.sender.protection, 0x0CFE3000 | OWN),
+        "valve": (deployment.axes["slew"].valve.message.protection, 0x0CFE3000 | OWN),
     }
     for protection, can_id in protections.values():
         assert isinstance(protection.check, Checksum)

@@ -7,7 +7,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.codecs import Sender
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.rewrite import RewrittenMessage
 
@@ -69,7 +68,7 @@ REST = {
 
 
 def made(protection: Protection = PROTECTED) -> RewrittenMessage:
-    return RewrittenMessage(Sender("b", STICK, protection=protection), "Enable", OURS)
+    return RewrittenMessage("b", STICK, None, protection, enable="Enable", ours=OURS)
 
 
 def decoded(data: bytes) -> dict[str, Any]:
@@ -104,7 +103,9 @@ def test_only_ours_are_changed(data: bytes, slew: int, lift: int) -> None:
 @given(FRAMES)
 def test_without_protection_count_and_check_are_its_own(data: bytes) -> None:
     assert others(made(UNPROTECTED).onto(data).data, *OURS) == others(data, *OURS)
-    lift = RewrittenMessage(Sender("b", STICK), "Enable", frozenset(("Lift",)))
+    lift = RewrittenMessage(
+        "b", STICK, None, UNPROTECTED, enable="Enable", ours=frozenset(("Lift",))
+    )
     assert others(lift.onto(data).data, "Lift") == others(data, "Lift")
     assert others(made(Protection("Count", 16)).onto(data).data, "Count", *OURS) == others(
         data, "Count", *OURS
@@ -123,7 +124,8 @@ def test_the_bits_of_ours() -> None:
 def test_the_bits_of_ours_where_those_of_no_signal_are_1() -> None:
     (stick,) = cantools.database.load_string(DBC, "dbc").messages
     stick.protocol = "j1939"
-    assert RewrittenMessage(Sender("b", stick), "Enable", OURS).ours_mask == 0xF0FFFF
+    rewritten = RewrittenMessage("b", stick, None, UNPROTECTED, enable="Enable", ours=OURS)
+    assert rewritten.ours_mask == 0xF0FFFF
 
 
 @given(FRAMES)

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.codecs import Sender
 from canshaper.codec.protection import Protection
-from canshaper.codec.valve import DirectionCodec, ValveCodec, ValveMessage
+from canshaper.codec.sent import SentMessage
+from canshaper.codec.valve import DirectionCodec, ValveCodec
 from tests.codec.valve_machine import CODES, DBC, network, with_valves
 from tests.rigs.files import Machine
 
@@ -19,7 +19,7 @@ STATE = DirectionCodec("State", (0, 1, 2))
 def avc(signal: str, *also: str) -> ValveCodec:
     message = network.get_message_by_name("AVC0")
     signals = {s.name: s for s in message.signals}
-    shared = ValveMessage(Sender("b", message))
+    shared = SentMessage("b", message)
     return ValveCodec(shared, signals[signal], STATE, [signals[name] for name in also])
 
 
@@ -46,7 +46,7 @@ def test_both_resolutions_report_the_same(steps: int, data: str) -> None:
 def test_both_resolutions_of_a_signal_with_a_sign() -> None:
     message = network.get_message_by_name("Block")
     first, second = (message.get_signal_by_name(name) for name in ("First", "Second"))
-    codec = ValveCodec(ValveMessage(Sender("b", message)), first, also=[second])
+    codec = ValveCodec(SentMessage("b", message), first, also=[second])
     codec.put(-25)
     assert codec.message.frame().data[:2] == bytes((256 - 25, 256 - 25))
 
@@ -54,7 +54,7 @@ def test_both_resolutions_of_a_signal_with_a_sign() -> None:
 def test_the_same_in_a_signal_that_falls() -> None:
     message = network.get_message_by_name("Block")
     first, falling = (message.get_signal_by_name(name) for name in ("First", "Falling"))
-    codec = ValveCodec(ValveMessage(Sender("b", message)), first, also=[falling])
+    codec = ValveCodec(SentMessage("b", message), first, also=[falling])
     for steps in (-125, -1, 0, 25, 125):
         codec.put(steps)
         values: Any = message.decode(codec.message.frame().data)
@@ -93,7 +93,7 @@ def test_in_neutral_no_flow_is_a_command() -> None:
 def test_what_takes_the_place_of_a_frame_has_its_count() -> None:
     block = network.get_message_by_name("Block")
     for protection in (Protection("Count", 16), Protection("Count", 16, Checksum("xor", 6))):
-        message = ValveMessage(Sender("b", block, protection=protection))
+        message = SentMessage("b", block, protection=protection)
         first = message.frame()
         message.raw["First"] = 5
         second = message.instead(first)
@@ -123,7 +123,7 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
     valve = f"message: AVC0, signal: ExtFlow, also: [PortFlow], timeout_ms: 200, {CODES}"
     axis = with_valves(machine, ("Slew", valve)).load().axes["slew"]
     assert axis.valve.steps == 64_000
-    assert axis.valve.message.sender.key == ("crane", 0x0CFE309C, True)
+    assert axis.valve.message.key == ("crane", 0x0CFE309C, True)
 
 
 @pytest.mark.parametrize(

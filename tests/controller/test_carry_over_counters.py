@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.e2e import COUNTER, E2e
 from canshaper.codec.frame import Frame
+from canshaper.codec.sent import SentMessage
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.j1939.network import J1939Network
@@ -25,7 +25,7 @@ def last_of(frames: list[Frame]) -> Sent:
     return {frame[:3]: frame.data for frame in frames}
 
 
-def count_of(sender: Sender, data: bytes) -> int:
+def count_of(sender: SentMessage, data: bytes) -> int:
     """Alive counter of a frame of a message that has one."""
     protection = sender.protection
     if isinstance(protection.check, E2e):

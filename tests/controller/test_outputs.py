@@ -38,7 +38,7 @@ def test_all_axes_of_its_message_are_neutral(name: str) -> None:
         assert neutral[:3] == frame[:3]
         for of in controller.axes.values():
             if of.bound.valve.message is message:
-                raw = message.sender.fields.layout.decode(neutral.data)
+                raw = message.fields.layout.decode(neutral.data)
                 assert of.bound.valve.read(raw) == 0
 
 
@@ -46,7 +46,7 @@ def test_it_has_the_count_of_the_refused_one() -> None:
     """Its receiver sees no gap."""
     controller = driven("canfd-forwarder")
     message = controller.axes["slew"].bound.valve.message
-    check = message.sender.protection.check
+    check = message.protection.check
     assert isinstance(check, E2e)
     frame = message.frame()
     neutral = controller.refused(frame)

@@ -84,7 +84,7 @@ def test_the_status_message_says_it() -> None:
     run = Run(deployment, PULSE, crane())
     status = deployment.axes["near_far"].status
     assert status is not None
-    key = status.sender.key
+    key = status.message.key
     values = [status.decode(frame.data) for frame in run.frames if frame[:3] == key]
     trusts = [value["SwaySensor"] for value in values if value]
     assert trusts[-1] is Trust.TRUSTED
@@ -104,7 +104,7 @@ def test_it_is_reported_and_shown_how_long_the_pendulum_seems() -> None:
     assert float(match[1]) == pytest.approx(1.56, rel=0.07)
     status = deployment.axes["near_far"].status
     assert status is not None
-    frames = [frame for frame in run.frames if frame[:3] == status.sender.key]
+    frames = [frame for frame in run.frames if frame[:3] == status.message.key]
     shown = [(status.decode(frame.data) or {})["SwingLength"] for frame in frames]
     assert shown[0] == 0.0
     assert shown[-1] == pytest.approx(1.56, rel=0.05)

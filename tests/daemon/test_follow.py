@@ -206,7 +206,7 @@ def test_a_black_box_of_such_ticks_is_played_the_same(
     assert "reason=LOOP_STALLED" in done.output
     status = load_deployment(bench.file).status
     assert status is not None
-    sent = [frame.data for frame in bench.sent if frame[:3] == status.sender.key]
+    sent = [frame.data for frame in bench.sent if frame[:3] == status.message.key]
     counted = status.decode(sent[-1]) or {}
     assert counted["MissedDeadlines"] == round((ticks[-1] - ticks[0]) / PERIOD_NS) - len(ticks) + 1
 

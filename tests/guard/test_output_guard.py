@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
@@ -61,7 +61,7 @@ def drive(name: str) -> Drive:
     controller = Controller(deployment)
     joysticks, until = dict.fromkeys(deployment.axes, 0.0), dict.fromkeys(deployment.axes, BEGIN_S)
     stop = deployment.emergency_stop
-    presses = Sender(stop.config.bus, stop.message, None, stop.protection) if stop else None
+    presses = SentMessage(stop.config.bus, stop.message, None, stop.protection) if stop else None
     feedback: list[Frame] = []
     tick_ms = deployment.config.tick_ms
     for number in range(round((BEGIN_S + MOVE_S + REST_S) * 1000) // tick_ms):
@@ -109,7 +109,7 @@ class Planted:
     def run(self, wrong: Wrong) -> list[Frame]:
         """Plant it with the next command; frames of this valve that leave with it and behind it."""
         codec = self.runner.bound.valve
-        sound, key = self.runner._put, codec.message.sender.key
+        sound, key = self.runner._put, codec.message.key
 
         def put(steps: int) -> None:
             self.runner._put = sound
@@ -135,7 +135,7 @@ class Planted:
     def caught(self, wrong: Wrong) -> bool:
         """Whether no frame has moved the axis, and it tripped for that."""
         codec = self.runner.bound.valve
-        layout = codec.message.sender.fields.layout
+        layout = codec.message.fields.layout
         for frame in self.run(wrong):
             assert codec.read(layout.decode(frame.data)) == 0
         assert self.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED

@@ -43,8 +43,8 @@ def test_a_message_fills_the_next_longer_frame(machine: Machine, length: int) ->
     least = min(n for n in FD_LENGTHS if n >= length)
     assert len(frame.data) == least
     assert frame.data[2:] == bytes(least - 2)
-    codec = deployment.joysticks["left"].codec
-    assert codec.decode(bytes(8) + b"\xcc" * (least - 8))[0]["Slew"] == 0
+    joystick = deployment.joysticks["left"]
+    assert joystick.decode(bytes(8) + b"\xcc" * (least - 8))[0]["Slew"] == 0
 
 
 @pytest.mark.parametrize(("length", "good"), [(12, True), (11, False)])

@@ -23,7 +23,7 @@ def commands(machine: Machine, raws: Sequence[int]) -> list[float | Reason]:
     result = []
     for raw in raws:
         data = (raw & 0xFFFF).to_bytes(2, "little") + bytes(6)
-        command = joystick.codec.decode(data)[1]["Slew"]
+        command = joystick.decode(data)[1]["Slew"]
         asked = 0.0 if isinstance(command, Reason) or abs(command) <= 0.02 else command
         assert guard.command(data) == pytest.approx(asked, abs=1e-12)
         result.append(command)
@@ -138,7 +138,7 @@ def test_a_signal_means_the_same_to_every_axis(
 def test_axes_that_agree_share_a_signal(machine: Machine) -> None:
     machine.in_yaml(COMMAND, f"{COMMAND} invert: true,")
     machine.in_yaml("signal: NearFar,", "signal: Slew, invert: true,")
-    assert machine.load().joysticks["left"].codec.decode(b"\xf4\1" + bytes(6))[1] == {"Slew": -0.5}
+    assert machine.load().joysticks["left"].decode(b"\xf4\1" + bytes(6))[1] == {"Slew": -0.5}
 
 
 def test_neutral_of_a_valve_is_its_zero(machine: Machine) -> None:

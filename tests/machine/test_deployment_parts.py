@@ -42,10 +42,10 @@ def test_every_section_has_its_part(chosen: Machine) -> None:
     assert deployment.profile.key == ("crane", 1297, False)
     assert (deployment.listen_only, deployment.fd) == (False, frozenset())
     assert deployment.status is not None
-    assert deployment.status.sender.key == ("crane", 0x310, False)
+    assert deployment.status.message.key == ("crane", 0x310, False)
     assert deployment.status_ticks == 25
     assert deployment.identity_status is not None
-    assert deployment.identity_status.sender.key == ("crane", 0x311, False)
+    assert deployment.identity_status.message.key == ("crane", 0x311, False)
 
 
 def test_what_runs_is_told_by_the_bytes_of_the_files(machine: Machine) -> None:

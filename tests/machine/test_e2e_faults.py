@@ -169,7 +169,7 @@ def test_a_counter_and_checksum_on_a_shared_valve_message(tmp_path: Path) -> Non
     )
     axes = load(tmp_path, (old, new), (old, new)).axes
     message = axes["slew"].valve.message
-    assert message.sender.protection == Protection("Alive", 32, Checksum("sum", 5))
+    assert message.protection == Protection("Alive", 32, Checksum("sum", 5))
     counts = []
     for _ in range(40):
         data = message.frame().data

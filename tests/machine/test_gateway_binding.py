@@ -214,7 +214,7 @@ def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_pat
     assert flags
     sent = deployment.axes["slew"].valve.message
     assert isinstance(sent, RewrittenMessage)
-    assert sent.sender.key[1] & 0xFF == 51
+    assert sent.key[1] & 0xFF == 51
     assert sent.ours == {axis.command.signal, flags.neutral, flags.positive, flags.negative}
     group = next(p for p in excluded(deployment) if p.mask != 0x9FFFFFFF)
     assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF_FLAG

@@ -139,14 +139,14 @@ def test_an_id_of_29_bits_is_no_service_of_canopen(tmp_path: Path) -> None:
     deployment = load(tmp_path, CANOPEN, (" 1696 ", f" {0x80000632} "))
     status = deployment.axes["slew"].status
     assert status is not None
-    assert status.sender.key == ("crane", 0x632, True)
+    assert status.message.key == ("crane", 0x632, True)
 
 
 def test_an_id_of_a_service_is_free_on_a_bus_without_canopen(machine: Machine) -> None:
     machine.dbc = machine.dbc.replace(" 768 ", f" {0x632} ")
     status = machine.load().axes["slew"].status
     assert status is not None
-    assert status.sender.key == ("crane", 0x632, False)
+    assert status.message.key == ("crane", 0x632, False)
 
 
 def test_a_node_of_a_bus_that_there_is_not(machine: Machine) -> None:

@@ -1,5 +1,6 @@
 """Frames of a crane, and what the page is shown of them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ class Watched:
 
     def valve(self, axis: str, steps: int) -> Frame:
         bound = self.deployment.axes[axis]
-        return bound.valve.message.sender.frame({bound.config.valve.signal: steps})
+        return bound.valve.message.frame({bound.config.valve.signal: steps})
 
     def sway(self, across_deg: float, along_deg: float = 0.0) -> list[Frame]:
         across, along = (value * 3.14159265 / 180.0 for value in (across_deg, along_deg))
@@ -75,6 +76,15 @@ def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
     shown = watched.receive(Hand(watched.deployment).frames(0, Held(joysticks)))
     given = {axis: values["joystick"] for axis, values in shown["axes"].items()}
     assert given == pytest.approx({axis: joysticks.get(axis, 0.0) for axis in given}, abs=0.005)
+
+
+@pytest.mark.parametrize("change", [lambda data: data + b"\0", lambda data: data[:-1]])
+def test_a_joystick_frame_of_another_length_is_not_shown(
+    watched: Watched, change: Callable[[bytes], bytes]
+) -> None:
+    frames = Hand(watched.deployment).frames(0, Held({"slew": 0.5}))
+    shown = watched.receive([frame._replace(data=change(frame.data)) for frame in frames])
+    assert shown == Watched().view.values(0.0)
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -2,10 +2,9 @@
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, group_of
-from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
+from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.input import Input
@@ -98,7 +97,7 @@ def _bound(
         return of_axis
     bus = deployment.axes[axis].config.valve.bus
     config = Input(bus=bus, message=name, timeout_ms=SILENT_MS)
-    return BoundInput(config, message, JoystickCodec(message, []), UNPROTECTED)
+    return BoundInput(config, message, Layout(message), UNPROTECTED, None)
 
 
 def _problem(deployment: Deployment, text: str) -> ConfigError:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.rewrite import RewrittenMessage
-from canshaper.codec.valve import ValveMessage
+from canshaper.codec.sent import SentMessage
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import BusProtocol, DrivenAxis, MessageKey
@@ -31,7 +31,7 @@ class ForwardedJoystick:
     """
 
     def __init__(
-        self, message: ValveMessage, joystick: JoystickInput, runners: Sequence[DrivenAxis]
+        self, message: SentMessage, joystick: JoystickInput, runners: Sequence[DrivenAxis]
     ) -> None:
         assert isinstance(message, RewrittenMessage)  # only such axes have one
         self._message = message
@@ -40,7 +40,7 @@ class ForwardedJoystick:
         self._seen = joystick.raw
         self.moves = False
         self._passed_ns = 0
-        cycle_ms = message.sender.fields.message.cycle_time or 0
+        cycle_ms = message.fields.message.cycle_time or 0
         self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
 
     def new_frame(self) -> bool:
@@ -103,7 +103,7 @@ class Gateway(BusProtocol):
         self._buses = gateway.between
         by_message: dict[MessageKey, list[DrivenAxis]] = {}
         for runner in (runner for runner in axes.values() if runner.bound.rewrites):
-            by_message.setdefault(runner.bound.valve.message.sender.key, []).append(runner)
+            by_message.setdefault(runner.bound.valve.message.key, []).append(runner)
         self.forwarding: dict[MessageKey, ForwardedJoystick] = {}
         for key, runners in by_message.items():
             bound = runners[0].bound
