@@ -6,7 +6,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.frame import Frame, new_frame
 from canshaper.codec.protection import Protection
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.sent import Sender, SentMessage
 from canshaper.codec.signals import raw_limits, special_codes
 
 
@@ -22,9 +22,12 @@ class RewrittenMessage(SentMessage):
         ours: names of the signals that the axes put in.
 
     Attributes:
-        raw: raw value of every signal: in those of the axes what they put, in all others what a
-            frame of our own says, which is nothing: rest, or "not available".
+        start: raw value of every signal: neutral in those of the axes, in all others what a frame
+            of our own says, which is nothing: rest, or "not available".
+        enable: name of its enable switch.
+        ours: names of the signals that the axes put in.
         ours_mask: bits of the velocities, byte 0 the lowest.
+        mask_of_all: the same with those of the alive counter.
     """
 
     def __init__(
@@ -38,37 +41,46 @@ class RewrittenMessage(SentMessage):
         ours: frozenset[str],
     ) -> None:
         super().__init__(bus, message, source, protection)
-        self.ours = ours
-        self._enable = enable
-        self._layout = self.fields.layout
-        self._start = self.fields.start[enable]
-        self._length = message.length
+        self.ours, self.enable = ours, enable
         for signal in message.signals:
-            self.raw[signal.name] = _at_rest(signal, self.raw[signal.name])
+            self.start[signal.name] = _at_rest(signal, self.start[signal.name])
         self.ours_mask = self._mask(ours)
         counter = protection.counter
-        self._mask_of_all = self.ours_mask | (self._mask({counter}) if counter else 0)
+        self.mask_of_all = self.ours_mask | (self._mask({counter}) if counter else 0)
 
     def _mask(self, names: frozenset[str] | set[str]) -> int:
         """Bits of these signals."""
-        zeros: dict[str, Any] = dict.fromkeys(self.raw, 0)
-        message = self.fields.message
+        zeros: dict[str, Any] = dict.fromkeys(self.start, 0)
+        message, layout = self.fields.message, self.fields.layout
         ones = {
             s.name: -1 if s.is_signed else raw_limits(s)[1]
             for s in message.signals
             if s.name in names
         }
-        low, high = (self._layout.encode({**zeros, **some}) for some in ({}, ones))
+        low, high = (layout.encode({**zeros, **some}) for some in ({}, ones))
         return int.from_bytes(low, "little") ^ int.from_bytes(high, "little")
 
     def neutral_bits(self) -> int:
-        """The velocities of a machine that stands, byte 0 the lowest; for the axes at rest."""
-        return int.from_bytes(self._layout.encode(self.raw), "little") & self.ours_mask
+        """The velocities of a machine that stands, byte 0 the lowest."""
+        return int.from_bytes(self.fields.layout.encode(self.start), "little") & self.ours_mask
+
+    def sender(self) -> "RewritingSender":
+        """What sends it, with its counter at the beginning."""
+        return RewritingSender(self)
+
+
+class RewritingSender(Sender):
+    """Sends it: in the place of frames of the joystick, and where none comes."""
+
+    def __init__(self, message: RewrittenMessage) -> None:
+        super().__init__(message)
+        self._mask, self._length = message.mask_of_all, message.fields.message.length
+        self._enable, self._start = message.enable, message.fields.start[message.enable]
 
     def onto(self, data: bytes) -> Frame:
         """The next frame: this one of the joystick with our velocities, protected again."""
-        ours = int.from_bytes(self.protector.without_check(self.raw), "little") & self._mask_of_all
-        word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
+        ours = int.from_bytes(self.protector.without_check(self.raw), "little") & self._mask
+        word = int.from_bytes(data, "little") & ~self._mask | ours
         protected = self.protector.add_check(word.to_bytes(self._length, "little"))
         return new_frame(Frame, (*self.key, protected))
 

@@ -1,4 +1,4 @@
-"""A message that we send: its place on the bus, what is in it now, and its protection."""
+"""A message that we send: as it is bound, and at work in one controller."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from canshaper.codec.signals import FieldSet
 
 
 class SentMessage:
-    """One message, of which every frame is the next one.
+    """One message as it is bound; nothing of it changes afterwards.
 
     Args:
         bus: name of the bus.
@@ -25,8 +25,7 @@ class SentMessage:
         key: bus, id and whether that is extended.
         fields: its signals.
         protection: that of its frames.
-        protector: its counter.
-        raw: raw value of every signal, changed by who has something to say.
+        start: raw value of every signal at first; valve codecs put neutral in while they are bound.
     """
 
     def __init__(
@@ -42,20 +41,39 @@ class SentMessage:
         self.key = bus, can_id, message.is_extended_frame
         self.fields = FieldSet(message)
         self.protection = protection
-        self.protector = protector = Protector(protection, self.fields.layout)
+        self.start: dict[str, Any] = dict(self.fields.start)
+
+    def sender(self) -> "Sender":
+        """What sends it, with its counter at the beginning."""
+        return Sender(self)
+
+
+class Sender:
+    """Sends one message: every frame is the next one.
+
+    Attributes:
+        key: bus, id and whether that is extended.
+        fields: its signals.
+        protector: its counter.
+        raw: raw value of every signal, changed by who has something to say.
+    """
+
+    def __init__(self, message: SentMessage) -> None:
+        self.key, self.fields = message.key, message.fields
+        self.protector = protector = Protector(message.protection, message.fields.layout)
         # Where there is nothing to protect: a call less on the way of every frame.
-        self._next = protector.protect if protection.check else protector.without_check
-        self.raw: dict[str, Any] = dict(self.fields.start)
+        checked = message.protection.check is not None
+        self._next = protector.protect if checked else protector.without_check
+        self.raw = dict(message.start)
 
     def frame(self, values: Mapping[str, Any] | None = None) -> Frame:
         """The next frame, protected.
 
         Args:
-            values: raw values that are put in first, by signal.
+            values: raw values for this frame alone, by signal.
         """
-        if values:
-            self.raw.update(values)
-        return new_frame(Frame, (*self.key, self._next(self.raw)))
+        raw = {**self.raw, **values} if values else self.raw
+        return new_frame(Frame, (*self.key, self._next(raw)))
 
     def instead(self, frame: Frame) -> Frame:
         """What takes the place of the last frame, which was not sent: with the same count."""

@@ -13,7 +13,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from cantools.database.can import Message
 
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import FrameFault
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.shaping.axis import Axis
@@ -139,14 +139,14 @@ def _field(name: str) -> StatusField[Any]:
 
 
 class StatusCodec(Generic[Source]):
-    """A status message.
+    """A status message: what its frames carry.
 
     Args:
-        message: what is sent.
+        message: where it is sent.
         fields: those that such a message may have.
 
     Attributes:
-        message: what is sent.
+        message: where it is sent.
         fields: those that it has in its DBC.
     """
 
@@ -154,14 +154,14 @@ class StatusCodec(Generic[Source]):
         self.message = message
         self.fields = [one for one in fields if one.name in message.fields.start]
 
-    def frame(self, source: Source) -> Frame:
-        """The next frame; values beyond the bits of their signal are held at its end."""
+    def values(self, source: Source) -> dict[str, int]:
+        """Raw values by signal; those beyond the bits of their signal are held at its end."""
         raw: dict[str, int] = {}
         for one in self.fields:
             value = one.encode(source)
             coded = one.largest is not None
             raw[one.name] = int(value) if coded else self.message.fields.raw(one.name, value)
-        return self.message.frame(raw)
+        return raw
 
     def decode(self, data: bytes) -> dict[str, Any] | None:
         """Values of a frame by the names of its fields; None where its length is wrong."""

@@ -87,19 +87,19 @@ class ValveCodec:
     ) -> None:
         self.message = message
         self.steps = _steps(signal)
-        self._raw = message.raw
         self._signal = signal.name
         self._zero, self._sign = _zero(signal), 1 if signal.scale > 0 else -1
         self._direction = direction
         self._negative = negative.name if negative else None
         self._also = [(s.name, _zero(s), _steps(s) * (1 if s.scale > 0 else -1)) for s in also]
         self._plain = not (direction or negative or also)  # nearly every valve
-        self.put(0)
+        self.put(message.start, 0)
 
-    def put(self, steps: int) -> None:
+    def put(self, raw: dict[str, Any], steps: int) -> None:
         """Put a command into the message.
 
         Args:
+            raw: raw values of the message, by signal.
             steps: the command; negative for the negative direction.
 
         Raises:
@@ -107,7 +107,6 @@ class ValveCodec:
         """
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command: expected up to +-{self.steps} steps, got {steps}")
-        raw = self._raw
         if self._plain:
             raw[self._signal] = self._zero + self._sign * steps
             return

@@ -267,11 +267,10 @@ class Daemon:
 
     def _send_identity(self) -> None:
         """The digest of what runs, where a message carries it and its bus may be used."""
-        deployment = self._controller.deployment
-        status = deployment.identity_status
+        status = self._controller.deployment.identity_status
         if status and status.message.key[0] not in self._controller.silent_buses:
-            frame = status.frame(deployment.identity.digest)
-            if not self._ports[frame.bus].send(frame):
+            frame = self._controller.status.identity()
+            if frame and not self._ports[frame.bus].send(frame):
                 self._guarded.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:

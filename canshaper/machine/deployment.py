@@ -87,11 +87,11 @@ class Deployment:
         stop = [self.emergency_stop] if self.emergency_stop else []
         return [*self.joysticks.values(), *self.switches, *stop]
 
-    def senders(self) -> list[SentMessage]:
+    def sent(self) -> list[SentMessage]:
         """Every message of the DBC files that we send, each once."""
         valves = [axis.valve.message for axis in self.axes.values()]
         statuses = [status.message for status in self._statuses()]
-        return list({sender.key: sender for sender in (*valves, *statuses)}.values())
+        return list({one.key: one for one in (*valves, *statuses)}.values())
 
     def listening(self) -> "Deployment":
         """The same machine for one who only listens, and reports what it would do.

@@ -46,7 +46,7 @@ class _ValveStates:
         self._signal = config.signal
         self._sender = SentMessage(
             config.bus, axis.status_word.message, None, axis.status_word.protection
-        )
+        ).sender()
         self._cycle_s = (axis.status_word.message.cycle_time or 100) / 1000.0
         self._left_s = 0.0
         self._step = 0

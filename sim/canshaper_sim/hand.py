@@ -72,7 +72,8 @@ class _Message:
         self.cycle_ms = bound.message.cycle_time or 20
         # Of J1939 from the address that is asked for.
         source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
-        self._sender = SentMessage(bound.config.bus, bound.message, source, bound.protection)
+        sent = SentMessage(bound.config.bus, bound.message, source, bound.protection)
+        self._sender = sent.sender()
         self._held: Held | None = None
         self._values: dict[str, int] = {}
 

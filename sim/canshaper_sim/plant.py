@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, SequenceChecker
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.sent import Sender, SentMessage
 from canshaper.codec.signals import find_signal
 from canshaper.codec.valve import ValveCodec
 from canshaper.config.schema import Feedback
@@ -94,7 +94,7 @@ class _ValveFeedback:
         self._signal = config.signal
         signal = find_signal(bound.message, config.signal)
         self._full = config.full or float((signal.maximum if signal else None) or 0.0)
-        self._sender = SentMessage(config.bus, bound.message, source, bound.protection)
+        self._sender = SentMessage(config.bus, bound.message, source, bound.protection).sender()
         self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
         self._left_s = self._cycle_s
 
@@ -137,7 +137,7 @@ class PlantNode:
         problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
         self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
-        self._senders: dict[str, SentMessage] = {}
+        self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
         measured = [motion.radius for motion in deployment.motions.values()]
         radii = {radius.message.name: radius.protection for radius in measured if radius}
@@ -149,7 +149,8 @@ class PlantNode:
                 problems.append(entry[0].problem(entry[1], f"lacks {', '.join(missing)}"))
             else:
                 protection = radii.get(message, UNPROTECTED)
-                self._senders[message] = SentMessage(bus, entry[1], protection=protection)
+                sent = SentMessage(bus, entry[1], protection=protection)
+                self._senders[message] = sent.sender()
         if problems:
             raise ConfigError(problems)
         if not listeners:

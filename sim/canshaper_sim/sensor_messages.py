@@ -31,7 +31,7 @@ class SensorMessage:
         message, self.node = first.message, first.config.node
         self._sender = SentMessage(
             message.config.bus, message.message, message.key[1] & 0xFF, message.protection
-        )
+        ).sender()
         self._merits = dict.fromkeys(message.merits.values(), 0)
         self._cycle_s = self._left_s = first.cycle_s
         self._lost_s = parameters.lost_s

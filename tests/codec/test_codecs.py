@@ -16,6 +16,7 @@ from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import VelocitySignal
 from canshaper.codec.valve import ValveCodec
 from canshaper.shaping.states import Reason
+from tests.rigs.sent import command_frame
 
 # One message of every kind of signal: J1939's 10 bits with an offset, big-endian, float, falling.
 DBC = """VERSION ""
@@ -78,8 +79,7 @@ def valve(message: str, counter: str | None = None) -> ValveCodec:
 
 
 def sent(codec: ValveCodec, steps: int) -> Frame:
-    codec.put(steps)
-    return codec.message.frame()
+    return command_frame(codec, steps)
 
 
 def raw_joystick(joystick: int) -> bytes:
@@ -266,19 +266,20 @@ def test_steps_beyond_full_command_are_refused(message: str) -> None:
 
 
 def test_the_alive_counter_counts_every_frame_and_wraps() -> None:
-    codec = valve("Offset", "Counter")
-    counts = [sent(codec, 0).data[0] & 0xF for _ in range(34)]
+    sender = valve("Offset", "Counter").message.sender()
+    counts = [sender.frame().data[0] & 0xF for _ in range(34)]
     assert counts == [*range(1, 16), *range(16), 0, 1, 2]
 
 
 def test_a_frame_that_is_refused_is_not_counted() -> None:
     codec = valve("Offset", "Counter")
+    sender = codec.message.sender()
     with pytest.raises(ValueError, match=r"got 126$"):
-        sent(codec, 126)
-    assert sent(codec, 0).data[0] & 0xF == 1
+        codec.put(sender.raw, 126)
+    assert sender.frame().data[0] & 0xF == 1
 
 
 def test_start_values_beyond_the_bits_are_held_within() -> None:
     text = DBC.replace("SG_ 3 Unused 255", "SG_ 3 Unused 99999")
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Offset")
-    assert SentMessage("b", message).frame({}).data[2] == 255
+    assert SentMessage("b", message).sender().frame({}).data[2] == 255

@@ -23,6 +23,7 @@ from canshaper.config.bus import J1939Name
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.sent import command_frame
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config" / "j1939-forwarder.yaml"
@@ -284,7 +285,7 @@ def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:
     for protection, can_id in protections.values():
         assert isinstance(protection.check, Checksum)
         assert protection.check.can_id == can_id
-    frame = deployment.axes["slew"].valve.message.frame()
+    frame = command_frame(deployment.axes["slew"].valve)
     assert frame.can_id == protections["valve"][1]
     assert (
         frame.data[5] == sum(frame.can_id.to_bytes(4, "big") + frame.data[:5] + b"\xff\xff") % 256

@@ -128,7 +128,8 @@ def test_what_is_not_set_keeps_its_start_value(message: Message, data: st.DataOb
         initial = int(signal.raw_initial or 0)
         start[signal.name] = initial if signal.is_float else min(max(initial, low), high)
     some = {name: value for name, value in raw.items() if name not in unset}
-    assert SentMessage("b", message).frame(some).data == judge_encode(message, {**start, **some})
+    sender = SentMessage("b", message).sender()
+    assert sender.frame(some).data == judge_encode(message, {**start, **some})
 
 
 @given(message=messages(), data=st.data())

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
 from canshaper.codec.protection import UNPROTECTED, Protection
-from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.rewrite import RewritingSender, RewrittenMessage
 
 # Two velocities that are ours, one of Motorola; one of each kind that is not.
 DBC = """VERSION ""
@@ -67,8 +67,12 @@ REST = {
 }
 
 
-def made(protection: Protection = PROTECTED) -> RewrittenMessage:
+def bound(protection: Protection = PROTECTED) -> RewrittenMessage:
     return RewrittenMessage("b", STICK, None, protection, enable="Enable", ours=OURS)
+
+
+def made(protection: Protection = PROTECTED) -> RewritingSender:
+    return bound(protection).sender()
 
 
 def decoded(data: bytes) -> dict[str, Any]:
@@ -105,7 +109,7 @@ def test_without_protection_count_and_check_are_its_own(data: bytes) -> None:
     assert others(made(UNPROTECTED).onto(data).data, *OURS) == others(data, *OURS)
     lift = RewrittenMessage(
         "b", STICK, None, UNPROTECTED, enable="Enable", ours=frozenset(("Lift",))
-    )
+    ).sender()
     assert others(lift.onto(data).data, "Lift") == others(data, "Lift")
     assert others(made(Protection("Count", 16)).onto(data).data, "Count", *OURS) == others(
         data, "Count", *OURS
@@ -114,9 +118,9 @@ def test_without_protection_count_and_check_are_its_own(data: bytes) -> None:
 
 def test_the_bits_of_ours() -> None:
     """Byte 0 is the lowest; 12 bits of Motorola from the highest of byte 1."""
-    message = made()
+    message = bound()
     assert message.ours_mask == 0xF0FFFF
-    message.raw["Slew"] = -1
+    message.start["Slew"] = -1
     # 1000 is 0x3E8, in bytes 1 and 2
     assert message.neutral_bits() == 0x803EFF
 

@@ -25,20 +25,20 @@ def last_of(frames: list[Frame]) -> Sent:
     return {frame[:3]: frame.data for frame in frames}
 
 
-def count_of(sender: SentMessage, data: bytes) -> int:
+def count_of(message: SentMessage, data: bytes) -> int:
     """Alive counter of a frame of a message that has one."""
-    protection = sender.protection
+    protection = message.protection
     if isinstance(protection.check, E2e):
         return data[1] & COUNTER
-    return int(sender.fields.layout.decode(data)[protection.counter or ""])
+    return int(message.fields.layout.decode(data)[protection.counter or ""])
 
 
 def counts(deployment: Deployment, sent: Sent) -> dict[tuple[str, int, bool], int]:
     """Alive counter of every message that has one."""
     return {
-        sender.key: count_of(sender, sent[sender.key])
-        for sender in deployment.senders()
-        if sender.protection.counts
+        message.key: count_of(message, sent[message.key])
+        for message in deployment.sent()
+        if message.protection.counts
     }
 
 

@@ -28,9 +28,9 @@ class FullSpeed(Controller):
         passed = super().receive(frame, arrived_ns)
         if passed is None or passed.can_id != 272:
             return passed
-        raw = self.axes["slew"].bound.valve.message.raw
-        self.axes["slew"].bound.valve.put(self.axes["slew"].bound.valve.steps)
-        data = self.axes["slew"].bound.valve.message.fields.layout.encode(raw)
+        runner = self.axes["slew"]
+        runner.put(runner.bound.valve.steps)
+        data = runner.valve.fields.layout.encode(runner.valve.raw)
         return passed._replace(data=data)
 
 
@@ -43,7 +43,7 @@ class Wrong:
         self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
         self.valve = deployment.axes["slew"].valve
         self.runner = self.controller.axes["slew"]
-        self.sound, self.runner._put = self.runner._put, lambda _steps: self.sound(99)
+        self.sound, self.runner._put = self.runner._put, lambda raw, _: self.sound(raw, 99)
         self.number = 0
 
     def tick(self) -> list[Frame]:
@@ -123,9 +123,8 @@ def test_the_last_frames_are_neutral(name: str) -> None:
     assert left == [frame[:3] for frame in controller.neutral_frames()]
     bound = next(iter(deployment.axes.values()))
     valve, put = bound.valve, bound.valve.put
-    valve.put = lambda _steps: put(99)  # type: ignore[method-assign]
+    valve.put = lambda raw, _steps: put(raw, 99)  # type: ignore[method-assign]
     missing = keys - {f[:3] for f in guarded.neutral_frames()}
-    put(0)
     assert missing == {valve.message.key}
 
 

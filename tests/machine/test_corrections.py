@@ -8,6 +8,7 @@ from canshaper.controller.controller import Controller
 from canshaper.guard.bits import CommandBits, JoystickBits
 from canshaper.shaping.states import Reason
 from tests.rigs.files import Machine
+from tests.rigs.sent import command_frame
 
 SLEW = "Slew : 0|16@1- (0.1,0) [-100|100]"
 VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
@@ -101,8 +102,7 @@ def test_a_valve(machine: Machine, dbc: str, yaml: str, steps: int, raws: dict[i
     )
     assert guard.full == steps
     for step, raw in raws.items():
-        valve.put(step)
-        data = valve.message.frame().data
+        data = command_frame(valve, step).data
         assert data[0] == raw
         assert guard.steps(data) == step
 
@@ -192,8 +192,7 @@ def test_a_valve_command_in_a_multiplexed_message(machine: Machine) -> None:
     )
     machine.in_yaml("message: SlewCommand,", "message: SlewCommand, multiplexor: 7,")
     valve = machine.load().axes["slew"].valve
-    valve.put(100)
-    assert valve.message.frame().data == bytes((100, 1, 7))
+    assert command_frame(valve, 100).data == bytes((100, 1, 7))
 
 
 @pytest.mark.parametrize("key", ["multiplexor", "cycle_ms"])

@@ -116,7 +116,7 @@ def test_a_group_with_a_destination_may_command_a_valve_and_be_read(tmp_path: Pa
     bound = deployment.axes["slew"].feedback
     assert bound is not None
     assert bound.key == ("crane", 0x0CEF9C33, True)
-    assert deployment.axes["slew"].valve.message.frame().can_id == 0x0CEF339C
+    assert deployment.axes["slew"].valve.message.key[1] == 0x0CEF339C
 
 
 def test_a_group_is_one_of_j1939_only(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
 from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
+from tests.rigs.sent import status_frame
 
 CONFIG = Path(__file__).parents[2] / "config"
 PROFILES = ["normal", "quick", "fine", None]
@@ -46,11 +47,11 @@ class Watched:
     ) -> Frame:
         codec = self.deployment.axes[axis].status
         assert codec
-        return codec.frame(report(state, reason, sway_deg=sway_deg))
+        return status_frame(codec, report(state, reason, sway_deg=sway_deg))
 
     def valve(self, axis: str, steps: int) -> Frame:
         bound = self.deployment.axes[axis]
-        return bound.valve.message.frame({bound.config.valve.signal: steps})
+        return bound.valve.message.sender().frame({bound.config.valve.signal: steps})
 
     def sway(self, across_deg: float, along_deg: float = 0.0) -> list[Frame]:
         across, along = (value * 3.14159265 / 180.0 for value in (across_deg, along_deg))
@@ -185,7 +186,7 @@ def test_faults_are_reported_once(watched: Watched) -> None:
     assert codec
     counters = Counters()
     counters.add(FrameFault.COUNTER_JUMP)
-    frame = codec.frame({"LastFault": int(counters.last_fault), **counters.values})
+    frame = status_frame(codec, {"LastFault": int(counters.last_fault), **counters.values})
     shown = watched.receive([frame, frame])
     assert shown["fault"] == "counter jump"
     assert watched.reported == [("fault: counter jump", "warn")]
@@ -227,7 +228,7 @@ def test_the_set_in_force_says_which_profile(number: int, name: str | None) -> N
     codec = watched.deployment.axes["slew"].status
     assert codec
     one = report(State.READY, Reason.JOYSTICK_NEUTRAL, active_set=number)
-    axes = watched.receive([codec.frame(one)])["axes"]
+    axes = watched.receive([status_frame(codec, one)])["axes"]
     assert axes["slew"]["profile"] == name
     assert axes["near_far"]["profile"] is axes["lift"]["profile"] is None
 

@@ -8,7 +8,7 @@ tripped until the operator resets it.
 
 from canshaper.codec.canopen import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.sent import Sender
 from canshaper.config.schema import StatusWord
 from canshaper.inputs.input import GOOD, Input, Raw
 from canshaper.machine.inputs import Bound
@@ -30,7 +30,7 @@ class ValveControl(Input):
     Args:
         bound: message with the status word.
         control: name of the signal with the control word.
-        message: message of the valve, which the control word is put into.
+        message: sends the message of the valve, which the control word is put into.
     """
 
     # Set by _go and _put.
@@ -39,7 +39,7 @@ class ValveControl(Input):
     _word: int
     _since_ns: int | None  # when this word was first put; None: at the next tick
 
-    def __init__(self, bound: Bound[StatusWord], control: str, message: SentMessage) -> None:
+    def __init__(self, bound: Bound[StatusWord], control: str, message: Sender) -> None:
         super().__init__(bound)
         self._signal = bound.config.signal
         self._status_timeout_ns = bound.config.timeout_ms * 1_000_000
