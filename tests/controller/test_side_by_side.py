@@ -1,4 +1,4 @@
-"""Controllers of one deployment side by side: each sends as if it were alone, and owns its state."""
+"""Controllers of one deployment side by side: each sends as if alone, and owns its state."""
 
 import pickle
 from functools import cache
