@@ -62,7 +62,7 @@ class Controller:
             if runner.bound.feedback and runner.feedback
         ]
         routing = deployment.routing
-        self.inputs = received_by(routing, bound)
+        self.inputs = received_by(bound)
         self._sent, self._others = routing.sent, routing.others
         self._protocols = protocols(deployment, self.axes, inputs.joysticks, bound)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}

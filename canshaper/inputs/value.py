@@ -5,7 +5,7 @@ import sys
 from cantools.database.can import Signal
 
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.signals import find_signal, special_codes
+from canshaper.codec.signals import special_codes
 from canshaper.inputs.input import GOOD, Input, Raw
 from canshaper.machine.inputs import BoundInput
 
@@ -43,7 +43,7 @@ class ValueInput(Input):
 
     Args:
         bound: its message.
-        name: the signal.
+        signal: the signal.
         low: smallest value that is one; by default every number.
         high: largest.
 
@@ -53,11 +53,9 @@ class ValueInput(Input):
     """
 
     def __init__(
-        self, bound: BoundInput, name: str, low: float = -LARGEST, high: float = LARGEST
+        self, bound: BoundInput, signal: Signal, low: float = -LARGEST, high: float = LARGEST
     ) -> None:
         super().__init__(bound)
-        signal = find_signal(bound.message, name)
-        assert signal is not None  # checked with the deployment
         self._signal = MeasuredSignal(signal, low, high)
         self.value = 0.0
         self.measured_ns: int | None = None

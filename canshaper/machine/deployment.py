@@ -18,7 +18,7 @@ from canshaper.machine.bus_load import BusLoad, bus_load
 from canshaper.machine.database import Messages
 from canshaper.machine.enable import BoundSwitches
 from canshaper.machine.identity import Identity
-from canshaper.machine.inputs import Bound, BoundJoystick, Choosing
+from canshaper.machine.inputs import Bound, BoundJoystick, BoundValue, Choosing
 from canshaper.machine.motion import BoundMotion
 from canshaper.machine.routing import Key, Routing, build_routing
 
@@ -38,8 +38,8 @@ class Deployment:
     status_ticks: int
     identity: Identity
     identity_status: StatusCodec[int] | None
-    load_state: Bound[Choosing] | None
-    profile: Bound[Choosing] | None
+    load_state: BoundValue[Choosing] | None
+    profile: BoundValue[Choosing] | None
     switches: list[BoundSwitches]
     on_bus: dict[str, list[Message]]
     fd: frozenset[Key]

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from cantools.database.can import Message
+from cantools.database.can import Message, Signal
 
 from canshaper.codec.flags import Velocity
 from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
@@ -121,6 +121,13 @@ class BoundJoystick(Bound[Joystick]):
         return raw, {one.name: one.read(raw) for one in self.velocities if meant}
 
 
+@dataclass(frozen=True)
+class BoundValue(Bound[Section_co]):
+    """A message of which one signal is read: a radius, a weight, a choice, a flow."""
+
+    signal: Signal
+
+
 AnySection = TypeVar("AnySection", bound=Input)
 
 
@@ -174,7 +181,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[Emergenc
     return bound
 
 
-def bind_radius(lookup: Lookup, place: Place, config: Radius) -> Bound[Radius] | None:
+def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radius] | None:
     """The measured radius of the tip."""
     result = bind_input(lookup, place, config, value=config.signal)
     if result is None:
@@ -183,7 +190,7 @@ def bind_radius(lookup: Lookup, place: Place, config: Radius) -> Bound[Radius] |
     if signal := used.find((*place, "signal"), config.signal):
         used.add_fault(radius_range(signal))
     check_source(used, "the radius")
-    return bound
+    return BoundValue(**vars(bound), signal=signal) if signal else None
 
 
 def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[StatusWord] | None:
@@ -196,26 +203,30 @@ def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[
     return bound
 
 
-def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> Bound[Choosing] | None:
+def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Choosing] | None:
     """The load state, or the operator's choice."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
-    if signal and isinstance(config, ProfileSwitch):
+    if signal is None:
+        return None
+    if isinstance(config, ProfileSwitch):
         used.check_integer((*place, "signal"), signal)
-    return bound
+    return BoundValue(**vars(bound), signal=signal)
 
 
-def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> Bound[Feedback] | None:
+def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundValue[Feedback] | None:
     """What a valve reports of itself."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
-    if signal and config.full is None and not signal.maximum:
+    if signal is None:
+        return None
+    if config.full is None and not signal.maximum:
         used.add_fault(f"{signal.name}: expected a range in the DBC, or full, got neither")
-    return bound
+    return BoundValue(**vars(bound), signal=signal)
 
 
 def check_source(used: UsedMessage, what: str) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from canshaper.config.motion import Motion, Radius
 from canshaper.config.source import Place
-from canshaper.machine.inputs import Bound, bind_radius
+from canshaper.machine.inputs import BoundValue, bind_radius
 from canshaper.machine.lookup import Lookup
 
 
@@ -13,7 +13,7 @@ class BoundMotion:
     """A motion with the message of its radius, where that is measured."""
 
     config: Motion
-    radius: Bound[Radius] | None = None
+    radius: BoundValue[Radius] | None = None
 
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:

@@ -11,7 +11,7 @@ from canshaper.codec.valve import ValveCodec
 from canshaper.config.schema import Feedback
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import USUAL_MAX_STEP, Bound
+from canshaper.machine.inputs import USUAL_MAX_STEP, BoundValue
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
@@ -87,13 +87,12 @@ class _ValveInput:
 class _ValveFeedback:
     """What a valve says of itself: how far it is open, each cycle of its message."""
 
-    def __init__(self, axis: str, bound: Bound[Feedback]) -> None:
+    def __init__(self, axis: str, bound: BoundValue[Feedback]) -> None:
         config = bound.config
         source = VALVE_ADDRESS if bound.any_source else bound.key[1] & 0xFF
         self._axis = axis
         self._signal = config.signal
-        signal = find_signal(bound.message, config.signal)
-        self._full = config.full or float((signal.maximum if signal else None) or 0.0)
+        self._full = config.full or float(bound.signal.maximum or 0.0)
         self._sender = SentMessage(config.bus, bound.message, source, bound.protection).sender()
         self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
         self._left_s = self._cycle_s

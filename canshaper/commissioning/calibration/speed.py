@@ -37,7 +37,7 @@ class SpeedFeedback:
         bus = deployment.config.buses[deployment.axes[axis].config.valve.bus]
         feedback = _find(deployment, message, signal, fd=bus.fd)
         self._bound = bound = _bound(deployment, axis, message, feedback[0], signal)
-        self._input = ValueInput(bound, feedback[1].name, *measurable(feedback[1]))
+        self._input = ValueInput(bound, feedback[1], *measurable(feedback[1]))
         self._keys = frozenset(bound.keys)
         _, can_id, _ = bound.key
         self._source = None if can_id & 0xFF == NULL else can_id & 0xFF
