@@ -60,10 +60,10 @@ class Sender:
 
     def __init__(self, message: SentMessage) -> None:
         self.key, self.fields = message.key, message.fields
+        self._bus, self._id, self._extended = message.key  # quicker than to unpack it each time
         self.protector = protector = Protector(message.protection, message.fields.layout)
         # Where there is nothing to protect: a call less on the way of every frame.
-        checked = message.protection.check is not None
-        self._next = protector.protect if checked else protector.without_check
+        self._next = protector.protect if message.protection.check else protector.without_check
         self.raw = dict(message.start)
 
     def frame(self, values: Mapping[str, Any] | None = None) -> Frame:
@@ -73,7 +73,7 @@ class Sender:
             values: raw values for this frame alone, by signal.
         """
         raw = {**self.raw, **values} if values else self.raw
-        return new_frame(Frame, (*self.key, self._next(raw)))
+        return new_frame(Frame, (self._bus, self._id, self._extended, self._next(raw)))
 
     def instead(self, frame: Frame) -> Frame:
         """What takes the place of the last frame, which was not sent: with the same count."""
