@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
+from canshaper.codec.status import StatusCodec
 from canshaper.controller.counters import Counters
 from canshaper.controller.runner import AxisRunner
 from canshaper.machine.deployment import Deployment
@@ -47,10 +48,8 @@ class StatusMessages:
         if status and _due(last, now, self._deployment.status_ticks):
             yield self._senders[status.message.key].frame(status.values(counters.status()))
 
-    def identity(self) -> Frame | None:
-        """The digest of what runs, where a message carries it."""
-        if (status := self._deployment.identity_status) is None:
-            return None
+    def identity(self, status: StatusCodec[int]) -> Frame:
+        """The digest of what runs, in the message that carries it."""
         values = status.values(self._deployment.identity.digest)
         return self._senders[status.message.key].frame(values)
 

@@ -270,8 +270,8 @@ class Daemon:
         """The digest of what runs, where a message carries it and its bus may be used."""
         status = self._controller.deployment.identity_status
         if status and status.message.key[0] not in self._controller.silent_buses:
-            frame = self._controller.status.identity()
-            if frame and not self._ports[frame.bus].send(frame):
+            frame = self._controller.status.identity(status)
+            if not self._ports[frame.bus].send(frame):
                 self._guarded.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:

@@ -59,6 +59,8 @@ def test_a_rocker_is_bound(machine: Machine) -> None:
     joystick = machine.load().joysticks["left"]
     assert joystick.decode(bytes([100, 0, *bytes(6)]))[1] == {"Slew": 0.5, "NearFar": 0.0}
     assert joystick.decode(bytes([0, 200, *bytes(6)]))[1] == {"Slew": -1.0, "NearFar": 0.0}
+    with pytest.raises(ValueError, match="expected 8 bytes, got 9"):
+        joystick.decode(bytes(9))
 
 
 def test_both_signals_of_a_rocker_are_looked_up(machine: Machine) -> None:
