@@ -11,7 +11,6 @@
      |    +-- GatewayError          the kernel's gateway refuses
      +-- ControlError           a running daemon cannot be reached, or refuses
      +-- NodeError              so with a node of CANopen that is to be set
-     +-- WrongLengthError       a frame is shorter or longer than its message
      +-- PageMessageError       what a page sent is no message
      +-- LogError               a log cannot be used
      |    +-- CutOffError           it ends in the middle
@@ -114,10 +113,6 @@ class ControlError(CanshaperError):
 
 class NodeError(CanshaperError):
     """A node of CANopen does not answer, or does not take a parameter."""
-
-
-class WrongLengthError(CanshaperError):
-    """A frame is shorter or longer than its message in the DBC file."""
 
 
 class PageMessageError(CanshaperError, ValueError):

@@ -1,7 +1,7 @@
 """Commands without a sign: a magnitude with flags as in J1939-71, or a signal a direction."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from canshaper.codec.signals import ROUNDING, VelocitySignal
 from canshaper.shaping.states import Reason
@@ -20,6 +20,17 @@ _DIRECTIONS = {
 }
 # Code of two bits in J1939-71 for a signal that does not exist; 2 and all above 3 are errors.
 _NOT_AVAILABLE = 3
+
+
+class Velocity(Protocol):
+    """What reads the velocity that moves an axis from the raw values of a joystick's frame."""
+
+    @property
+    def name(self) -> str:
+        """Name of its signal."""
+
+    def read(self, raw: dict[str, Any], /) -> float | Reason:
+        """Command in [-1, 1], or why there is none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ bitstruct is called directly: docs/decisions/0009-cantools-at-the-desk.md.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from cantools.database.can import Message, Signal
 
@@ -34,6 +34,20 @@ def layout_fault(message: Message) -> str | None:
         if signal.is_float and signal.length not in (16, 32, 64):
             return f"{signal.name}: expected a float of 16, 32 or 64 bits, got {signal.length}"
     return None
+
+
+class Chosen(NamedTuple):
+    """Which frames of a multiplexed message are meant.
+
+    Attributes:
+        signal: the multiplexor.
+        value: raw, of the frames that are meant.
+        alone: whether alive counter or checksum are in these only.
+    """
+
+    signal: str
+    value: int
+    alone: bool
 
 
 class Layout:

@@ -2,69 +2,91 @@
 
 from typing import Any
 
-from cantools.database.can import Signal
+from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame, new_frame
+from canshaper.codec.protection import Protection
+from canshaper.codec.sent import Sender, SentMessage
 from canshaper.codec.signals import raw_limits, special_codes
-from canshaper.codec.valve import ValveMessage
 
 
-class RewrittenMessage(ValveMessage):
+class RewrittenMessage(SentMessage):
     """The message of a joystick as it leaves on the other bus.
 
     Args:
-        sender: its place on that bus, and its protection, which is computed again.
+        bus: name of that bus.
+        message: its definition.
+        source: its source address, where it is one of J1939.
+        protection: that of its frames, computed again.
         enable: name of its enable switch.
         ours: names of the signals that the axes put in.
 
     Attributes:
-        raw: raw value of every signal: in those of the axes what they put, in all others what a
-            frame of our own says, which is nothing: rest, or "not available".
+        start: raw value of every signal: neutral in those of the axes, in all others what a frame
+            of our own says, which is nothing: rest, or "not available".
+        enable: name of its enable switch.
+        ours: names of the signals that the axes put in.
         ours_mask: bits of the velocities, byte 0 the lowest.
+        mask_of_all: the same with those of the alive counter.
     """
 
-    def __init__(self, sender: Sender, enable: str, ours: frozenset[str]) -> None:
-        super().__init__(sender)
-        self.ours = ours
-        self._enable = enable
-        self._protector = sender.protector
-        self._layout = sender.fields.layout
-        self._start = sender.fields.start[enable]
-        message = sender.fields.message
-        self._length = message.length
+    def __init__(
+        self,
+        bus: str,
+        message: Message,
+        source: int | None,
+        protection: Protection,
+        *,
+        enable: str,
+        ours: frozenset[str],
+    ) -> None:
+        super().__init__(bus, message, source, protection)
+        self.ours, self.enable = ours, enable
         for signal in message.signals:
-            self.raw[signal.name] = _at_rest(signal, self.raw[signal.name])
+            self.start[signal.name] = _at_rest(signal, self.start[signal.name])
         self.ours_mask = self._mask(ours)
-        counter = sender.protection.counter
-        self._mask_of_all = self.ours_mask | (self._mask({counter}) if counter else 0)
+        counter = protection.counter
+        self.mask_of_all = self.ours_mask | (self._mask({counter}) if counter else 0)
 
     def _mask(self, names: frozenset[str] | set[str]) -> int:
         """Bits of these signals."""
-        zeros: dict[str, Any] = dict.fromkeys(self.raw, 0)
-        message = self.sender.fields.message
+        zeros: dict[str, Any] = dict.fromkeys(self.start, 0)
+        message, layout = self.fields.message, self.fields.layout
         ones = {
             s.name: -1 if s.is_signed else raw_limits(s)[1]
             for s in message.signals
             if s.name in names
         }
-        low, high = (self._layout.encode({**zeros, **some}) for some in ({}, ones))
+        low, high = (layout.encode({**zeros, **some}) for some in ({}, ones))
         return int.from_bytes(low, "little") ^ int.from_bytes(high, "little")
 
     def neutral_bits(self) -> int:
-        """The velocities of a machine that stands, byte 0 the lowest; for the axes at rest."""
-        return int.from_bytes(self._layout.encode(self.raw), "little") & self.ours_mask
+        """The velocities of a machine that stands, byte 0 the lowest."""
+        return int.from_bytes(self.fields.layout.encode(self.start), "little") & self.ours_mask
+
+    def sender(self) -> "RewritingSender":
+        """What sends it, with its counter at the beginning."""
+        return RewritingSender(self)
+
+
+class RewritingSender(Sender):
+    """Sends it: in the place of frames of the joystick, and where none comes."""
+
+    def __init__(self, message: RewrittenMessage) -> None:
+        super().__init__(message)
+        self._mask, self._length = message.mask_of_all, message.fields.message.length
+        self._enable, self._start = message.enable, message.fields.start[message.enable]
 
     def onto(self, data: bytes) -> Frame:
         """The next frame: this one of the joystick with our velocities, protected again."""
-        ours = int.from_bytes(self._protector.without_check(self.raw), "little") & self._mask_of_all
-        word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
-        protected = self._protector.add_check(word.to_bytes(self._length, "little"))
-        return new_frame(Frame, (self.bus, self._id, self._extended, protected))
+        ours = int.from_bytes(self.protector.without_check(self.raw), "little") & self._mask
+        word = int.from_bytes(data, "little") & ~self._mask | ours
+        protected = self.protector.add_check(word.to_bytes(self._length, "little"))
+        return new_frame(Frame, (*self.key, protected))
 
     def instead(self, frame: Frame) -> Frame:
         """The same frame with what the axes have put in now, and with the same count."""
-        self._protector.take_back()
+        self.protector.take_back()
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:

@@ -13,8 +13,8 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from cantools.database.can import Message
 
-from canshaper.codec.codecs import Sender
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import FrameFault
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.states import Reason, State
@@ -139,33 +139,33 @@ def _field(name: str) -> StatusField[Any]:
 
 
 class StatusCodec(Generic[Source]):
-    """A status message.
+    """A status message: what its frames carry.
 
     Args:
-        sender: its place on the bus.
+        message: where it is sent.
         fields: those that such a message may have.
 
     Attributes:
-        sender: its place on the bus.
+        message: where it is sent.
         fields: those that it has in its DBC.
     """
 
-    def __init__(self, sender: Sender, fields: Iterable[StatusField[Source]]) -> None:
-        self.sender = sender
-        self.fields = [one for one in fields if one.name in sender.fields.start]
+    def __init__(self, message: SentMessage, fields: Iterable[StatusField[Source]]) -> None:
+        self.message = message
+        self.fields = [one for one in fields if one.name in message.fields.start]
 
-    def frame(self, source: Source) -> Frame:
-        """The next frame; values beyond the bits of their signal are held at its end."""
+    def values(self, source: Source) -> dict[str, int]:
+        """Raw values by signal; those beyond the bits of their signal are held at its end."""
         raw: dict[str, int] = {}
         for one in self.fields:
             value = one.encode(source)
             coded = one.largest is not None
-            raw[one.name] = int(value) if coded else self.sender.fields.raw(one.name, value)
-        return self.sender.frame(raw)
+            raw[one.name] = int(value) if coded else self.message.fields.raw(one.name, value)
+        return raw
 
     def decode(self, data: bytes) -> dict[str, Any] | None:
         """Values of a frame by the names of its fields; None where its length is wrong."""
-        fields = self.sender.fields
+        fields = self.message.fields
         if len(data) != fields.layout.length:
             return None
         raw = fields.layout.decode(data)

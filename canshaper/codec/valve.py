@@ -1,4 +1,4 @@
-"""Valve messages: the grid steps of axes to the bytes of a frame."""
+"""The command of an axis in its valve message: grid steps to raw values and back."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,36 +6,8 @@ from typing import Any, Protocol
 
 from cantools.database.can import Signal
 
-from canshaper.codec.codecs import Sender
-from canshaper.codec.frame import Frame, new_frame
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import full_scale, valve_steps
-
-
-class ValveMessage:
-    """A message with the commands of one axis, or of several.
-
-    Attributes:
-        sender: its place on the bus.
-        bus: name of the bus.
-        raw: raw value of every signal, which the axes change.
-    """
-
-    def __init__(self, sender: Sender) -> None:
-        self.sender = sender
-        self.raw: dict[str, Any] = dict(sender.fields.start)
-        self.bus, self._id, self._extended = sender.key
-        # Where there is nothing to protect: a call less on the way of every frame.
-        protector = sender.protector
-        self._next = protector.protect if sender.protection.check else protector.without_check
-
-    def frame(self) -> Frame:
-        """The next frame, protected, with what its axes have put in."""
-        return new_frame(Frame, (self.bus, self._id, self._extended, self._next(self.raw)))
-
-    def instead(self, frame: Frame) -> Frame:
-        """What takes the place of the last frame, which was not sent: with the same count."""
-        self.sender.protector.take_back()
-        return self.frame()
 
 
 class Direction(Protocol):
@@ -107,7 +79,7 @@ class ValveCodec:
 
     def __init__(
         self,
-        message: ValveMessage,
+        message: SentMessage,
         signal: Signal,
         direction: Direction | None = None,
         also: Sequence[Signal] = (),
@@ -115,19 +87,19 @@ class ValveCodec:
     ) -> None:
         self.message = message
         self.steps = _steps(signal)
-        self._raw = message.raw
         self._signal = signal.name
         self._zero, self._sign = _zero(signal), 1 if signal.scale > 0 else -1
         self._direction = direction
         self._negative = negative.name if negative else None
         self._also = [(s.name, _zero(s), _steps(s) * (1 if s.scale > 0 else -1)) for s in also]
         self._plain = not (direction or negative or also)  # nearly every valve
-        self.put(0)
+        self.put(message.start, 0)
 
-    def put(self, steps: int) -> None:
+    def put(self, raw: dict[str, Any], steps: int) -> None:
         """Put a command into the message.
 
         Args:
+            raw: raw values of the message, by signal.
             steps: the command; negative for the negative direction.
 
         Raises:
@@ -135,7 +107,6 @@ class ValveCodec:
         """
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command: expected up to +-{self.steps} steps, got {steps}")
-        raw = self._raw
         if self._plain:
             raw[self._signal] = self._zero + self._sign * steps
             return

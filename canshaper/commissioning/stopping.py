@@ -75,9 +75,14 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
     tick_s = deployment.config.tick_ms / 1000.0
     period_s = tick_s * bound.period_ticks
     timeout_s = slowest_ms(deployment.config, joystick.name) / 1000.0
+    senders = {one.key: one.sender() for one in deployment.sent()}
     travels = [
         travel(
-            lambda one=one: AxisRunner(one, tick_s, JoystickInput(joystick)).axis,  # type: ignore[misc]
+            lambda one=one: (
+                AxisRunner(  # type: ignore[misc]
+                    one, tick_s, JoystickInput(joystick), senders
+                ).axis
+            ),
             timeout_s=timeout_s,
             period_s=period_s,
         )

@@ -15,7 +15,7 @@ from canshaper.controller.overrun import OverrunDetector
 from canshaper.controller.parts import parts
 from canshaper.controller.runner import AxisRunner
 from canshaper.controller.sensor_report import SensorReport
-from canshaper.controller.status import status_frames
+from canshaper.controller.status import StatusMessages
 from canshaper.inputs.carry_over import Key, Part, carry_over
 from canshaper.inputs.input import EnableGate
 from canshaper.machine.deployment import Deployment
@@ -35,6 +35,7 @@ class Controller:
         inputs: what receives a message that is known by its identifier.
         events: changes of state since the owner last emptied the list.
         motions: the two-axis motions.
+        status: the status messages.
         moves: whether the frame that was handed out last is one of a valve, and any moves.
     """
 
@@ -44,11 +45,15 @@ class Controller:
         self.events: list[Event] = []
         inputs = MachineInputs(deployment)
         self.joysticks, self._stop = inputs.joysticks, inputs.stop
+        self._senders = {one.key: one.sender() for one in deployment.sent()}
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
-            name: AxisRunner(bound, tick_s, inputs.joysticks[bound.config.command.joystick])
+            name: AxisRunner(
+                bound, tick_s, inputs.joysticks[bound.config.command.joystick], self._senders
+            )
             for name, bound in deployment.axes.items()
         }
+        self.status = StatusMessages(deployment, self.axes.values(), self._senders)
         self._sensors: dict[str, SensorReport] = {}
         self._connect(inputs, tick_s)
         bound = inputs.bound + [
@@ -57,7 +62,7 @@ class Controller:
             if runner.bound.feedback and runner.feedback
         ]
         routing = deployment.routing
-        self.inputs = received_by(routing, bound)
+        self.inputs = received_by(bound)
         self._sent, self._others = routing.sent, routing.others
         self._protocols = protocols(deployment, self.axes, inputs.joysticks, bound)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}
@@ -92,7 +97,9 @@ class Controller:
                 self.on_bus_off(name)
 
     def _parts(self) -> dict[Key, Part]:
-        return parts(self.deployment, self.inputs, self.axes, self._protocols)
+        return parts(
+            self.deployment, self._senders.values(), self.inputs, self.axes, self._protocols
+        )
 
     @property
     def neutral(self) -> bool:
@@ -184,7 +191,7 @@ class Controller:
                 if rule is not None:
                     if (own := rule.own(now_ns)) is not None:
                         yield own
-                elif message is not None and message.bus not in silent:
+                elif message is not None and message.key[0] not in silent:
                     yield message.frame()
                 runner.axis.advance()
                 if runner.feedback is not None or runner.axis.sensed is not None:
@@ -193,8 +200,7 @@ class Controller:
                     self._changed(name, runner, transition)
                     changed.append(runner)
         self.moves = False
-        axes = self.axes.values()
-        for frame in status_frames(self.deployment, axes, changed, self.counters, (last, now)):
+        for frame in self.status.frames(changed, self.counters, last, now):
             if frame.bus not in silent:
                 yield frame
         if self._protocols:

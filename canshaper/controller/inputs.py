@@ -1,6 +1,6 @@
 """The inputs of a deployment: what receives each of its messages."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from canshaper.inputs.input import EmergencyStopInput, MessageInput, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
@@ -9,8 +9,7 @@ from canshaper.inputs.radius import radius_input
 from canshaper.inputs.sway_sensor import SwaySensorInput
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundSwitch
-from canshaper.machine.routing import Routing
+from canshaper.machine.inputs import BoundInput, BoundValue, Choosing
 from canshaper.protocols.interface import MessageKey
 
 BoundHandler = tuple[BoundInput, MessageInput]
@@ -86,19 +85,14 @@ class MachineInputs:
         having = [self.joysticks[n] for n, one in config.joysticks.items() if one.next_profile]
         return ProfileButtons(having, profile_names(config)) if having else None
 
-    def _switch(self, bound: BoundSwitch | None) -> ValueInput | None:
+    def _switch(self, bound: BoundValue[Choosing] | None) -> ValueInput | None:
         if bound is None:
             return None
-        one = ValueInput(bound, bound.config.signal)
+        one = ValueInput(bound, bound.signal)
         self.bound.append((bound, one))
         return one
 
 
-def received_by(routing: Routing, bound: Iterable[BoundHandler]) -> dict[MessageKey, MessageInput]:
+def received_by(bound: Iterable[BoundHandler]) -> dict[MessageKey, MessageInput]:
     """What receives each message that is known by its identifier."""
-    handlers: Mapping[int, MessageInput] = {id(one): handler for one, handler in bound}
-    return {
-        key: handlers[id(route.input)]
-        for key, route in routing.routes.items()
-        if id(route.input) in handlers
-    }
+    return {key: one for message, one in bound if not message.any_source for key in message.keys}

@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.valve import ValveMessage
+from canshaper.codec.sent import Sender
 from canshaper.controller.runner import AxisRunner
 from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
-Turn = tuple[str, AxisRunner, ValveMessage | None, ForwardingRule | None]
+Turn = tuple[str, AxisRunner, Sender | None, ForwardingRule | None]
 """An axis with its name, and what goes out when it has moved: a message, or by a rule."""
 
 
@@ -32,10 +32,9 @@ class ValveOutputs:
         """The axes in their order; a message goes out with the last one of its axes."""
         turns: list[Turn] = []
         for name, runner in order:
-            message = runner.bound.valve.message
-            key = message.sender.key
+            key = runner.valve.key
             if self._axes[key][-1] is runner:
-                turns.append((name, runner, message, self._forwarding.get(key)))
+                turns.append((name, runner, runner.valve, self._forwarding.get(key)))
             else:
                 turns.append((name, runner, None, None))
         return turns
@@ -58,7 +57,7 @@ class ValveOutputs:
         runners = self._axes[frame[:3]]
         if not any(runner.axis.raw for runner in runners):
             return False
-        runners[-1].bound.valve.message.sender.protector.take_back()
+        runners[-1].valve.protector.take_back()
         return True
 
     def refused(self, frame: Frame) -> Frame:
@@ -70,17 +69,17 @@ class ValveOutputs:
         runners = self._axes[frame[:3]]
         for runner in runners:
             runner.trip(Reason.OUTPUT_REFUSED)
-            runner.bound.valve.put(0)
-        return runners[0].bound.valve.message.instead(frame)
+            runner.put(0)
+        return runners[0].valve.instead(frame)
 
     def neutral_frames(self, silent: frozenset[str]) -> list[Frame]:
         """A neutral frame for every valve whose bus is not silent: the last thing sent."""
         frames: list[Frame] = []
         for key, runners in self._axes.items():
             for runner in runners:
-                runner.bound.valve.put(0)
+                runner.put(0)
             if (rule := self._forwarding.get(key)) is not None:
                 frames += rule.last()
             elif key[0] not in silent:
-                frames.append(runners[-1].bound.valve.message.frame())
+                frames.append(runners[-1].valve.frame())
         return frames

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from canshaper.codec.sent import Sender
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.machine.deployment import Deployment
@@ -10,6 +11,7 @@ from canshaper.protocols.interface import BusProtocol
 
 def parts(
     deployment: Deployment,
+    senders: Iterable[Sender],
     inputs: Mapping[tuple[str, int, bool], Part],
     axes: Mapping[str, AxisRunner],
     protocols: Iterable[BusProtocol],
@@ -21,6 +23,7 @@ def parts(
 
     Args:
         deployment: the machine.
+        senders: what sends each message.
         inputs: what receives a message, by bus and id.
         axes: the axes by name.
         protocols: those of the machine.
@@ -30,11 +33,11 @@ def parts(
     def by_key() -> Iterator[tuple[Key, Part]]:
         for (bus, *message), entry in inputs.items():
             yield ("input", *places[bus], *message), entry
-        for sender in deployment.senders():
+        for sender in senders:
             bus, *message = sender.key
             yield ("sender", *places[bus], *message), sender.protector
         for name, runner in axes.items():
-            bus, *message = runner.bound.valve.message.sender.key
+            bus, *message = runner.valve.key
             signal = runner.bound.config.valve.signal
             yield ("valve", *places[bus], *message, signal), runner
             yield ("axis", name), runner

@@ -1,10 +1,12 @@
 """One axis of a deployment at work."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Self
 
 from canshaper.codec.frame import Frame
+from canshaper.codec.sent import Sender
 from canshaper.config.schema import AxisConfig
 from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
@@ -14,7 +16,7 @@ from canshaper.inputs.profile import ProfileChoice
 from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.bound_axis import BoundAxis
-from canshaper.protocols.interface import Interlock
+from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
@@ -35,15 +37,24 @@ class AxisRunner:
 
     Attributes:
         bound: the axis with its codecs, and with the configuration that is in force.
+        valve: sends the message of its valve.
         period_ticks, period_s: time between two commands to its valve.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
     """
 
-    def __init__(self, bound: BoundAxis, tick_s: float, joystick: CommandSource) -> None:
+    def __init__(
+        self,
+        bound: BoundAxis,
+        tick_s: float,
+        joystick: CommandSource,
+        senders: Mapping[MessageKey, Sender],
+    ) -> None:
         config = bound.config
         self.bound = bound
+        self.valve = senders[bound.valve.message.key]
+        self._status = senders[bound.status.message.key] if bound.status else None
         self._joystick = joystick
         self._releases = self._presses = 0  # as this axis knows them
         self._signal = config.command.signal
@@ -124,8 +135,8 @@ class AxisRunner:
         assert bound is not None
         assert sway is not None  # checked with the deployment
         self._sway_signal = SwaySignal(message, bound)
-        damps, timing = bound.config.use == "damp", bound.timing(self.period_s)
-        self.axis.sensed = SensedSway(sway, timing, bound.limits, damps=damps)
+        damps = bound.config.use == "damp"
+        self.axis.sensed = SensedSway(sway, bound.timing, bound.limits, bound.gains, damps=damps)
 
     def add_radius(self, radius: ValueInput | None) -> None:
         """Of an axis that turns: the speed of its tip is by this radius, where it is measured."""
@@ -222,8 +233,12 @@ class AxisRunner:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
             axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
         transition = axis.act(command, self._added, damps=self._damps)
-        self._put(axis.raw)
+        self._put(self.valve.raw, axis.raw)
         return transition
+
+    def put(self, steps: int) -> None:
+        """Put a command into the message of the valve."""
+        self.bound.valve.put(self.valve.raw, steps)
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
         """Why the axis has to stop or may not begin; why it has to be neutral at once is noted."""
@@ -264,7 +279,8 @@ class AxisRunner:
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""
-        return self.bound.status.frame(self) if self.bound.status else None
+        status, sender = self.bound.status, self._status
+        return sender.frame(status.values(self)) if status and sender else None
 
     @property
     def sway_deg(self) -> float:

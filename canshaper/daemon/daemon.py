@@ -16,7 +16,7 @@ from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.control_server import ControlServer
-from canshaper.daemon.follow import TickFollower
+from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.gateway import InlineGateway
 from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.loop import run_at_deadlines
@@ -140,6 +140,8 @@ class Daemon:
             if port.state in OFF_BUS:
                 self._guarded.on_bus_off(name)
         self._reporter.buses()
+        if self._follower and (news := self._follower.news()):
+            log.warning("%s", news)
         self._reporter.faults(now_ns)
         self._reloads.step(neutral=controller.neutral)
         if self._line:
@@ -183,8 +185,7 @@ class Daemon:
         self._adjuster = Adjuster(self._controller)
         self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        follows = deployment.config.tick is not None
-        self._follower = TickFollower(deployment, self._controller) if follows else None
+        self._follower = tick_follower(deployment, self._controller)
 
     def _in_line(self, deployment: Deployment) -> InlineGateway | None:
         """What passes frames on, where we stand in a line."""
@@ -267,10 +268,9 @@ class Daemon:
 
     def _send_identity(self) -> None:
         """The digest of what runs, where a message carries it and its bus may be used."""
-        deployment = self._controller.deployment
-        status = deployment.identity_status
-        if status and status.sender.key[0] not in self._controller.silent_buses:
-            frame = status.frame(deployment.identity.digest)
+        status = self._controller.deployment.identity_status
+        if status and status.message.key[0] not in self._controller.silent_buses:
+            frame = self._controller.status.identity(status)
             if not self._ports[frame.bus].send(frame):
                 self._guarded.send_failed(frame)
 

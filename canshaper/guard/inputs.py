@@ -109,7 +109,7 @@ class GuardedInput(ABC):
         self._length = bound.message.length
         self._check = bound.protection.check
         self._choice: tuple[Field, int] | None = None
-        if chosen := bound.codec.chosen:
+        if chosen := bound.chosen:
             signal = bound.message.get_signal_by_name(chosen.signal)
             self._choice = Field(signal, self._length), chosen.value
         self._plain = self._check is None and self._choice is None

@@ -152,7 +152,7 @@ def _valves(
     for name, bound in deployment.axes.items():
         joystick = joysticks[bound.config.command.joystick]
         axes[name] = GuardedAxis(deployment, bound, joystick, (*stops, *joystick.needed))
-        by_message.setdefault(bound.valve.message.sender.key, []).append(axes[name])
+        by_message.setdefault(bound.valve.message.key, []).append(axes[name])
     for motion in (bound.config for bound in deployment.motions.values()):
         if motion.near_far is not None:
             slew, near_far = axes[motion.slew], axes[motion.near_far]

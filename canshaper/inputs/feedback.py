@@ -5,9 +5,9 @@ from collections import deque
 from enum import Enum
 from typing import Self
 
-from canshaper.codec.signals import find_signal
+from canshaper.config.schema import Feedback as FeedbackConfig
 from canshaper.inputs.value import ValueInput, measurable
-from canshaper.machine.inputs import BoundFeedback
+from canshaper.machine.inputs import BoundValue
 
 
 class Following(Enum):
@@ -32,11 +32,9 @@ class Feedback(ValueInput):
         following: what it says.
     """
 
-    def __init__(self, bound: BoundFeedback, period_s: float) -> None:
-        config = bound.config
-        signal = find_signal(bound.message, config.signal)
-        assert signal is not None  # checked with the deployment
-        super().__init__(bound, signal.name, *measurable(signal))
+    def __init__(self, bound: BoundValue[FeedbackConfig], period_s: float) -> None:
+        config, signal = bound.config, bound.signal
+        super().__init__(bound, signal, *measurable(signal))
         self._full = config.full if config.full is not None else float(signal.maximum or 0.0)
         self._tolerance = config.tolerance_pct / 100.0
         self._commands = deque([0.0], maxlen=1 + math.ceil(config.settle_ms / 1000.0 / period_s))

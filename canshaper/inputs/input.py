@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, Self
 
 from canshaper.codec.frame import FrameFault
-from canshaper.errors import WrongLengthError
 from canshaper.inputs.carry_over import Part
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
 # A member by way of its class takes ten times as long as a name, for every frame.
 GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
+Raw = dict[str, Any]
+"""Raw values of a frame, by signal."""
 
 
 class Receiver(Protocol):
@@ -35,27 +36,25 @@ class Input(ABC):
     frame is read: it is numbered, not dated, so that none is too old to be seen.
 
     Attributes:
-        raw: raw values of the last frame that counted, by signal.
-        commands: its velocities, or why there is none, by signal.
+        raw: raw values of the last frame that counted.
     """
 
     def __init__(self, bound: BoundInput) -> None:
-        self._codec, self._chosen = bound.codec, bound.codec.chosen
+        self._length, self._decode = bound.message.length, bound.layout.decode
+        self._chosen = bound.chosen
         self._sequence = bound.sequence_checker()
         self._counter = bound.protection.counter
         self._timeout_ns = bound.config.timeout_ms * 1_000_000
         self._last_frame_ns: int | None = None
         self._refused_ns: int | None = None
         self._received_ns: int | None = None
-        self.raw: dict[str, Any] = {}
-        self.commands: dict[str, float | Reason] = {}
+        self.raw: Raw = {}
 
     def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
         """Receive a frame, or return its fault; only a good one counts."""
-        try:
-            raw, commands = self._codec.decode(data)
-        except WrongLengthError:
+        if len(data) != self._length:
             return FrameFault.WRONG_LENGTH
+        raw = self._decode(data)
         chosen, others = self._chosen, False
         if chosen is not None and (others := raw[chosen.signal] != chosen.value) and chosen.alone:
             return GOOD
@@ -70,26 +69,19 @@ class Input(ABC):
         if others:
             return fault
         accepted = sequence.qualified and not fault
-        content = self.on_frame(raw, commands, arrived_ns, accepted)
+        content = self.on_frame(raw, arrived_ns, accepted)
         if not accepted:
             self._refused_ns = arrived_ns
             return fault
-        self.raw, self.commands, self._received_ns = raw, commands, arrived_ns
+        self.raw, self._received_ns = raw, arrived_ns
         return content
 
     @abstractmethod
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """A frame with the right checksum came; the last one still stands in ``raw``.
 
         Args:
-            raw: its raw values, by signal.
-            commands: its velocities, or why there is none, by signal.
+            raw: its raw values.
             arrived_ns: when it arrived.
             accepted: whether it may be used. A switch may say something without that.
 
@@ -142,7 +134,7 @@ class Switch:
         self._agreed = False  # in the last frame that counts
         self._doubted = 0  # number of the last release in a frame that does not
 
-    def on_frame(self, raw: dict[str, Any], accepted: bool) -> None:
+    def on_frame(self, raw: Raw, accepted: bool) -> None:
         """A released switch needs no trust, however short; only a frame that counts ends it."""
         signal, on = self.agrees
         agrees = raw[signal] == on
@@ -180,13 +172,7 @@ class SwitchInput(Input):
         super().__init__(bound)
         self.switches = {name: Switch(self, *one) for name, one in switches.items()}
 
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """Each of them looks at it."""
         for switch in self.switches.values():
             switch.on_frame(raw, accepted)
@@ -238,13 +224,7 @@ class EmergencyStopInput(Input):
         self.presses = 0
         self._pressed = False
 
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """A stop needs no trust, however short it is pressed; only a frame that counts frees it."""
         if raw[self._signal] != 0:
             self.presses += 1

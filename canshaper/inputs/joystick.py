@@ -1,9 +1,9 @@
 """What is known of one joystick now: its last good frame, and what an axis may use of it."""
 
-from typing import Any, Protocol, Self
+from typing import Protocol, Self
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.input import GOOD, Input, Switch
+from canshaper.inputs.input import GOOD, Input, Raw, Switch
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.states import CommandInput, Reason
 
@@ -29,11 +29,14 @@ class JoystickInput(Input):
     Attributes:
         pressed: the switch to press, where it is none of its own.
         presses: how often its button for the next profile was pressed.
+        commands: its velocities in the last frame that counted, or why there is none, by signal.
     """
 
     def __init__(self, joystick: BoundJoystick) -> None:
         super().__init__(joystick)
         config = joystick.config
+        self._velocities = joystick.velocities
+        self.commands: dict[str, float | Reason] = {}
         self._enable = joystick.enable
         self.pressed: Switch | None = None
         self._switches: dict[str, Switch] = {}  # others in its message, by signal
@@ -65,13 +68,7 @@ class JoystickInput(Input):
         """Whether enable is released, by the last frame that says so or says otherwise."""
         return self._released if self.pressed is None else self.pressed.released
 
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """Note since when each joystick is where it is; codes that are no measurement are a fault.
 
         A released enable needs no trust, however short it is; only a frame that counts ends it.
@@ -91,10 +88,12 @@ class JoystickInput(Input):
         if self._next is not None:
             self._press(raw[self._next], arrived_ns)
         valid = enable in (0, 1)
-        last = self.commands
-        for name, command in commands.items():
-            if command != last.get(name):
+        commands = self.commands
+        for velocity in self._velocities:
+            name, command = velocity.name, velocity.read(raw)
+            if command != commands.get(name):
                 self._changed_ns[name] = arrived_ns
+            commands[name] = command
             if type(command) is Reason:
                 valid = False
         return GOOD if valid else FrameFault.INVALID_SIGNAL

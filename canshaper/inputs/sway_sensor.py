@@ -1,13 +1,12 @@
 """Measurements of sway: one message, and what each axis reads of it."""
 
 import math
-from typing import Any, Protocol
+from typing import Protocol
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.input import GOOD, Input
+from canshaper.inputs.input import GOOD, Input, Raw
 from canshaper.inputs.value import MeasuredSignal, measurable
 from canshaper.machine.sway_sensor import BoundSwaySensor, SensorMessage
-from canshaper.shaping.states import Reason
 
 GOOD_MERIT = 0
 """Figure of merit of SSI: within the specification of the sensor. 1 is degraded, 2 an error."""
@@ -31,13 +30,7 @@ class SwaySensorInput(Input):
         self.number = 0
         self.values: dict[str, float | None] = {}
 
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """What is no value is a fault, and no measurement."""
         values = {one.name: self._value(one, raw) for one in self._signals}
         if accepted:
@@ -45,7 +38,7 @@ class SwaySensorInput(Input):
             self.values = values
         return FrameFault.INVALID_SIGNAL if None in values.values() else GOOD
 
-    def _value(self, signal: MeasuredSignal, raw: dict[str, Any]) -> float | None:
+    def _value(self, signal: MeasuredSignal, raw: Raw) -> float | None:
         """What a signal measures; nothing where its figure of merit is another than good."""
         merit = self._merits.get(signal.name)
         return None if merit and raw[merit] != GOOD_MERIT else signal.value(raw)

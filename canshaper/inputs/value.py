@@ -1,16 +1,13 @@
 """One number out of a message, while it is fresh: a radius, a weight, a choice, a flow."""
 
 import sys
-from collections.abc import Mapping
-from typing import Any
 
 from cantools.database.can import Signal
 
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.signals import find_signal, special_codes
-from canshaper.inputs.input import GOOD, Input
+from canshaper.codec.signals import special_codes
+from canshaper.inputs.input import GOOD, Input, Raw
 from canshaper.machine.inputs import BoundInput
-from canshaper.shaping.states import Reason
 
 LARGEST = sys.float_info.max
 
@@ -34,7 +31,7 @@ class MeasuredSignal:
         self._special = special_codes(signal)
         self._low, self._high = low, high
 
-    def value(self, raw: Mapping[str, Any]) -> float | None:
+    def value(self, raw: Raw) -> float | None:
         """Its value by the raw values of a message, in the DBC's unit; None where it is none."""
         code = raw[self.name]
         value: float = code * self._scale + self._offset
@@ -46,7 +43,7 @@ class ValueInput(Input):
 
     Args:
         bound: its message.
-        name: the signal.
+        signal: the signal.
         low: smallest value that is one; by default every number.
         high: largest.
 
@@ -56,22 +53,14 @@ class ValueInput(Input):
     """
 
     def __init__(
-        self, bound: BoundInput, name: str, low: float = -LARGEST, high: float = LARGEST
+        self, bound: BoundInput, signal: Signal, low: float = -LARGEST, high: float = LARGEST
     ) -> None:
         super().__init__(bound)
-        signal = find_signal(bound.message, name)
-        assert signal is not None  # checked with the deployment
         self._signal = MeasuredSignal(signal, low, high)
         self.value = 0.0
         self.measured_ns: int | None = None
 
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """What is no value is a fault."""
         value = self._signal.value(raw)
         if value is None:

@@ -23,7 +23,9 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     slewing = {motion.slew for motion in lookup.config.motion.values()}
     order = sorted(lookup.config.axes.items(), key=lambda item: item[0] not in slewing)
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
-    sensors = bind_sway_sensors(lookup)
+    tick_s = lookup.config.tick_ms / 1000.0
+    periods = {n: tick_s * axis.period_ticks for n, axis in axes.items() if axis}
+    sensors = bind_sway_sensors(lookup, periods)
     return {n: replace(axis, sway_sensor=sensors.get(n)) for n, axis in axes.items() if axis}
 
 
@@ -60,7 +62,7 @@ def _bind_axis(
     return BoundAxis(
         name,
         axis,
-        codec.message.sender.fields.message,
+        codec.message.fields.message,
         codec,
         ticks,
         *status,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from canshaper.checksums.kinds import package_line
-from canshaper.codec.signals import find_signal, special_name
+from canshaper.codec.signals import special_name
 from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config
 from canshaper.config.schedule import Profile
@@ -19,7 +19,7 @@ from canshaper.machine.enable import bind_switches, check_conditions
 from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.following import check_following
 from canshaper.machine.identity import Identity, filter_lines
-from canshaper.machine.inputs import BoundSwitch, bind_emergency_stop, bind_switch
+from canshaper.machine.inputs import BoundValue, Choosing, bind_emergency_stop, bind_switch
 from canshaper.machine.joysticks import bind_joystick
 from canshaper.machine.lookup import Lookup, load_messages, protected_sections
 from canshaper.machine.motion import bind_motions
@@ -88,7 +88,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     )
 
 
-def _bind_profile(lookup: Lookup) -> BoundSwitch | None:
+def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
     """The switch that says which profile is in force, where there is one."""
     config = lookup.config.profile
     profile = bind_switch(lookup, ("profile",), config) if config else None
@@ -126,11 +126,11 @@ def _values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
     }
 
 
-def _check_values(lookup: Lookup, switch: BoundSwitch, values: Mapping[Place, float]) -> None:
+def _check_values(
+    lookup: Lookup, switch: BoundValue[Choosing], values: Mapping[Place, float]
+) -> None:
     """A value that the DBC names as an error is never used, so it can choose nothing."""
-    signal = find_signal(switch.message, switch.config.signal)
-    if signal is None:  # noted with the switch
-        return
+    signal = switch.signal
     for place, value in values.items():
         if name := special_name(signal, value):
             text = f"expected a value of {signal.name} that the DBC names no error"

@@ -7,8 +7,8 @@ from cantools.database.can import Message
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import ValveCodec
-from canshaper.config.schema import AxisConfig
-from canshaper.machine.inputs import BoundFeedback, BoundStatusWord
+from canshaper.config.schema import AxisConfig, Feedback, StatusWord
+from canshaper.machine.inputs import Bound, BoundValue
 from canshaper.machine.sway_sensor import BoundSwaySensor
 
 
@@ -23,8 +23,8 @@ class BoundAxis:
     period_ticks: int
     status: StatusCodec[ReportedAxis] | None
     status_ticks: int
-    feedback: BoundFeedback | None = None
-    status_word: BoundStatusWord | None = None
+    feedback: BoundValue[Feedback] | None = None
+    status_word: Bound[StatusWord] | None = None
     sway_sensor: BoundSwaySensor | None = None
 
     @property

@@ -4,7 +4,7 @@ from itertools import takewhile
 
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.rewrite import RewrittenMessage
-from canshaper.codec.valve import ValveMessage
+from canshaper.codec.sent import SentMessage
 from canshaper.config.bus import LAST_SPN, Bus, J1939Name
 from canshaper.config.gateway import Gateway
 from canshaper.config.schema import DeploymentConfig
@@ -87,7 +87,7 @@ def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
         owners.setdefault(config.id, f"nodes.{node}")
 
 
-def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[ValveMessage]) -> None:
+def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[SentMessage]) -> None:
     """The gateway against the buses, the messages and the valves that it forwards to.
 
     Args:
@@ -111,7 +111,7 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[ValveMessage]) 
             add(("gateway", "blocked", i), result)
     if gateway.fallback == "stop":
         return
-    rewritten = [m.sender for m in valves if isinstance(m, RewrittenMessage)]
+    rewritten = [one for one in valves if isinstance(one, RewrittenMessage)]
     if not rewritten:
         text = "expected stop where no valve has the message of a joystick on the other bus"
         add(("gateway", "fallback"), f"{text}, got {gateway.fallback}")

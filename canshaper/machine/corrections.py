@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import Chosen
-from canshaper.codec.layout import frame_length
+from canshaper.codec.layout import Chosen, frame_length
 from canshaper.codec.signals import STEP_ROUNDING, raw_limits
 from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig, Scaling

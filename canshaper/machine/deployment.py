@@ -7,17 +7,18 @@ from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.layout import is_j1939
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.status import StatusCodec
-from canshaper.config.schema import DeploymentConfig
+from canshaper.config.input import Input
+from canshaper.config.schema import DeploymentConfig, EmergencyStop
 from canshaper.config.source import Source
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.bus_load import BusLoad, bus_load
 from canshaper.machine.database import Messages
 from canshaper.machine.enable import BoundSwitches
 from canshaper.machine.identity import Identity
-from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop, BoundSwitch
+from canshaper.machine.inputs import Bound, BoundJoystick, BoundValue, Choosing
 from canshaper.machine.motion import BoundMotion
 from canshaper.machine.routing import Key, Routing, build_routing
 
@@ -32,13 +33,13 @@ class Deployment:
     joysticks: dict[str, BoundJoystick]
     axes: dict[str, BoundAxis]
     motions: dict[str, BoundMotion]
-    emergency_stop: BoundStop | None
+    emergency_stop: Bound[EmergencyStop] | None
     status: StatusCodec[dict[str, int]] | None
     status_ticks: int
     identity: Identity
     identity_status: StatusCodec[int] | None
-    load_state: BoundSwitch | None
-    profile: BoundSwitch | None
+    load_state: BoundValue[Choosing] | None
+    profile: BoundValue[Choosing] | None
     switches: list[BoundSwitches]
     on_bus: dict[str, list[Message]]
     fd: frozenset[Key]
@@ -63,14 +64,14 @@ class Deployment:
             self.config,
             inputs=self.inputs(),
             axes=self.axes.values(),
-            statuses=[status.sender.key for status in self._statuses()],
+            statuses=[status.message.key for status in self._statuses()],
             known=self.messages.ids(),
             j1939=used,
             fd=self.fd,
             listen_only=self.listen_only,
         )
 
-    def inputs(self) -> list[BoundInput]:
+    def inputs(self) -> list[Bound[Input]]:
         """Joysticks, switches, radii, sway sensors, feedback and status words of the valves."""
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
@@ -81,16 +82,16 @@ class Deployment:
         return [*self.joysticks.values(), *self.switches, *(i for i in others if i)]
 
     @property
-    def stopping_inputs(self) -> list[BoundInput]:
+    def stopping_inputs(self) -> list[Bound[Input]]:
         """Those without which nothing may move: joysticks, their switches, emergency stop."""
         stop = [self.emergency_stop] if self.emergency_stop else []
         return [*self.joysticks.values(), *self.switches, *stop]
 
-    def senders(self) -> list[Sender]:
+    def sent(self) -> list[SentMessage]:
         """Every message of the DBC files that we send, each once."""
-        valves = [axis.valve.message.sender for axis in self.axes.values()]
-        statuses = [status.sender for status in self._statuses()]
-        return list({sender.key: sender for sender in (*valves, *statuses)}.values())
+        valves = [axis.valve.message for axis in self.axes.values()]
+        statuses = [status.message for status in self._statuses()]
+        return list({one.key: one for one in (*valves, *statuses)}.values())
 
     def listening(self) -> "Deployment":
         """The same machine for one who only listens, and reports what it would do.
@@ -99,7 +100,7 @@ class Deployment:
         not compared with ours. A node of ours on J1939 stays where a status message needs its
         address, which it gives up to the node that has it.
         """
-        reporting = {s.sender.key[0] for s in self._statuses()}
+        reporting = {s.message.key[0] for s in self._statuses()}
         buses = {
             name: bus if name in reporting else bus.model_copy(update={"j1939": None})
             for name, bus in self.config.buses.items()

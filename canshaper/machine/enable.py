@@ -1,14 +1,14 @@
 """What enables a joystick: switches in its own message, in those of others, in their own."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from canshaper.codec.signals import find_signal, raw_limits
 from canshaper.config.enable import conditions, named_by
 from canshaper.config.input import Input
 from canshaper.config.source import Place
 from canshaper.config.switch import Switch
-from canshaper.machine.inputs import BoundInput, bind_input, check_source
+from canshaper.machine.inputs import Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 
 # What of a section is about its message: the same for every switch in it.
@@ -16,14 +16,14 @@ _OF_MESSAGE = tuple(Input.model_fields)
 
 
 @dataclass(frozen=True)
-class BoundSwitches(BoundInput):
+class BoundSwitches(Bound[Switch]):
     """A message with switches.
 
     Attributes:
         switches: signal and raw value that agrees, by name of the switch.
     """
 
-    switches: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    switches: Mapping[str, tuple[str, int]]
 
 
 def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
@@ -75,7 +75,7 @@ def _bind(lookup: Lookup, switches: dict[str, Switch]) -> BoundSwitches | None:
         text = f"switches.{first}, which reads the message too"
         place = ("switches", other)
         lookup.diagnostics.check_same(place, switches[other], _OF_MESSAGE, config, text)
-    result = bind_input(lookup, BoundSwitches, ("switches", first), config, ("signal",))
+    result = bind_input(lookup, ("switches", first), config, ("signal",))
     if result is None:
         return None
     used, bound = result
@@ -88,7 +88,7 @@ def _bind(lookup: Lookup, switches: dict[str, Switch]) -> BoundSwitches | None:
             text = f"expected up to {largest}, of {signal.length} bits of {signal.name}"
             lookup.diagnostics.add(("switches", name, "code"), f"{text}, got {one.code}")
     names = {name: (one.signal, one.code) for name, one in switches.items()}
-    return BoundSwitches(bound.config, bound.message, bound.codec, bound.protection, names)
+    return BoundSwitches(**vars(bound), switches=names)
 
 
 def _place(names: list[str] | None, joystick: str, i: int) -> Place:

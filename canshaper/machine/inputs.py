@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
-from cantools.database.can import Message
+from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import JoystickCodec
+from canshaper.codec.flags import Velocity
 from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
-from canshaper.codec.layout import is_j1939
+from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.protection import Protection, SequenceChecker
 from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.enable import Condition
@@ -20,19 +20,34 @@ from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
 from canshaper.machine.used_message import UsedMessage
+from canshaper.shaping.states import Reason
 
 # Two frames may be lost in a row; more is no longer the noise of a bus.
 USUAL_MAX_STEP = 3
 
 
-@dataclass(frozen=True)
-class BoundInput:
-    """A message that is received; ``key`` is (bus, id, extended)."""
+Choosing = LoadState | ProfileSwitch
+"""Sections of the load state, and of the operator's choice."""
+Section_co = TypeVar("Section_co", bound=Input, covariant=True)
 
-    config: Input
+
+@dataclass(frozen=True)
+class Bound(Generic[Section_co]):
+    """A message that is received; ``key`` is (bus, id, extended).
+
+    Attributes:
+        config: its section in the deployment file.
+        message: its definition.
+        layout: where its signals lie.
+        protection: of its frames.
+        chosen: which frames are meant, where the message is multiplexed.
+    """
+
+    config: Section_co
     message: Message
-    codec: JoystickCodec
+    layout: Layout
     protection: Protection
+    chosen: Chosen | None
 
     @property
     def key(self) -> tuple[str, int, bool]:
@@ -67,13 +82,23 @@ class BoundInput:
         return SequenceChecker(self.protection, step, config.qualify)
 
 
-@dataclass(frozen=True)
-class BoundJoystick(BoundInput):
-    """A joystick with its message."""
+BoundInput = Bound[Input]
+"""Whatever its section is."""
 
-    config: Joystick
+
+@dataclass(frozen=True)
+class BoundJoystick(Bound[Joystick]):
+    """A joystick with its message.
+
+    Attributes:
+        name: of the joystick.
+        velocities: what its axes take from it.
+        conditions: what enables it; the first one is to be pressed.
+    """
+
     name: str
-    conditions: tuple[Condition, ...] = ()
+    velocities: tuple[Velocity, ...]
+    conditions: tuple[Condition, ...]
 
     @property
     def enable(self) -> str | None:
@@ -81,60 +106,44 @@ class BoundJoystick(BoundInput):
         pressed = self.conditions[0]
         return pressed.name if pressed.joystick == self.name else None
 
+    def decode(self, data: bytes) -> tuple[dict[str, Any], dict[str, float | Reason]]:
+        """Raw values of a frame, and the command or fault of each velocity, for a listener.
 
-@dataclass(frozen=True)
-class BoundStop(BoundInput):
-    """The emergency stop with its message."""
+        There is no command in frames that are not meant. See ``JoystickInput`` for the controller.
 
-    config: EmergencyStop
-
-
-@dataclass(frozen=True)
-class BoundRadius(BoundInput):
-    """A measured radius with its message."""
-
-    config: Radius
-
-
-@dataclass(frozen=True)
-class BoundFeedback(BoundInput):
-    """Feedback of a valve with its message."""
-
-    config: Feedback
+        Raises:
+            ValueError: the frame has another length.
+        """
+        if len(data) != self.message.length:
+            raise ValueError(f"expected {self.message.length} bytes, got {len(data)}")
+        raw, chosen = self.layout.decode(data), self.chosen
+        meant = chosen is None or raw[chosen.signal] == chosen.value
+        return raw, {one.name: one.read(raw) for one in self.velocities if meant}
 
 
 @dataclass(frozen=True)
-class BoundStatusWord(BoundInput):
-    """Status word of a valve with its message."""
+class BoundValue(Bound[Section_co]):
+    """A message of which one signal is read: a radius, a weight, a choice, a flow."""
 
-    config: StatusWord
-
-
-@dataclass(frozen=True)
-class BoundSwitch(BoundInput):
-    """The load state, or the operator's choice, with its message."""
-
-    config: LoadState | ProfileSwitch
+    signal: Signal
 
 
-Bound = TypeVar("Bound", bound=BoundInput)
+AnySection = TypeVar("AnySection", bound=Input)
 
 
 def bind_input(
     lookup: Lookup,
-    kind: type[Bound],
     place: Place,
-    config: Input,
+    config: AnySection,
     switches: tuple[str, ...] = (),
     *,
     enable: Iterable[tuple[Place, str]] = (),
     value: str | None = None,
-) -> tuple[UsedMessage, Bound] | None:
+) -> tuple[UsedMessage, Bound[AnySection]] | None:
     """A message that is received: its switches, its cycle and its protection.
 
     Args:
         lookup: what it is bound with.
-        kind: what it becomes.
         place: of its section in the deployment file.
         config: that section.
         switches: keys of the section that name switches.
@@ -160,34 +169,33 @@ def bind_input(
     if protection.counts and (config.alive_max_step or 0) > most:
         text = f"expected up to {most} with a counter of {protection.counts} values"
         used.add("alive_max_step", f"{text}, got {config.alive_max_step}")
-    codec = JoystickCodec(used.message, [], used.chosen)
-    return used, kind(config, used.message, codec, protection)
+    return used, Bound(config, used.message, Layout(used.message), protection, used.chosen)
 
 
-def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> BoundStop | None:
+def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[EmergencyStop] | None:
     """The emergency stop."""
-    if (result := bind_input(lookup, BoundStop, ("emergency_stop",), config, ("signal",))) is None:
+    if (result := bind_input(lookup, ("emergency_stop",), config, ("signal",))) is None:
         return None
     used, bound = result
     check_source(used, "the emergency stop")
     return bound
 
 
-def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundRadius | None:
+def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radius] | None:
     """The measured radius of the tip."""
-    result = bind_input(lookup, BoundRadius, place, config, value=config.signal)
+    result = bind_input(lookup, place, config, value=config.signal)
     if result is None:
         return None
     used, bound = result
     if signal := used.find((*place, "signal"), config.signal):
         used.add_fault(radius_range(signal))
     check_source(used, "the radius")
-    return bound
+    return BoundValue(**vars(bound), signal=signal) if signal else None
 
 
-def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> BoundStatusWord | None:
+def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[StatusWord] | None:
     """The status word of a valve."""
-    if (result := bind_input(lookup, BoundStatusWord, place, config, ("signal",))) is None:
+    if (result := bind_input(lookup, place, config, ("signal",))) is None:
         return None
     used, bound = result
     if signal := find_signal(used.message, config.signal):
@@ -195,28 +203,30 @@ def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> BoundS
     return bound
 
 
-def bind_switch(
-    lookup: Lookup, place: Place, config: LoadState | ProfileSwitch
-) -> BoundSwitch | None:
+def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Choosing] | None:
     """The load state, or the operator's choice."""
-    if (result := bind_input(lookup, BoundSwitch, place, config, value=config.signal)) is None:
+    if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
-    if signal and isinstance(config, ProfileSwitch):
+    if signal is None:
+        return None
+    if isinstance(config, ProfileSwitch):
         used.check_integer((*place, "signal"), signal)
-    return bound
+    return BoundValue(**vars(bound), signal=signal)
 
 
-def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundFeedback | None:
+def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundValue[Feedback] | None:
     """What a valve reports of itself."""
-    if (result := bind_input(lookup, BoundFeedback, place, config, value=config.signal)) is None:
+    if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
-    if signal and config.full is None and not signal.maximum:
+    if signal is None:
+        return None
+    if config.full is None and not signal.maximum:
         used.add_fault(f"{signal.name}: expected a range in the DBC, or full, got neither")
-    return bound
+    return BoundValue(**vars(bound), signal=signal)
 
 
 def check_source(used: UsedMessage, what: str) -> None:

@@ -1,13 +1,12 @@
 """Joysticks of a deployment, bound to the DBC: the velocities that the axes take from them."""
 
-from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.signals import VelocitySignal, magnitude_range, symmetrical_range
 from canshaper.config.enable import conditions
 from canshaper.config.schema import Command, Joystick, Scaling
 from canshaper.config.source import Place
 from canshaper.machine.enable import signals_of
-from canshaper.machine.inputs import BoundInput, BoundJoystick, bind_input
+from canshaper.machine.inputs import BoundJoystick, bind_input
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
 
@@ -17,7 +16,7 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
     place: Place = ("joysticks", name)
     switches = ("reset", "anti_sway_off", "next_profile")
     enable = signals_of(lookup, name)
-    result = bind_input(lookup, BoundInput, place, config, switches, enable=enable)
+    result = bind_input(lookup, place, config, switches, enable=enable)
     if result is None:
         return None
     used, bound = result
@@ -29,9 +28,11 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
         (_bind_rocker if command.negative else _bind_velocity)(used, axis, command, moves)
         for axis, command in of_axes.items()
     ]
-    codec = JoystickCodec(used.message, [v for v in velocities if v], used.chosen)
     return BoundJoystick(
-        config, used.message, codec, bound.protection, name, conditions(lookup.config, name)
+        **vars(bound),
+        name=name,
+        velocities=tuple(v for v in velocities if v),
+        conditions=conditions(lookup.config, name),
     )
 
 

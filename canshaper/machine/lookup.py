@@ -5,7 +5,6 @@ from pathlib import Path
 
 from cantools.database.can import Message
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.identifier import (
     NULL,
     WITHOUT_PRIORITY,
@@ -16,6 +15,7 @@ from canshaper.codec.identifier import (
 )
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, is_fd, is_j1939
 from canshaper.codec.protection import Protection
+from canshaper.codec.sent import SentMessage
 from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import sections
@@ -100,9 +100,9 @@ class Lookup:
         config = self.config.buses.get(bus)
         return config.j1939.address if config and config.j1939 else None
 
-    def sender(self, bus: str, message: Message, protection: Protection) -> Sender:
+    def sent(self, bus: str, message: Message, protection: Protection) -> SentMessage:
         """A message that we send, under our address where it has one."""
-        return Sender(bus, message, self.own_address(bus), protection)
+        return SentMessage(bus, message, self.own_address(bus), protection)
 
     def fd(self) -> frozenset[tuple[str, int, bool]]:
         """Bus, id and format of the messages of CAN FD that are used."""

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from canshaper.config.motion import Motion
+from canshaper.config.motion import Motion, Radius
 from canshaper.config.source import Place
-from canshaper.machine.inputs import BoundRadius, bind_radius
+from canshaper.machine.inputs import BoundValue, bind_radius
 from canshaper.machine.lookup import Lookup
 
 
@@ -13,7 +13,7 @@ class BoundMotion:
     """A motion with the message of its radius, where that is measured."""
 
     config: Motion
-    radius: BoundRadius | None = None
+    radius: BoundValue[Radius] | None = None
 
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:

@@ -160,7 +160,7 @@ def build_routing(
     axes = list(axes)
     valves: dict[Key, tuple[str, ...]] = {}
     for axis in axes:
-        key = axis.valve.message.sender.key
+        key = axis.valve.message.key
         valves[key] = (*valves.get(key, ()), axis.name)
     routes = dict.fromkeys(statuses, Route(Role.SENT))
     if not listen_only:
@@ -228,7 +228,7 @@ def _group_routes(
     for axis in axes:
         # Not those of joysticks whose frames we forward: others send the same group.
         if is_j1939(axis.valve_message) and not axis.rewrites:
-            bus, can_id, _ = axis.valve.message.sender.key
+            bus, can_id, _ = axis.valve.message.key
             at = (bus, group_of(can_id))
             commanded[at] = (*commanded.get(at, ()), axis.name)
     received = grouped_inputs(inputs)

@@ -22,5 +22,5 @@ def bind_status(
         used.add_fault(fault)
     used.uses.update(dict.fromkeys((one.name for one in fields), "a signal of the status"))
     protection = bind_protection(used, status)
-    sender = lookup.sender(status.bus, used.message, protection)
-    return StatusCodec(sender, fields), lookup.period(used)
+    message = lookup.sent(status.bus, used.message, protection)
+    return StatusCodec(message, fields), lookup.period(used)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
@@ -10,9 +10,10 @@ from canshaper.config.input import Input
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
 from canshaper.config.sway_sensor import SwaySensor
-from canshaper.machine.inputs import BoundInput, bind_input, check_source
+from canshaper.machine.inputs import Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
+from canshaper.shaping.free_swing import SensorGains, sensor_gains
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
@@ -39,7 +40,7 @@ _OF_MESSAGE = (*Input.model_fields, "node")
 
 
 @dataclass(frozen=True)
-class SensorMessage(BoundInput):
+class SensorMessage(Bound[SwaySensor]):
     """A message with measurements of sway.
 
     Attributes:
@@ -47,8 +48,8 @@ class SensorMessage(BoundInput):
         merits: names of their figures of merit, by their own; of those that have one.
     """
 
-    signals: tuple[Signal, ...] = ()
-    merits: Mapping[str, str] = field(default_factory=dict)
+    signals: tuple[Signal, ...]
+    merits: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,9 @@ class BoundSwaySensor:
         signal: its signal.
         factor: rad or rad/s per unit of the signal, with the sign of the sway model.
         cycle_s: time between two frames.
+        timing: when it measures.
+        limits: what it may show.
+        gains: of its observer, computed here because no loop may wait for them.
     """
 
     config: SwaySensor
@@ -68,55 +72,64 @@ class BoundSwaySensor:
     signal: Signal
     factor: float
     cycle_s: float
+    timing: SensorTiming
+    limits: SensorLimits
+    gains: SensorGains
 
     @property
     def name(self) -> str:
         """MESSAGE.SIGNAL."""
         return f"{self.message.message.name}.{self.signal.name}"
 
-    @property
-    def limits(self) -> SensorLimits:
-        """What it may show."""
-        config = self.config
-        noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
-        second_s = config.second_period_s
-        second = SwayMode.from_period(second_s, SECOND_DAMPING) if second_s else None
-        return SensorLimits(noise, offset, config.length_range_pct / 100.0, second)
 
-    def timing(self, period_s: float) -> SensorTiming:
-        """For an axis whose command is sent every so many seconds."""
-        config = self.config
-        return SensorTiming(
-            config.measured,
-            period_s=max(self.cycle_s, period_s),
-            delay_s=config.delay_ms / 1000.0,
-            lag_s=config.valve_lag_ms / 1000.0,
-            lost_s=config.timeout_ms / 1000.0,
-        )
+def sensor_limits(config: SwaySensor) -> SensorLimits:
+    """What a sensor may show."""
+    noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
+    second_s = config.second_period_s
+    second = SwayMode.from_period(second_s, SECOND_DAMPING) if second_s else None
+    return SensorLimits(noise, offset, config.length_range_pct / 100.0, second)
 
 
-def bind_sway_sensors(lookup: Lookup) -> dict[str, BoundSwaySensor]:
-    """Every sway sensor without a problem, by the name of its axis."""
+def sensor_timing(config: SwaySensor, cycle_s: float, period_s: float) -> SensorTiming:
+    """When a sensor measures, on an axis whose command is sent every so many seconds."""
+    return SensorTiming(
+        config.measured,
+        period_s=max(cycle_s, period_s),
+        delay_s=config.delay_ms / 1000.0,
+        lag_s=config.valve_lag_ms / 1000.0,
+        lost_s=config.timeout_ms / 1000.0,
+    )
+
+
+def bind_sway_sensors(lookup: Lookup, periods: Mapping[str, float]) -> dict[str, BoundSwaySensor]:
+    """Every sway sensor of an axis without a problem, by the name of the axis.
+
+    Args:
+        lookup: what it is bound with.
+        periods: seconds between two commands of an axis, of those without a problem.
+    """
     readers: dict[tuple[str, str], dict[str, SwaySensor]] = {}
     for name, axis in lookup.config.axes.items():
         if sensor := axis.sway_sensor:
             readers.setdefault((sensor.bus, sensor.message), {})[name] = sensor
     bound: dict[str, BoundSwaySensor] = {}
     for sensors in readers.values():
-        bound |= _bind_message(lookup, sensors)
+        bound |= _bind_message(lookup, sensors, periods)
     return bound
 
 
-def _bind_message(lookup: Lookup, sensors: dict[str, SwaySensor]) -> dict[str, BoundSwaySensor]:
+def _bind_message(
+    lookup: Lookup, sensors: dict[str, SwaySensor], periods: Mapping[str, float]
+) -> dict[str, BoundSwaySensor]:
     """The axes that read one message."""
     first, *others = sensors
     config = sensors[first]
     for other in others:
         text = f"axes.{first}.sway_sensor, which reads the message too"
         lookup.diagnostics.check_same(_place(other), sensors[other], _OF_MESSAGE, config, text)
-    if (result := bind_input(lookup, SensorMessage, _place(first), config)) is None:
+    if (result := bind_input(lookup, _place(first), config)) is None:
         return {}
-    used, message = result
+    used, bound = result
     check_source(used, "a sway sensor")
     lookup.check_node(_place(first), config.bus, config.node)
     factors = {name: _factor(used, name, one) for name, one in sensors.items()}
@@ -124,13 +137,19 @@ def _bind_message(lookup: Lookup, sensors: dict[str, SwaySensor]) -> dict[str, B
         _check(lookup, used, name, one)
     merits = {s.signal: merit for name, s in sensors.items() if (merit := _merit(used, name, s))}
     signals = tuple(signal for signal, _ in filter(None, factors.values()))
-    message = replace(message, signals=signals, merits=merits)
+    message = SensorMessage(**vars(bound), signals=signals, merits=merits)
     cycle_s = (used.message.cycle_time or 0) / 1000.0
-    return {
-        name: BoundSwaySensor(sensors[name], message, *signal_factor, cycle_s)
-        for name, signal_factor in factors.items()
-        if signal_factor
-    }
+    complete = {}
+    for name, signal_factor in factors.items():
+        period_s, sway = periods.get(name), lookup.config.axes[name].sway
+        if signal_factor and period_s and sway:
+            limits = sensor_limits(sensors[name])
+            timing = sensor_timing(sensors[name], cycle_s, period_s)
+            gains = sensor_gains(sway.mode(), period_s, timing, limits)
+            complete[name] = BoundSwaySensor(
+                sensors[name], message, *signal_factor, cycle_s, timing, limits, gains
+            )
+    return complete
 
 
 def _place(axis: str) -> Place:

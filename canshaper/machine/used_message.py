@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.canopen import STATE_BITS
-from canshaper.codec.codecs import Chosen
+from canshaper.codec.layout import Chosen
 from canshaper.codec.signals import find_signal
 from canshaper.config.similar import there_are
 from canshaper.config.source import Place

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import (
     command_fault,
     find_signal,
@@ -16,7 +16,7 @@ from canshaper.codec.signals import (
     set_point_fault,
     symmetrical_range,
 )
-from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec, ValveMessage
+from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
 from canshaper.config.schema import Command, DeploymentConfig, DirectionCodes, Valve
 from canshaper.config.source import Place
@@ -40,7 +40,7 @@ class SharedValve:
     used: UsedMessage
     ticks: int
     config: Valve
-    codec: ValveMessage
+    codec: SentMessage
 
 
 SharedValves = dict[tuple[str, str], SharedValve]
@@ -169,14 +169,14 @@ def _bind_message(
     if joystick is not None:
         codec = _rewritten_message(lookup.config, used, valve, joystick, protection)
     else:
-        codec = ValveMessage(lookup.sender(valve.bus, used.message, protection))
+        codec = lookup.sent(valve.bus, used.message, protection)
     shared_valves[key] = SharedValve(used, ticks, valve, codec)
     return shared_valves[key]
 
 
 def _rewritten_message(
     config: DeploymentConfig, used: UsedMessage, valve: Valve, joystick: str, protection: Protection
-) -> ValveMessage:
+) -> SentMessage:
     """The message of a joystick as it leaves, with the switch that enables it."""
     if (enable := own_switch(config, joystick)) is None:
         text = "expected one switch of its own message, where its frames leave through the gateway"
@@ -191,10 +191,10 @@ def _rewritten_message(
             ours |= {axis.valve.signal, *axis.valve.also}
             ours |= {command.negative} if command.negative else set()
             ours |= {*command.flags.model_dump().values()} if command.flags else set()
-    sender = Sender(valve.bus, used.message, used.can_id & 0xFF, protection)
+    at = valve.bus, used.message, used.can_id & 0xFF, protection
     if enable is None or find_signal(used.message, enable) is None:  # noted with the joystick
-        return ValveMessage(sender)
-    return RewrittenMessage(sender, enable, frozenset(ours))
+        return SentMessage(*at)
+    return RewrittenMessage(*at, enable=enable, ours=frozenset(ours))
 
 
 def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -> Signal | None:

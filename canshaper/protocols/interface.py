@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Protocol
 
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.sent import Sender
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import MessageInput
@@ -34,6 +35,10 @@ class DrivenAxis(Protocol):
         """The axis with its codecs."""
 
     @property
+    def valve(self) -> Sender:
+        """Sends the message of its valve."""
+
+    @property
     def axis(self) -> Axis:
         """Its state machine."""
 
@@ -44,6 +49,9 @@ class DrivenAxis(Protocol):
     @property
     def tripping(self) -> bool:
         """Whether the next tick trips it."""
+
+    def put(self, steps: int) -> None:
+        """Put a command into the message of its valve."""
 
     def invalidate(self) -> None:
         """Its input was lost, though it may be back by the next tick."""

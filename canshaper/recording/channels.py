@@ -65,7 +65,7 @@ class Sorter:
         self._raw = {n: b.interface == "socketcan" for n, b in deployment.config.buses.items()}
         # It carries the digest of the program that ran, which need not be this one.
         identity = deployment.identity_status
-        self._kinds = {identity.sender.key: Kind.IGNORED} if identity else {}
+        self._kinds = {identity.message.key: Kind.IGNORED} if identity else {}
 
     def kind(self, key: Key) -> Kind:
         """What a frame is, by bus, id and whether that is extended."""

@@ -60,12 +60,12 @@ class History:
         self.last_fault = ""
         self.counted_ns: int | None = None
         self.changes: list[HistoryEvent] = []
-        self._axes = {a.status.sender.key: n for n, a in deployment.axes.items() if a.status}
+        self._axes = {a.status.message.key: n for n, a in deployment.axes.items() if a.status}
         self._codecs: dict[Key, StatusCodec[Any]] = {
-            axis.status.sender.key: axis.status for axis in deployment.axes.values() if axis.status
+            axis.status.message.key: axis.status for axis in deployment.axes.values() if axis.status
         }
         if deployment.status:
-            self._codecs[deployment.status.sender.key] = deployment.status
+            self._codecs[deployment.status.message.key] = deployment.status
 
     def receive(self, frame: ReceivedFrame) -> None:
         """A data frame was received; one that is no status is passed over."""

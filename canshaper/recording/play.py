@@ -43,7 +43,7 @@ class Player:
 
     Args:
         box: the black box.
-        deployment: that of the daemon; nothing was sent with it yet.
+        deployment: that of the daemon.
 
     Raises:
         StateError: a controller of this deployment cannot be played.
@@ -51,6 +51,9 @@ class Player:
 
     def __init__(self, box: Box, deployment: Deployment) -> None:
         self._box = box
+        program = box.header["identity"][1]
+        same = program == deployment.identity.lines()[1]
+        self._other = "" if same else f"; it was recorded by {program}: play it with that version"
         if box.header.get("listen_only"):
             deployment = deployment.listening()
         controller = Controller(deployment)
@@ -75,8 +78,11 @@ class Player:
                     tick.now_ns += since_1970_ns
                     tick.received = [(at + since_1970_ns, frame) for at, frame in tick.received]
                     yield tick, result
-            except (ValueError, LookupError) as error:
-                raise BoxError(f"{box.path}: segment {index + 1}: {error}") from None
+            except Exception as error:  # what the state of another program lacks shows anywhere
+                if not (self._other or isinstance(error, ValueError | LookupError)):
+                    raise
+                text = f"{box.path}: segment {index + 1}: {error}{self._other}"
+                raise BoxError(text) from None
             progress((index + 1) / len(box.segments))
 
 

@@ -97,7 +97,7 @@ class Replay:
     """One deployment through one log.
 
     Args:
-        deployment: the machine; nothing was sent with it yet.
+        deployment: the machine.
         drive: the log.
 
     Attributes:

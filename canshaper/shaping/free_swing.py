@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 from canshaper.shaping.kalman import kalman_gains
 from canshaper.shaping.sway import SwayMode, swing_over
@@ -27,6 +29,23 @@ FIRST_S = 4.0
 # driven too, hardly gets into it.
 QUICKNESS_OF_TWO, SECOND_QUICKNESS = 0.4, 5.0
 FIRST_SECOND_DEG, FIRST_SECOND_DEG_S = 2.0, 20.0
+
+Gains = tuple[tuple[float, ...], ...]
+"""For one measurement after the other; the last ones are those of the steady state."""
+
+
+class SensorGains(NamedTuple):
+    """Gains of one sensor on one axis; their computation takes longer than a tick.
+
+    Attributes:
+        period_s: time between two measurements, a whole number of ticks.
+        one: of angle, rate and offset.
+        two: of angle and rate of a second mode besides; () without one.
+    """
+
+    period_s: float
+    one: Gains
+    two: Gains
 
 
 class FreeSwing:
@@ -128,7 +147,7 @@ class TwoFreeSwings(FreeSwing):
 
 def observer_gains(
     mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
-) -> list[tuple[float, ...]]:
+) -> Gains:
     """Kalman gains of the first measurements, and at last those of the steady state.
 
     Of angle, rate and offset; of angle and rate of a second mode besides.
@@ -156,4 +175,21 @@ def observer_gains(
         first += [math.radians(FIRST_SECOND_DEG), math.radians(FIRST_SECOND_DEG_S)]
     variances = [sd * sd * ticks for sd in noise], [(sd / limits.noise) ** 2 for sd in first]
     gains = kalman_gains(step, shown, *variances)
-    return [*gains[: round(FIRST_S / tick_s)], gains[-1]]
+    return (*gains[: round(FIRST_S / tick_s)], gains[-1])
+
+
+def sensor_gains(
+    mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
+) -> SensorGains:
+    """Gains of a sensor on an axis.
+
+    Args:
+        mode: swing of the axis.
+        tick_s: period of the axis.
+        timing: of the sensor.
+        limits: what it may show.
+    """
+    period_s = max(1, round(timing.period_s / tick_s)) * tick_s
+    one = observer_gains(mode, period_s, timing, replace(limits, second=None))
+    two = observer_gains(mode, period_s, timing, limits) if limits.second else ()
+    return SensorGains(period_s, one, two)

@@ -12,7 +12,7 @@ def kalman_gains(
     shown: Sequence[float],
     noise: Sequence[float],
     first: Sequence[float],
-) -> list[tuple[float, ...]]:
+) -> tuple[tuple[float, ...], ...]:
     """Gains for one measurement after the other; the last ones are those of the steady state.
 
     Args:
@@ -38,4 +38,4 @@ def kalman_gains(
         ]
         if max(abs(new - old) for new, old in zip(gains[-1], gains[-2], strict=True)) < 1e-9:
             break
-    return gains[1:]
+    return tuple(gains[1:])

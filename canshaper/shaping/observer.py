@@ -12,9 +12,7 @@ which runs ahead of the grapple by the lag of the valve, it is predicted ahead b
 age of the measurement.
 """
 
-from dataclasses import replace
-
-from canshaper.shaping.free_swing import FreeSwing, TwoFreeSwings, observer_gains
+from canshaper.shaping.free_swing import FreeSwing, SensorGains, TwoFreeSwings
 from canshaper.shaping.late_model import LateModel
 from canshaper.shaping.sway import SwayModel, swing_over
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
@@ -30,6 +28,7 @@ class SwayObserver:
         sway: sway model of the axis.
         timing: of the sensor.
         limits: what it may show.
+        gains: for both of them, by ``sensor_gains``.
 
     Attributes:
         late: the late model.
@@ -54,23 +53,22 @@ class SwayObserver:
         "negated",
     )
 
-    def __init__(self, sway: SwayModel, timing: SensorTiming, limits: SensorLimits) -> None:
+    def __init__(
+        self, sway: SwayModel, timing: SensorTiming, limits: SensorLimits, gains: SensorGains
+    ) -> None:
         self._rates = timing.measured is Measured.RATE
         self._ahead_s = timing.lag_s + timing.delay_s
         self.late = LateModel(sway, timing)
         self._set_mode(sway)
-        period_s = max(1, round(timing.period_s / sway.tick_s)) * sway.tick_s
         measured, second = timing.measured, limits.second
-        gains = alone = observer_gains(sway.mode, period_s, timing, replace(limits, second=None))
-        self.free, self.negated = (FreeSwing(measured, gains) for _ in range(2))
+        self.free, self.negated = (FreeSwing(measured, gains.one) for _ in range(2))
         if second:
-            gains = observer_gains(sway.mode, period_s, timing, limits)
             by = swing_over(second, sway.tick_s)
-            self.free, self.negated = (TwoFreeSwings(measured, gains, by) for _ in range(2))
-        smooth = [(*one[:2], 0.0) for one in alone]
+            self.free, self.negated = (TwoFreeSwings(measured, gains.two, by) for _ in range(2))
+        smooth = [(*one[:2], 0.0) for one in gains.one]
         self.alone, self.dragged = (FreeSwing(measured, smooth) for _ in range(2))
         self._way = 0.0  # of the tip since the last measurement, normalised
-        self._bend = gains[-1][1] / period_s
+        self._bend = (gains.two or gains.one)[-1][1] / gains.period_s
         self._tick_s = sway.tick_s
 
     def _set_mode(self, sway: SwayModel) -> None:

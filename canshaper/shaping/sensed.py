@@ -1,6 +1,6 @@
 """A sway sensor at work on one axis: what it adds to the sway model, as far as it is trusted."""
 
-from canshaper.shaping.free_swing import FreeSwing
+from canshaper.shaping.free_swing import FreeSwing, SensorGains
 from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.sway import SwayModel
 from canshaper.shaping.sway_sensor import SensorLimits, SensorTiming
@@ -38,6 +38,7 @@ class SensedSway:
         sway: sway model of the axis; gets the free swing as far as it is trusted.
         timing: when the sensor measures what.
         limits: what it may show.
+        gains: of its observer.
         damps: the free swing is fed back; else it is only watched.
 
     Attributes:
@@ -47,7 +48,13 @@ class SensedSway:
     """
 
     def __init__(
-        self, sway: SwayModel, timing: SensorTiming, limits: SensorLimits, *, damps: bool
+        self,
+        sway: SwayModel,
+        timing: SensorTiming,
+        limits: SensorLimits,
+        gains: SensorGains,
+        *,
+        damps: bool,
     ) -> None:
         measured, tick_s = timing.measured, sway.tick_s
         self.state = Trust.NO_DATA
@@ -55,7 +62,7 @@ class SensedSway:
         self._sway, self._limits = sway, limits
         self._most = (SECOND_MODE_WEIGHT if limits.second else 1.0) if damps else 0.0
         self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
-        self._observer = SwayObserver(sway, timing, limits)
+        self._observer = SwayObserver(sway, timing, limits, gains)
         self._evidence = Evidence(measured, limits.noise, timing.period_s)
         self._standstill = Standstill(measured, limits.noise, timing.period_s, sway.mode.period_s)
         self._restlessness = Restlessness(tick_s)

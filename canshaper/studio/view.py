@@ -74,13 +74,13 @@ class CraneView:
     def _find_messages(self) -> None:
         deployment = self._deployment
         for name, axis in deployment.axes.items():
-            self._on(axis.valve.message.sender.key, self._valve, name, axis.valve_message.name)
+            self._on(axis.valve.message.key, self._valve, name, axis.valve_message.name)
             if axis.status and (status := axis.config.status):
                 what = (name, axis.status)
-                self._on(axis.status.sender.key, self._axis_status, what, status.message)
+                self._on(axis.status.message.key, self._axis_status, what, status.message)
         service = deployment.config.status
         if deployment.status and service:
-            key = deployment.status.sender.key
+            key = deployment.status.message.key
             self._on(key, self._service_status, deployment.status, service.message)
         for message_name, handler in (
             ("GrappleSway", self._sway),
@@ -203,7 +203,7 @@ class CraneView:
     # -- messages ------------------------------------------------------------------------------
 
     def _joystick(self, joystick: BoundJoystick, data: bytes, _now_s: float) -> None:
-        _, commands = joystick.codec.decode(data)
+        _, commands = joystick.decode(data)
         if commands:  # none in other frames of a multiplexed message
             self._joystick_at(joystick.name, commands)
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from canshaper.codec.canopen import START, NodeState, ValveState
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import HEARTBEAT, NMT
+from canshaper.codec.sent import SentMessage
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 
@@ -38,15 +38,15 @@ class _ValveStates:
     def __init__(self, axis: BoundAxis, node: _Node | None) -> None:
         assert axis.status_word
         assert axis.config.valve.cia408
-        self.key = axis.valve.message.sender.key
+        self.key = axis.valve.message.key
         self._node = node
         self._message: Any = axis.valve_message
         self._control = axis.config.valve.cia408.control
         config = axis.status_word.config
         self._signal = config.signal
-        self._sender = Sender(
+        self._sender = SentMessage(
             config.bus, axis.status_word.message, None, axis.status_word.protection
-        )
+        ).sender()
         self._cycle_s = (axis.status_word.message.cycle_time or 100) / 1000.0
         self._left_s = 0.0
         self._step = 0

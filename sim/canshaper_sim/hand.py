@@ -4,12 +4,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import full_scale
+from canshaper.config.schema import EmergencyStop
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.enable import BoundSwitches
-from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop
+from canshaper.machine.inputs import Bound, BoundInput, BoundJoystick
 
 # Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
 JOYSTICK_ADDRESS = 0x33
@@ -71,7 +72,8 @@ class _Message:
         self.cycle_ms = bound.message.cycle_time or 20
         # Of J1939 from the address that is asked for.
         source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
-        self._sender = Sender(bound.config.bus, bound.message, source, bound.protection)
+        sent = SentMessage(bound.config.bus, bound.message, source, bound.protection)
+        self._sender = sent.sender()
         self._held: Held | None = None
         self._values: dict[str, int] = {}
 
@@ -161,7 +163,7 @@ class _Switches(_Message):
 class _Stop(_Message):
     """The emergency stop, never pressed."""
 
-    def __init__(self, stop: BoundStop) -> None:
+    def __init__(self, stop: Bound[EmergencyStop]) -> None:
         super().__init__(stop)
         self._released = {stop.config.signal: 0}
 

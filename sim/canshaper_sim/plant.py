@@ -3,14 +3,15 @@
 import math
 from collections.abc import Iterator, Mapping
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, SequenceChecker
+from canshaper.codec.sent import Sender, SentMessage
 from canshaper.codec.signals import find_signal
 from canshaper.codec.valve import ValveCodec
+from canshaper.config.schema import Feedback
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import USUAL_MAX_STEP, BoundFeedback
+from canshaper.machine.inputs import USUAL_MAX_STEP, BoundValue
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
@@ -48,9 +49,9 @@ class _ValveInput:
     def __init__(self, axis: str, deployment: Deployment) -> None:
         bound = deployment.axes[axis]
         self.axis = axis
-        self._layout = bound.valve.message.sender.fields.layout
+        self._layout = bound.valve.message.fields.layout
         self._codec: ValveCodec = bound.valve
-        protection = bound.valve.message.sender.protection
+        protection = bound.valve.message.protection
         self._counter = protection.counter
         self._sequence = SequenceChecker(
             protection, min(USUAL_MAX_STEP, protection.counts // 2), qualify=1
@@ -86,14 +87,13 @@ class _ValveInput:
 class _ValveFeedback:
     """What a valve says of itself: how far it is open, each cycle of its message."""
 
-    def __init__(self, axis: str, bound: BoundFeedback) -> None:
+    def __init__(self, axis: str, bound: BoundValue[Feedback]) -> None:
         config = bound.config
         source = VALVE_ADDRESS if bound.any_source else bound.key[1] & 0xFF
         self._axis = axis
         self._signal = config.signal
-        signal = find_signal(bound.message, config.signal)
-        self._full = config.full or float((signal.maximum if signal else None) or 0.0)
-        self._sender = Sender(config.bus, bound.message, source, bound.protection)
+        self._full = config.full or float(bound.signal.maximum or 0.0)
+        self._sender = SentMessage(config.bus, bound.message, source, bound.protection).sender()
         self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
         self._left_s = self._cycle_s
 
@@ -148,7 +148,8 @@ class PlantNode:
                 problems.append(entry[0].problem(entry[1], f"lacks {', '.join(missing)}"))
             else:
                 protection = radii.get(message, UNPROTECTED)
-                self._senders[message] = Sender(bus, entry[1], protection=protection)
+                sent = SentMessage(bus, entry[1], protection=protection)
+                self._senders[message] = sent.sender()
         if problems:
             raise ConfigError(problems)
         if not listeners:
@@ -171,7 +172,7 @@ class PlantNode:
         self._inputs = {axis: _ValveInput(axis, deployment) for axis in deployment.axes}
         self._valves: dict[tuple[str, int, bool], list[_ValveInput]] = {}
         for valve in self._inputs.values():
-            key = deployment.axes[valve.axis].valve.message.sender.key
+            key = deployment.axes[valve.axis].valve.message.key
             self._valves.setdefault(key, []).append(valve)
 
     @property

@@ -57,7 +57,7 @@ class Recorder:
             self._handlers[joystick.key] = joystick.message.name, joystick.message.length, handler
         valves: dict[tuple[str, int, bool], dict[str, BoundAxis]] = {}
         for name, axis in deployment.axes.items():
-            valves.setdefault(axis.valve.message.sender.key, {})[name] = axis
+            valves.setdefault(axis.valve.message.key, {})[name] = axis
         for key, axes in valves.items():
             message = next(iter(axes.values())).valve_message
             self._handlers[key] = message.name, message.length, self._valve(axes)
@@ -110,7 +110,7 @@ class Recorder:
         def receive(data: bytes, time_s: float) -> None:
             if self._start_s is None:
                 self._start_s = time_s
-            _, commands = joystick.codec.decode(data)
+            _, commands = joystick.decode(data)
             for now, signal in commanded if commands else ():
                 command = commands[signal]
                 now[0] = 0.0 if isinstance(command, Reason) else command
@@ -122,7 +122,7 @@ class Recorder:
             (self._now[name], axis.valve, axis.config.limits.output_limits())
             for name, axis in axes.items()
         ]
-        layout = next(iter(axes.values())).valve.message.sender.fields.layout
+        layout = next(iter(axes.values())).valve.message.fields.layout
 
         def receive(data: bytes, _time_s: float) -> None:
             raw = layout.decode(data)

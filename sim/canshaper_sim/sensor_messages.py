@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator, Mapping
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
+from canshaper.codec.sent import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import BoundSwaySensor
 from canshaper_sim.axes import SLEW
@@ -29,9 +29,9 @@ class SensorMessage:
     ) -> None:
         first = next(iter(axes.values()))
         message, self.node = first.message, first.config.node
-        self._sender = Sender(
+        self._sender = SentMessage(
             message.config.bus, message.message, message.key[1] & 0xFF, message.protection
-        )
+        ).sender()
         self._merits = dict.fromkeys(message.merits.values(), 0)
         self._cycle_s = self._left_s = first.cycle_s
         self._lost_s = parameters.lost_s

@@ -3,6 +3,7 @@
 import json
 import logging
 import pickle
+import re
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -249,6 +250,32 @@ def test_a_byte_that_is_another_is_reported(box: Path, tmp_path: Path) -> None:
         result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
         assert result.exit_code in (0, 2), result.output
         assert result.exception is None or isinstance(result.exception, SystemExit)
+
+
+@pytest.mark.parametrize(
+    ("name", "lacking"),
+    [(b"canshaper.codec.sent", b"canshaper.codec.gone"), (b"_releases", b"_gone")],
+)
+def test_one_of_another_program_that_lacks_something_says_of_which(
+    box: Path, tmp_path: Path, name: bytes, lacking: bytes
+) -> None:
+    path = inside(box, tmp_path)
+    data = bytearray(path.read_bytes().replace(b"program=sha256:", b"program=sha256:0"))
+    at = data.index(b"\n", len(MAGIC)) + 1
+    _, _, state, size, _ = HEAD.unpack_from(data, at)
+    begin = at + HEAD.size
+    held = bytes(data[begin : begin + state])
+    assert name in held
+    data[begin : begin + state] = held.replace(name, lacking.ljust(len(name), b"_"))
+    checked(data, at, begin + state, size)
+    path.write_bytes(data)
+    result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
+    assert result.exit_code == 2, result.output
+    assert "Traceback" not in result.output
+    text = result.output.replace("\n", "")
+    assert re.search(
+        r"segment 1: .*; it was recorded by program=.*: play it with that version", text
+    )
 
 
 class Hostile:

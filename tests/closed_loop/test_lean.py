@@ -59,7 +59,7 @@ def test_no_status_is_sent_where_no_one_listens() -> None:
     simulation = Simulation(deployment, script, lambda frame, _time_s: sent.append(frame))
     for _ in simulation.ticks():
         pass
-    statuses = {axis.status.sender.key for axis in deployment.axes.values() if axis.status}
+    statuses = {axis.status.message.key for axis in deployment.axes.values() if axis.status}
     assert statuses
     assert statuses <= {frame[:3] for frame in sent}
     unreported = deployment.unreported.routing

@@ -9,13 +9,14 @@ from cantools.database.can import Message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.codecs import Chosen, JoystickCodec, Sender
 from canshaper.codec.frame import Frame
+from canshaper.codec.layout import Layout
 from canshaper.codec.protection import UNPROTECTED, Protection
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import VelocitySignal
-from canshaper.codec.valve import ValveCodec, ValveMessage
-from canshaper.errors import WrongLengthError
+from canshaper.codec.valve import ValveCodec
 from canshaper.shaping.states import Reason
+from tests.rigs.sent import command_frame
 
 # One message of every kind of signal: J1939's 10 bits with an offset, big-endian, float, falling.
 DBC = """VERSION ""
@@ -64,21 +65,21 @@ def velocity(message: str, name: str = "Joystick") -> VelocitySignal:
     return VelocitySignal.of(signal(custom.get_message_by_name(message), name))
 
 
-def joystick(message: str) -> JoystickCodec:
-    return JoystickCodec(custom.get_message_by_name(message), [velocity(message)])
+def read(message: str, data: bytes) -> tuple[dict[str, Any], float | Reason]:
+    raw = Layout(custom.get_message_by_name(message)).decode(data)
+    return raw, velocity(message).read(raw)
 
 
 def valve(message: str, counter: str | None = None) -> ValveCodec:
     definition = custom.get_message_by_name(message)
     count = signal(definition, counter) if counter else None
     protection = Protection(count.name, 1 << count.length) if count else UNPROTECTED
-    shared = ValveMessage(Sender("b", definition, protection=protection))
+    shared = SentMessage("b", definition, protection=protection)
     return ValveCodec(shared, signal(definition, "Velocity"))
 
 
 def sent(codec: ValveCodec, steps: int) -> Frame:
-    codec.put(steps)
-    return codec.message.frame()
+    return command_frame(codec, steps)
 
 
 def raw_joystick(joystick: int) -> bytes:
@@ -90,14 +91,6 @@ def raw_joystick(joystick: int) -> bytes:
 
 
 # -- joysticks ------------------------------------------------------------------------------------
-
-
-def test_of_a_multiplexed_message_only_frames_that_are_meant_move() -> None:
-    message = custom.get_message_by_name("Joystick")
-    codec = JoystickCodec(message, [velocity("Joystick")], Chosen("Enable", 1, alone=False))
-    data = raw_joystick(750)
-    assert codec.decode(data)[1] == {"Joystick": 0.5}
-    assert codec.decode(bytes((data[0], data[1] ^ 0b1100, *data[2:])))[1] == {}
 
 
 @pytest.mark.parametrize(
@@ -115,9 +108,9 @@ def test_of_a_multiplexed_message_only_frames_that_are_meant_move() -> None:
     ],
 )
 def test_codes_are_distinguished_from_commands(raw: int, command: float | Reason) -> None:
-    values, commands = joystick("Joystick").decode(raw_joystick(raw))
+    values, got = read("Joystick", raw_joystick(raw))
     assert values["Joystick"] == raw
-    assert commands == {"Joystick": pytest.approx(command)}
+    assert got == pytest.approx(command)
 
 
 @pytest.mark.parametrize(
@@ -197,8 +190,7 @@ def test_ordinary_words_are_no_errors(name: str) -> None:
     ],
 )
 def test_float_joysticks(value: float, command: float | Reason) -> None:
-    _, commands = joystick("FloatJoystick").decode(struct.pack("<fB", value, 1))
-    assert commands == {"Joystick": command}
+    assert read("FloatJoystick", struct.pack("<fB", value, 1))[1] == command
 
 
 @pytest.mark.parametrize(("raw", "command"), [(3, 1.0), (-3, -1.0)])
@@ -207,31 +199,23 @@ def test_full_deflection_is_full_in_spite_of_rounding(raw: int, command: float) 
     assert VelocitySignal("S", 0.1, 0.0, 0.3, {}).read({"S": raw}) == command
 
 
-@pytest.mark.parametrize("length", [0, 1, 7, 9, 64])
-def test_another_length_is_refused(length: int) -> None:
-    with pytest.raises(WrongLengthError):
-        joystick("Joystick").decode(bytes(length))
-
-
 @pytest.mark.parametrize("switch", [0, 1, 2, 3])
 def test_switches_come_raw(switch: int) -> None:
     data = bytearray(raw_joystick(500))
     data[1] = data[1] & 0b11 | switch << 2
-    values, _ = joystick("Joystick").decode(bytes(data))
+    values, _ = read("Joystick", bytes(data))
     assert values["Enable"] == switch
 
 
 @given(data=st.binary(min_size=8, max_size=8))
 def test_every_frame_decodes_to_a_command_or_a_fault(data: bytes) -> None:
     message = custom.get_message_by_name("Joystick")
-    names = ["Joystick", "Motorola", "Plain"]
-    codec = JoystickCodec(message, [velocity("Joystick", n) for n in names])
-    _, commands = codec.decode(data)
+    raw = Layout(message).decode(data)
     judge = message.decode(data, decode_choices=False)
     named = message.decode(data, decode_choices=True)
     assert isinstance(judge, dict) and isinstance(named, dict)
-    for name in names:
-        command, scaled = commands[name], judge[name]
+    for name in ("Joystick", "Motorola", "Plain"):
+        command, scaled = velocity("Joystick", name).read(raw), judge[name]
         assert isinstance(scaled, int | float)
         if isinstance(command, Reason):
             coded = not isinstance(named[name], int | float) and str(named[name]) != "Centre"
@@ -282,19 +266,20 @@ def test_steps_beyond_full_command_are_refused(message: str) -> None:
 
 
 def test_the_alive_counter_counts_every_frame_and_wraps() -> None:
-    codec = valve("Offset", "Counter")
-    counts = [sent(codec, 0).data[0] & 0xF for _ in range(34)]
+    sender = valve("Offset", "Counter").message.sender()
+    counts = [sender.frame().data[0] & 0xF for _ in range(34)]
     assert counts == [*range(1, 16), *range(16), 0, 1, 2]
 
 
 def test_a_frame_that_is_refused_is_not_counted() -> None:
     codec = valve("Offset", "Counter")
+    sender = codec.message.sender()
     with pytest.raises(ValueError, match=r"got 126$"):
-        sent(codec, 126)
-    assert sent(codec, 0).data[0] & 0xF == 1
+        codec.put(sender.raw, 126)
+    assert sender.frame().data[0] & 0xF == 1
 
 
 def test_start_values_beyond_the_bits_are_held_within() -> None:
     text = DBC.replace("SG_ 3 Unused 255", "SG_ 3 Unused 99999")
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Offset")
-    assert Sender("b", message).frame({}).data[2] == 255
+    assert SentMessage("b", message).sender().frame({}).data[2] == 255

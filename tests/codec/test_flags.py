@@ -7,8 +7,8 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.flags import FlaggedVelocity
+from canshaper.codec.layout import Layout
 from canshaper.codec.signals import VelocitySignal
 from canshaper.shaping.states import Reason
 
@@ -46,12 +46,11 @@ def read(flags: tuple[int, int, int], position: float, message: str = "BJM1") ->
     """Command of a frame that cantools has made."""
     definition = custom.get_message_by_name(message)
     joystick = VelocitySignal.of(definition.get_signal_by_name("XPosition"))
-    codec = JoystickCodec(definition, [FlaggedVelocity(joystick, "XNeutral", "XNeg", "XPos")])
+    velocity = FlaggedVelocity(joystick, "XNeutral", "XNeg", "XPos")
     raw = dict(zip(("XNeutral", "XNeg", "XPos"), flags, strict=True))
     data = definition.encode({**raw, "XPosition": position}, scaling=False, strict=False)
-    _, commands = codec.decode(data)
-    assert commands.keys() == {"XPosition"}
-    return commands["XPosition"]
+    assert velocity.name == "XPosition"
+    return velocity.read(Layout(definition).decode(data))
 
 
 @pytest.mark.parametrize(

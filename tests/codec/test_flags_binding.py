@@ -22,8 +22,8 @@ def flagged(machine: Machine, flags: str = FLAGS) -> int:
 
 def test_flags_bind(machine: Machine) -> None:
     flagged(machine)
-    codec = machine.load().joysticks["left"].codec
-    raw, commands = codec.decode(bytes.fromhex("c4 3e 00 00 01 00 00 00"))
+    joystick = machine.load().joysticks["left"]
+    raw, commands = joystick.decode(bytes.fromhex("c4 3e 00 00 01 00 00 00"))
     assert (raw["SlewNegative"], raw["Slew"]) == (1, 251)
     assert commands == {"Slew": pytest.approx(-0.251), "NearFar": 0.0}
 

@@ -23,6 +23,7 @@ from canshaper.config.bus import J1939Name
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.sent import command_frame
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config" / "j1939-forwarder.yaml"
@@ -279,12 +280,12 @@ def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:
     deployment = machine.load()
     protections = {
         "joystick": (deployment.joysticks["left"].protection, (int(BJM1) & 0x1FFFFF00) | 0x21),
-        "valve": (deployment.axes["slew"].valve.message.sender.protection, 0x0CFE3000 | OWN),
+        "valve": (deployment.axes["slew"].valve.message.protection, 0x0CFE3000 | OWN),
     }
     for protection, can_id in protections.values():
         assert isinstance(protection.check, Checksum)
         assert protection.check.can_id == can_id
-    frame = deployment.axes["slew"].valve.message.frame()
+    frame = command_frame(deployment.axes["slew"].valve)
     assert frame.can_id == protections["valve"][1]
     assert (
         frame.data[5] == sum(frame.can_id.to_bytes(4, "big") + frame.data[:5] + b"\xff\xff") % 256

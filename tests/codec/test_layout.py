@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.codec import layout
-from canshaper.codec.codecs import Sender
 from canshaper.codec.layout import Layout, frame_length, is_fd, layout_fault
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from tests.rigs.files import Machine
 
@@ -128,7 +128,8 @@ def test_what_is_not_set_keeps_its_start_value(message: Message, data: st.DataOb
         initial = int(signal.raw_initial or 0)
         start[signal.name] = initial if signal.is_float else min(max(initial, low), high)
     some = {name: value for name, value in raw.items() if name not in unset}
-    assert Sender("b", message).frame(some).data == judge_encode(message, {**start, **some})
+    sender = SentMessage("b", message).sender()
+    assert sender.frame(some).data == judge_encode(message, {**start, **some})
 
 
 @given(message=messages(), data=st.data())

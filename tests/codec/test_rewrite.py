@@ -7,9 +7,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.codecs import Sender
 from canshaper.codec.protection import UNPROTECTED, Protection
-from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.rewrite import RewritingSender, RewrittenMessage
 
 # Two velocities that are ours, one of Motorola; one of each kind that is not.
 DBC = """VERSION ""
@@ -68,8 +67,12 @@ REST = {
 }
 
 
-def made(protection: Protection = PROTECTED) -> RewrittenMessage:
-    return RewrittenMessage(Sender("b", STICK, protection=protection), "Enable", OURS)
+def bound(protection: Protection = PROTECTED) -> RewrittenMessage:
+    return RewrittenMessage("b", STICK, None, protection, enable="Enable", ours=OURS)
+
+
+def made(protection: Protection = PROTECTED) -> RewritingSender:
+    return bound(protection).sender()
 
 
 def decoded(data: bytes) -> dict[str, Any]:
@@ -104,7 +107,9 @@ def test_only_ours_are_changed(data: bytes, slew: int, lift: int) -> None:
 @given(FRAMES)
 def test_without_protection_count_and_check_are_its_own(data: bytes) -> None:
     assert others(made(UNPROTECTED).onto(data).data, *OURS) == others(data, *OURS)
-    lift = RewrittenMessage(Sender("b", STICK), "Enable", frozenset(("Lift",)))
+    lift = RewrittenMessage(
+        "b", STICK, None, UNPROTECTED, enable="Enable", ours=frozenset(("Lift",))
+    ).sender()
     assert others(lift.onto(data).data, "Lift") == others(data, "Lift")
     assert others(made(Protection("Count", 16)).onto(data).data, "Count", *OURS) == others(
         data, "Count", *OURS
@@ -113,9 +118,9 @@ def test_without_protection_count_and_check_are_its_own(data: bytes) -> None:
 
 def test_the_bits_of_ours() -> None:
     """Byte 0 is the lowest; 12 bits of Motorola from the highest of byte 1."""
-    message = made()
+    message = bound()
     assert message.ours_mask == 0xF0FFFF
-    message.raw["Slew"] = -1
+    message.start["Slew"] = -1
     # 1000 is 0x3E8, in bytes 1 and 2
     assert message.neutral_bits() == 0x803EFF
 
@@ -123,7 +128,8 @@ def test_the_bits_of_ours() -> None:
 def test_the_bits_of_ours_where_those_of_no_signal_are_1() -> None:
     (stick,) = cantools.database.load_string(DBC, "dbc").messages
     stick.protocol = "j1939"
-    assert RewrittenMessage(Sender("b", stick), "Enable", OURS).ours_mask == 0xF0FFFF
+    rewritten = RewrittenMessage("b", stick, None, UNPROTECTED, enable="Enable", ours=OURS)
+    assert rewritten.ours_mask == 0xF0FFFF
 
 
 @given(FRAMES)

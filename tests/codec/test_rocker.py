@@ -10,13 +10,14 @@ from cantools.database.conversion import BaseConversion
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.flags import RockerVelocity
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import VelocitySignal
-from canshaper.codec.valve import FlagsCodec, ValveCodec, ValveMessage
+from canshaper.codec.valve import FlagsCodec, ValveCodec
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
+from tests.rigs.sent import command_raw
 
 ROOT = Path(__file__).parents[2]
 network: Any = cantools.database.load_file(ROOT / "dbc" / "rotator.dbc")
@@ -72,15 +73,14 @@ def test_up_to_a_twentieth_of_both_is_noise_and_a_rounding_is_none() -> None:
 @given(st.integers(-250, 250))
 def test_what_is_put_is_read(steps: int) -> None:
     """As a valve, in a gateway: both signals hold what one command says."""
-    message = ValveMessage(Sender("b", ROCKER))
-    codec = ValveCodec(message, LEFT, negative=RIGHT)
-    codec.put(steps)
-    assert (message.raw["RotateLeft"], message.raw["RotateRight"]) == (
+    codec = ValveCodec(SentMessage("b", ROCKER), LEFT, negative=RIGHT)
+    raw = command_raw(codec, steps)
+    assert (raw["RotateLeft"], raw["RotateRight"]) == (
         max(steps, 0),
         max(-steps, 0),
     )
-    assert codec.read(message.raw) == steps
-    assert read(message.raw["RotateLeft"], message.raw["RotateRight"]) == pytest.approx(steps / 250)
+    assert codec.read(raw) == steps
+    assert read(raw["RotateLeft"], raw["RotateRight"]) == pytest.approx(steps / 250)
 
 
 @given(st.integers(-100, 100))
@@ -92,16 +92,16 @@ def test_the_same_with_an_offset(steps: int) -> None:
             Signal(name, 8 * at, 8, conversion=conversion, minimum=0.0, maximum=100.0)
             for at, name in enumerate(("RotateLeft", "RotateRight"))
         )
-        message = ValveMessage(Sender("b", Message(1, "M", 2, [positive, negative])))
+        message = SentMessage("b", Message(1, "M", 2, [positive, negative]))
         codec = ValveCodec(message, positive, negative=negative)
-        codec.put(steps)
+        raw = command_raw(codec, steps)
         expected = {"RotateLeft": max(steps, 0), "RotateRight": max(-steps, 0)}
-        assert message.sender.fields.message.decode(message.frame().data) == expected
-        assert codec.read(message.raw) == steps
+        assert message.fields.message.decode(message.sender().frame(raw).data) == expected
+        assert codec.read(raw) == steps
 
 
 def test_both_directions_at_once_are_no_command() -> None:
-    codec = ValveCodec(ValveMessage(Sender("b", ROCKER)), LEFT, negative=RIGHT)
+    codec = ValveCodec(SentMessage("b", ROCKER), LEFT, negative=RIGHT)
     assert codec.read({"RotateLeft": 5, "RotateRight": 5}) is None
 
 
@@ -112,13 +112,13 @@ def test_both_directions_at_once_are_no_command() -> None:
 def test_flags_of_a_direction(flags: tuple[int, int, int], steps: int | None) -> None:
     """Neutral, positive, negative, as a joystick of J1939 has them."""
     names = ("N", "P", "M")
-    codec = ValveCodec(ValveMessage(Sender("b", ROCKER)), LEFT, FlagsCodec(names))
+    codec = ValveCodec(SentMessage("b", ROCKER), LEFT, FlagsCodec(names))
     raw = {"RotateLeft": 0 if flags[0] else 40, **dict(zip(names, flags, strict=True))}
     assert codec.read(raw) == steps
     if steps is not None:
-        codec.put(steps)
-        assert tuple(codec.message.raw[n] for n in names) == flags
-        assert codec.message.raw["RotateLeft"] == abs(steps)
+        raw = command_raw(codec, steps)
+        assert tuple(raw[n] for n in names) == flags
+        assert raw["RotateLeft"] == abs(steps)
     assert codec.read({**raw, "RotateLeft": 40, "N": 1, "P": 0, "M": 0}) == 0
 
 

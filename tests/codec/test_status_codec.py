@@ -7,8 +7,8 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import FrameFault
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.status import (
     AXIS_STATUS,
     IDENTITY,
@@ -20,6 +20,7 @@ from canshaper.codec.status import (
 from canshaper.shaping.states import Reason, State
 from canshaper.shaping.trust import Trust
 from tests.rigs.reports import report
+from tests.rigs.sent import status_frame
 
 SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"
 shipped: Any = cantools.database.load_file(SHIPPED)
@@ -27,7 +28,7 @@ shipped: Any = cantools.database.load_file(SHIPPED)
 
 def axis_status(*values: Any) -> dict[str, Any]:
     message = shipped.get_message_by_name("SlewStatus")
-    frame = StatusCodec(Sender("b", message), AXIS_STATUS).frame(report(*values))
+    frame = status_frame(StatusCodec(SentMessage("b", message), AXIS_STATUS), report(*values))
     decoded = message.decode(frame.data, decode_choices=False)
     assert isinstance(decoded, dict)
     return decoded
@@ -54,9 +55,11 @@ def test_status_beyond_its_bits_stays_at_the_end(sway: float, shown: float) -> N
 
 def test_counters_stop_at_their_largest_value() -> None:
     message = shipped.get_message_by_name("ShaperStatus")
-    codec = StatusCodec(Sender("b", message), SERVICE_STATUS)
+    codec = StatusCodec(SentMessage("b", message), SERVICE_STATUS)
     names = [one.name for one in SERVICE_STATUS]
-    decoded = message.decode(codec.frame({**dict.fromkeys(names, 10**6), "LastFault": 7}).data)
+    decoded = message.decode(
+        status_frame(codec, {**dict.fromkeys(names, 10**6), "LastFault": 7}).data
+    )
     assert isinstance(decoded, dict)
     assert decoded.pop("MissedDeadlines") == 65535
     assert str(decoded.pop("LastFault")) == "BUS_ERROR"
@@ -64,9 +67,11 @@ def test_counters_stop_at_their_largest_value() -> None:
 
 
 def test_a_status_is_decoded_as_it_was_encoded() -> None:
-    codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
+    codec = StatusCodec(SentMessage("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
     values = codec.decode(
-        codec.frame(report(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, 0.25, 1.5, active_set=3)).data
+        status_frame(
+            codec, report(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, 0.25, 1.5, active_set=3)
+        ).data
     )
     assert values == {
         "State": State.ACTIVE,
@@ -85,8 +90,8 @@ def test_a_status_can_be_sent_to_another_process() -> None:
 
 
 def test_a_code_of_another_version_is_shown_by_its_number() -> None:
-    codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
-    values = codec.decode(codec.frame(report(State.READY, 254)).data)
+    codec = StatusCodec(SentMessage("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
+    values = codec.decode(status_frame(codec, report(State.READY, 254)).data)
     assert values is not None
     assert values["Reason"] == 254
     shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
@@ -101,8 +106,8 @@ def test_a_measurement_is_shown_as_a_number() -> None:
 def test_a_code_is_sent_as_it_is_whatever_the_scale_of_its_signal() -> None:
     """Old DBC files have their tables of raw values; a scale would move them."""
     message = text_message("SG_ Digest : 0|16@1+ (0.5,-10) [0|0]")
-    codec = StatusCodec(Sender("b", message), IDENTITY)
-    assert codec.frame(0x1234).data == b"\x34\x12"
+    codec = StatusCodec(SentMessage("b", message), IDENTITY)
+    assert status_frame(codec, 0x1234).data == b"\x34\x12"
     assert codec.decode(b"\x34\x12") == {"Digest": 0x1234}
 
 

@@ -7,11 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.codecs import Sender
 from canshaper.codec.protection import Protection
-from canshaper.codec.valve import DirectionCodec, ValveCodec, ValveMessage
+from canshaper.codec.sent import SentMessage
+from canshaper.codec.valve import DirectionCodec, ValveCodec
 from tests.codec.valve_machine import CODES, DBC, network, with_valves
 from tests.rigs.files import Machine
+from tests.rigs.sent import command_frame, command_raw
 
 STATE = DirectionCodec("State", (0, 1, 2))
 
@@ -19,15 +20,14 @@ STATE = DirectionCodec("State", (0, 1, 2))
 def avc(signal: str, *also: str) -> ValveCodec:
     message = network.get_message_by_name("AVC0")
     signals = {s.name: s for s in message.signals}
-    shared = ValveMessage(Sender("b", message))
+    shared = SentMessage("b", message)
     return ValveCodec(shared, signals[signal], STATE, [signals[name] for name in also])
 
 
 def test_the_example_of_a_maker() -> None:
     """60 % out of port B: 96 00 01 in the fields that matter, all unused bits 1."""
     codec = avc("PortFlow")
-    codec.put(150)
-    frame = codec.message.frame()
+    frame = command_frame(codec, 150)
     assert frame.data.hex() == "96ff31ffffffffff"
     assert (frame.can_id, frame.extended) == (0x0CFE30FE, True)
 
@@ -39,25 +39,22 @@ def test_the_example_of_a_maker() -> None:
 def test_both_resolutions_report_the_same(steps: int, data: str) -> None:
     codec = avc("ExtFlow", "PortFlow")
     assert codec.steps == 64_000
-    codec.put(steps)
-    assert codec.message.frame().data.hex() == data
+    assert command_frame(codec, steps).data.hex() == data
 
 
 def test_both_resolutions_of_a_signal_with_a_sign() -> None:
     message = network.get_message_by_name("Block")
     first, second = (message.get_signal_by_name(name) for name in ("First", "Second"))
-    codec = ValveCodec(ValveMessage(Sender("b", message)), first, also=[second])
-    codec.put(-25)
-    assert codec.message.frame().data[:2] == bytes((256 - 25, 256 - 25))
+    codec = ValveCodec(SentMessage("b", message), first, also=[second])
+    assert command_frame(codec, -25).data[:2] == bytes((256 - 25, 256 - 25))
 
 
 def test_the_same_in_a_signal_that_falls() -> None:
     message = network.get_message_by_name("Block")
     first, falling = (message.get_signal_by_name(name) for name in ("First", "Falling"))
-    codec = ValveCodec(ValveMessage(Sender("b", message)), first, also=[falling])
+    codec = ValveCodec(SentMessage("b", message), first, also=[falling])
     for steps in (-125, -1, 0, 25, 125):
-        codec.put(steps)
-        values: Any = message.decode(codec.message.frame().data)
+        values: Any = message.decode(command_frame(codec, steps).data)
         assert values["First"] == pytest.approx(0.8 * steps)
         assert values["Falling"] == pytest.approx(0.8 * steps, abs=0.5)
 
@@ -65,10 +62,8 @@ def test_the_same_in_a_signal_that_falls() -> None:
 @given(st.integers(-64_000, 64_000))
 def test_what_is_put_is_read_by_cantools(steps: int) -> None:
     codec = avc("ExtFlow", "PortFlow")
-    codec.put(steps)
-    raw: Any = network.decode_message(
-        "AVC0", codec.message.frame().data, decode_choices=False, scaling=False
-    )
+    data = command_frame(codec, steps).data
+    raw: Any = network.decode_message("AVC0", data, decode_choices=False, scaling=False)
     assert codec.read(raw) == steps
     flow = 250 * abs(steps) / 64_000
     assert abs(raw["PortFlow"] - flow) <= 0.5
@@ -76,14 +71,13 @@ def test_what_is_put_is_read_by_cantools(steps: int) -> None:
 
 
 def test_neutral_is_what_it_holds_before_anything_is_put() -> None:
-    assert avc("ExtFlow", "PortFlow").message.frame().data.hex() == "00ff300000ffffff"
+    assert avc("ExtFlow", "PortFlow").message.sender().frame().data.hex() == "00ff300000ffffff"
 
 
 def test_the_smallest_commands_have_a_direction() -> None:
     codec = avc("PortFlow")
     for steps, state in ((1, 1), (-1, 2), (0, 0)):
-        codec.put(steps)
-        assert codec.message.raw["State"] == state
+        assert command_raw(codec, steps)["State"] == state
 
 
 def test_in_neutral_no_flow_is_a_command() -> None:
@@ -93,7 +87,7 @@ def test_in_neutral_no_flow_is_a_command() -> None:
 def test_what_takes_the_place_of_a_frame_has_its_count() -> None:
     block = network.get_message_by_name("Block")
     for protection in (Protection("Count", 16), Protection("Count", 16, Checksum("xor", 6))):
-        message = ValveMessage(Sender("b", block, protection=protection))
+        message = SentMessage("b", block, protection=protection).sender()
         first = message.frame()
         message.raw["First"] = 5
         second = message.instead(first)
@@ -113,7 +107,7 @@ def test_beyond_full_flow_is_no_command() -> None:
     codec = avc("PortFlow")
     assert codec.read({"PortFlow": 251, "State": 1}) is None
     with pytest.raises(ValueError, match=r"expected up to \+-250 steps, got -251"):
-        codec.put(-251)
+        command_raw(codec, -251)
 
 
 # -- bound to a deployment -------------------------------------------------------------------------
@@ -123,7 +117,7 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
     valve = f"message: AVC0, signal: ExtFlow, also: [PortFlow], timeout_ms: 200, {CODES}"
     axis = with_valves(machine, ("Slew", valve)).load().axes["slew"]
     assert axis.valve.steps == 64_000
-    assert axis.valve.message.sender.key == ("crane", 0x0CFE309C, True)
+    assert axis.valve.message.key == ("crane", 0x0CFE309C, True)
 
 
 @pytest.mark.parametrize(
@@ -194,8 +188,7 @@ def test_the_largest_code_of_the_bits_is_a_direction(machine: Machine) -> None:
     codes = CODES.replace("negative: 2", "negative: 15")
     valve = f"message: AVC0, signal: PortFlow, timeout_ms: 200, {codes}"
     codec = with_valves(machine, ("Slew", valve)).load().axes["slew"].valve
-    codec.put(-10)
-    assert codec.message.raw["State"] == 15
+    assert command_raw(codec, -10)["State"] == 15
 
 
 def test_a_direction_with_a_sign_is_reported(machine: Machine) -> None:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.e2e import COUNTER, E2e
 from canshaper.codec.frame import Frame
+from canshaper.codec.sent import SentMessage
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.j1939.network import J1939Network
@@ -25,20 +25,20 @@ def last_of(frames: list[Frame]) -> Sent:
     return {frame[:3]: frame.data for frame in frames}
 
 
-def count_of(sender: Sender, data: bytes) -> int:
+def count_of(message: SentMessage, data: bytes) -> int:
     """Alive counter of a frame of a message that has one."""
-    protection = sender.protection
+    protection = message.protection
     if isinstance(protection.check, E2e):
         return data[1] & COUNTER
-    return int(sender.fields.layout.decode(data)[protection.counter or ""])
+    return int(message.fields.layout.decode(data)[protection.counter or ""])
 
 
 def counts(deployment: Deployment, sent: Sent) -> dict[tuple[str, int, bool], int]:
     """Alive counter of every message that has one."""
     return {
-        sender.key: count_of(sender, sent[sender.key])
-        for sender in deployment.senders()
-        if sender.protection.counts
+        message.key: count_of(message, sent[message.key])
+        for message in deployment.sent()
+        if message.protection.counts
     }
 
 

@@ -179,7 +179,7 @@ def test_an_emergency_stop_counts_every_press(remote: Inputs) -> None:
     stop = stop_of(remote)
     for presses in range(3):
         for pressed in (1, 0):
-            stop.on_frame({"Stop": pressed}, {}, 0, accepted=True)
+            stop.on_frame({"Stop": pressed}, 0, accepted=True)
         assert stop.stop(0, presses) is Reason.EMERGENCY_STOP
 
 

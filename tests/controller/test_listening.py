@@ -39,7 +39,7 @@ def test_no_node_of_canopen_is_started_or_received() -> None:
 
 def test_j1939_keeps_its_address_for_the_status_and_for_nothing_else(tmp_path: Path) -> None:
     machine = ROOT / "config" / "j1939-forwarder.yaml"
-    valves = {a.valve.message.sender.key[1] for a in load_deployment(machine).axes.values()}
+    valves = {a.valve.message.key[1] for a in load_deployment(machine).axes.values()}
     listening = load_deployment(machine).listening()
     reported = [s for s in (listening.status, *(a.status for a in listening.axes.values())) if s]
     assert reported

@@ -57,7 +57,7 @@ def test_the_status_says_which(rig: Rig) -> None:
     press(rig)
     status = rig.deployment.axes["slew"].status
     assert status is not None
-    sent = [f for frames in rig.run(10) for f in frames if f[:3] == status.sender.key]
+    sent = [f for frames in rig.run(10) for f in frames if f[:3] == status.message.key]
     values = status.decode(sent[-1].data)
     assert values is not None
     assert values["ActiveSet"] == QUICK

@@ -1,6 +1,7 @@
 """A sway sensor on frames: what the controller makes of it, says of it, and sends."""
 
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -83,7 +84,7 @@ def test_the_status_message_says_it() -> None:
     run = Run(deployment, PULSE, crane())
     status = deployment.axes["near_far"].status
     assert status is not None
-    key = status.sender.key
+    key = status.message.key
     values = [status.decode(frame.data) for frame in run.frames if frame[:3] == key]
     trusts = [value["SwaySensor"] for value in values if value]
     assert trusts[-1] is Trust.TRUSTED
@@ -103,7 +104,7 @@ def test_it_is_reported_and_shown_how_long_the_pendulum_seems() -> None:
     assert float(match[1]) == pytest.approx(1.56, rel=0.07)
     status = deployment.axes["near_far"].status
     assert status is not None
-    frames = [frame for frame in run.frames if frame[:3] == status.sender.key]
+    frames = [frame for frame in run.frames if frame[:3] == status.message.key]
     shown = [(status.decode(frame.data) or {})["SwingLength"] for frame in frames]
     assert shown[0] == 0.0
     assert shown[-1] == pytest.approx(1.56, rel=0.05)
@@ -254,3 +255,9 @@ def test_it_measures_while_its_node_works(said: tuple[Frame, ...], trust: Trust)
         controller.receive(frame, 0)
     assert list(controller.tick(0))
     assert [controller.axes[name].trust for name in ("slew", "near_far")] == [trust, trust]
+
+
+def test_no_loop_waits_for_the_gains_of_an_observer(monkeypatch: pytest.MonkeyPatch) -> None:
+    handed_over = pickle.loads(pickle.dumps(load_deployment(FILE)))
+    monkeypatch.delattr("canshaper.shaping.free_swing.kalman_gains")
+    assert Controller(handed_over).axes["near_far"].axis.sensed is not None

@@ -62,7 +62,7 @@ def running(file: Path) -> Iterator[tuple[subprocess.Popen[bytes], Callable[[str
 def ids_of(file: Path) -> dict[str, int]:
     """Ids of the valve frames by axis."""
     axes = load_deployment(file).axes.items()
-    return {name: axis.valve.message.sender.key[1] for name, axis in axes if axis.valve.message}
+    return {name: axis.valve.message.key[1] for name, axis in axes if axis.valve.message}
 
 
 def received(bus: can.BusABC, expected: set[int]) -> None:

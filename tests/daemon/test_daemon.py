@@ -98,10 +98,10 @@ def test_the_digest_that_does_not_go_out_is_counted(
     monkeypatch.setattr(module.Controller, "send_failed", lambda _, frame: failed.append(frame))
     send = FakePort.send
     monkeypatch.setattr(
-        FakePort, "send", lambda port, f: f[:3] != status.sender.key and send(port, f)
+        FakePort, "send", lambda port, f: f[:3] != status.message.key and send(port, f)
     )
     at(bench, {}, last=60)
-    assert [frame[:3] for frame in failed] == [status.sender.key] * 2
+    assert [frame[:3] for frame in failed] == [status.message.key] * 2
 
 
 def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
@@ -112,7 +112,7 @@ def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
     silent = property(lambda _: frozenset({"crane"}))
     monkeypatch.setattr(module.Controller, "silent_buses", silent)
     at(bench, {}, last=60)
-    assert not [frame for frame in bench.sent if frame[:3] == status.sender.key]
+    assert not [frame for frame in bench.sent if frame[:3] == status.message.key]
 
 
 class Left(Exception):

@@ -1,6 +1,7 @@
 """Ticks that follow a joystick: how soon they are there, how steady, and what moves them."""
 
 import random
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,8 +12,9 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.config.load import load_config
+from canshaper.controller.controller import Controller
 from canshaper.daemon.daemon import Daemon
-from canshaper.daemon.follow import AFTER_NS, CLUSTER_NS, TickFollower
+from canshaper.daemon.follow import AFTER_NS, CLUSTER_NS, TickFollower, tick_follower
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -51,6 +53,7 @@ class Joysticks:
         right_ns: int | None = None,
         begin_ns: int = 10**12 + 7 * MS,
         joystick_ns: int = PERIOD_NS,
+        lost: float = 0.0,
     ) -> tuple[list[int], list[int]]:
         """From the left frame to the tick that reads it, and from tick to tick."""
         noise = random.Random(3)
@@ -59,8 +62,9 @@ class Joysticks:
         waits, apart = [], []
         for _ in range(ticks):
             while (at := came + noise.randint(0, jitter_ns)) <= deadline:
-                waits.append(deadline - at)
-                self.left.received_ns = at
+                if noise.random() >= lost:
+                    waits.append(deadline - at)
+                    self.left.received_ns = at
                 if right_ns is not None:
                     self.right.received_ns = at + right_ns
                 came += joystick_ns
@@ -91,6 +95,25 @@ def test_within_a_second_a_frame_waits_no_longer_than_it_has_to(
 def test_a_joystick_with_another_clock_is_followed(joysticks: Joysticks, drift_ns: int) -> None:
     waits, _ = joysticks.waits(2000, joystick_ns=PERIOD_NS + drift_ns)
     assert all(abs(ns - AFTER_NS) <= 2 * abs(drift_ns) for ns in waits[100:])
+
+
+@pytest.mark.parametrize("part", [0.98, 1.02, 1.5])
+def test_a_joystick_with_another_cycle_is_not_followed(joysticks: Joysticks, part: float) -> None:
+    _, apart = joysticks.waits(300, joystick_ns=round(part * PERIOD_NS))
+    assert set(apart[120:]) == {PERIOD_NS}
+    assert not joysticks.follower.follows
+    assert joysticks.follower.news().startswith("tick=plain joystick=left cycle_ms=")
+    assert not joysticks.follower.news(), "once"
+    waits, _ = joysticks.waits(300)
+    assert joysticks.follower.news() == "tick=follows joystick=left cycle_ms=20.00 expected=20"
+    assert set(waits[200:]) == {AFTER_NS}
+
+
+@pytest.mark.parametrize("part", [0.995, 1.005])
+def test_lost_frames_do_not_look_like_another_cycle(joysticks: Joysticks, part: float) -> None:
+    waits, _ = joysticks.waits(600, joystick_ns=round(part * PERIOD_NS), lost=0.3)
+    assert joysticks.follower.follows and not joysticks.follower.news()
+    assert all(abs(ns - AFTER_NS) < 2 * MS for ns in waits[200:])
 
 
 def test_a_joystick_that_is_not_steady_is_read_in_its_tick(joysticks: Joysticks) -> None:
@@ -206,9 +229,49 @@ def test_a_black_box_of_such_ticks_is_played_the_same(
     assert "reason=LOOP_STALLED" in done.output
     status = load_deployment(bench.file).status
     assert status is not None
-    sent = [frame.data for frame in bench.sent if frame[:3] == status.sender.key]
+    sent = [frame.data for frame in bench.sent if frame[:3] == status.message.key]
     counted = status.decode(sent[-1]) or {}
     assert counted["MissedDeadlines"] == round((ticks[-1] - ticks[0]) / PERIOD_NS) - len(ticks) + 1
+
+
+@pytest.mark.parametrize("cycle_us", [20_000, 20_400])
+def test_the_daemon_says_that_it_does_not_follow(
+    bench: Bench, caplog: pytest.LogCaptureFixture, cycle_us: int
+) -> None:
+    caplog.set_level("WARNING", "canshaper")
+    at_ns, ticks = bench.now_ns + 5 * MS, list[int]()
+
+    def script(number: int) -> None:
+        nonlocal at_ns
+        ticks.append(bench.now_ns)
+        while at_ns <= bench.now_ns + PERIOD_NS:
+            bench.ports[0].waiting.append((at_ns, bench.rig.joystick("JoystickLeft")))
+            at_ns += cycle_us * 1000
+        if number == 150:
+            bench.stop()
+
+    bench.run(script)
+    apart = {second - first for first, second in pairwise(ticks[100:])}
+    said = [record.message for record in caplog.records if "tick=" in record.message]
+    assert apart == {PERIOD_NS}
+    off = ["tick=plain joystick=left cycle_ms=20.40 expected=20"]
+    assert said == ([] if cycle_us == 20_000 else off)
+
+
+def test_where_the_command_line_takes_another_interface_the_ticks_stay(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("WARNING", "canshaper")
+    deployment = deployment_of(tmp_path)
+    assert tick_follower(deployment, Controller(deployment)) is not None
+    buses = {
+        n: b.model_copy(update={"interface": "virtual"}) for n, b in deployment.config.buses.items()
+    }
+    config = deployment.config.model_copy(update={"buses": buses})
+    changed = replace(deployment, config=config)
+    assert tick_follower(changed, Controller(changed)) is None
+    (record,) = caplog.records
+    assert record.message.startswith("tick=plain expected a bus of socketcan")
 
 
 def test_a_reload_ends_it_and_begins_it(bench: Bench) -> None:
@@ -258,8 +321,11 @@ def test_a_cycle_may_be_several_ticks(tmp_path: Path, tick_ms: int) -> None:
     deployment_of(tmp_path, **{"tick_ms: 20": f"tick_ms: {tick_ms}"})
 
 
-def test_it_is_off_by_default() -> None:
+def test_it_is_off_by_default_and_in_the_file_that_is_recommended() -> None:
     assert load_config(ROOT / "config" / "forwarder.yaml")[0].tick is None
+    tick = load_config(ROOT / "config" / "forwarder-robust.yaml")[0].tick
+    assert tick is not None
+    assert tick.follow == "left"
 
 
 # -- one deadline ----------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ def test_the_digest_of_what_runs_is_sent_once_a_second_and_logged_at_every_chang
         bench.run(script)
     status = load_deployment(bench.file).identity_status
     assert status is not None
-    values = [status.decode(f.data) for f in bench.sent if f[:3] == status.sender.key]
+    values = [status.decode(f.data) for f in bench.sent if f[:3] == status.message.key]
     sent = [one["Digest"] for one in values if one]
     assert sent == [digests[0]] * 3 + [digests[1]] * 2
     assert digests[0] != digests[1]

@@ -33,6 +33,7 @@ class Bench:
         self.deployment = deployment
         self.guard, self.hand = OutputGuard(deployment), Hand(deployment)
         self.valve = deployment.axes[axis].valve
+        self.sender = self.valve.message.sender()
         self.tick_ms = deployment.config.tick_ms
         self.number = 0
 
@@ -58,9 +59,9 @@ class Bench:
             cut: so many bytes are missing at its end.
         """
         self.guard.begin(missed)
-        self.valve.put(steps)
-        frame = self.valve.message.frame()
-        self.valve.put(0)
+        self.valve.put(self.sender.raw, steps)
+        frame = self.sender.frame()
+        self.valve.put(self.sender.raw, 0)
         valve, data = self.guard.valves[frame[:3]], frame.data[: len(frame.data) - cut]
         why = valve.refusal(data, data[valve.span], self.now_ns, self.guard.at)
         self.number += 1

@@ -15,7 +15,7 @@ from tests.guard.bench import LATE_NS, TICK_NS, Bench, bench, limited, signs
 
 
 def axis(one: Bench) -> GuardedAxis:
-    valve = one.guard.valves[one.valve.message.sender.key]
+    valve = one.guard.valves[one.valve.message.key]
     assert isinstance(valve, GuardedAxis)
     return valve
 

@@ -11,6 +11,7 @@ from canshaper.guard.opening import openings
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.limits import without_deadband
 from tests.faults import shipped
+from tests.rigs.sent import command_raw
 
 
 @pytest.mark.parametrize("name", shipped.NAMES)
@@ -22,10 +23,10 @@ def test_joysticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
         bits = JoystickBits(joystick.message, config)
         for _ in range(300):
             data = rng.randbytes(joystick.message.length)
-            if chosen := joystick.codec.chosen:
-                raw = joystick.codec.decode(data)[0] | {chosen.signal: chosen.value}
+            if chosen := joystick.chosen:
+                raw = joystick.decode(data)[0] | {chosen.signal: chosen.value}
                 data = FieldSet(joystick.message).layout.encode(raw)
-            command = joystick.codec.decode(data)[1][config.signal]
+            command = joystick.decode(data)[1][config.signal]
             if isinstance(command, float) and abs(command) > config.neutral_pct / 100.0:
                 assert bits.command(data) == command
 
@@ -36,16 +37,14 @@ def test_commands_are_read_as_the_valve_codec_reads_them(name: str) -> None:
     for axis in deployment.axes.values():
         joystick = axis.config.command if axis.rewrites else None
         bits, codec = CommandBits(axis.valve_message, axis.config.valve, joystick), axis.valve
-        layout = codec.message.sender.fields.layout
+        layout = codec.message.fields.layout
         for steps in (0, 1, -1, codec.steps, -codec.steps, rng.randrange(codec.steps)):
-            codec.put(steps)
-            assert bits.steps(layout.encode(codec.message.raw)) == steps
+            assert bits.steps(layout.encode(command_raw(codec, steps))) == steps
         for _ in range(300):
             data = rng.randbytes(axis.valve_message.length)
             steps = bits.steps(data)
             if steps is not None and abs(steps) <= codec.steps:
                 assert steps == codec.read(layout.decode(data))
-        codec.put(0)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -28,9 +28,9 @@ class FullSpeed(Controller):
         passed = super().receive(frame, arrived_ns)
         if passed is None or passed.can_id != 272:
             return passed
-        raw = self.axes["slew"].bound.valve.message.raw
-        self.axes["slew"].bound.valve.put(self.axes["slew"].bound.valve.steps)
-        data = self.axes["slew"].bound.valve.message.sender.fields.layout.encode(raw)
+        runner = self.axes["slew"]
+        runner.put(runner.bound.valve.steps)
+        data = runner.valve.fields.layout.encode(runner.valve.raw)
         return passed._replace(data=data)
 
 
@@ -43,7 +43,7 @@ class Wrong:
         self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
         self.valve = deployment.axes["slew"].valve
         self.runner = self.controller.axes["slew"]
-        self.sound, self.runner._put = self.runner._put, lambda _steps: self.sound(99)
+        self.sound, self.runner._put = self.runner._put, lambda raw, _: self.sound(raw, 99)
         self.number = 0
 
     def tick(self) -> list[Frame]:
@@ -52,7 +52,7 @@ class Wrong:
         for frame in self.hand.frames(self.number * 20, Held(enable=True)):
             self.guarded.receive(frame, now_ns)
         self.number += 1
-        key = self.valve.message.sender.key
+        key = self.valve.message.key
         return [frame for frame in self.guarded.tick(now_ns) if frame[:3] == key]
 
 
@@ -77,7 +77,7 @@ def test_in_the_place_of_a_wrong_one_neutral_leaves() -> None:
     frames = [frame for _ in range(3) for frame in wrong.tick()]
     assert len(frames) == 3
     for frame in frames:
-        assert wrong.valve.read(wrong.valve.message.sender.fields.layout.decode(frame.data)) == 0
+        assert wrong.valve.read(wrong.valve.message.fields.layout.decode(frame.data)) == 0
     assert wrong.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
 
 
@@ -91,7 +91,7 @@ def test_what_a_gateway_passes_on_is_looked_at_too() -> None:
         for frame in hand.frames(number * 20, Held(enable=True)):
             left.append(guarded.receive(frame, number * TICK_NS))
         left += guarded.tick(number * TICK_NS)
-    raws = [valve.message.sender.fields.layout.decode(f.data) for f in left if f and f[1] == 272]
+    raws = [valve.message.fields.layout.decode(f.data) for f in left if f and f[1] == 272]
     assert raws
     assert {valve.read(raw) for raw in raws} == {0}
     (refusal,) = [e for e in controller.events if "output=refused" in e.text]
@@ -105,7 +105,7 @@ def test_the_last_frames_are_neutral(name: str) -> None:
     deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
     controller = Controller(deployment)
     guarded = Guarded(controller)
-    keys = {axis.valve.message.sender.key for axis in deployment.axes.values()}
+    keys = {axis.valve.message.key for axis in deployment.axes.values()}
     # J1939 has to have an address, and a gateway that rests sends nothing of its own.
     hand, tick_ms = Hand(deployment), deployment.config.tick_ms
     for number in range(1000 // tick_ms):
@@ -123,10 +123,9 @@ def test_the_last_frames_are_neutral(name: str) -> None:
     assert left == [frame[:3] for frame in controller.neutral_frames()]
     bound = next(iter(deployment.axes.values()))
     valve, put = bound.valve, bound.valve.put
-    valve.put = lambda _steps: put(99)  # type: ignore[method-assign]
+    valve.put = lambda raw, _steps: put(raw, 99)  # type: ignore[method-assign]
     missing = keys - {f[:3] for f in guarded.neutral_frames()}
-    put(0)
-    assert missing == {valve.message.sender.key}
+    assert missing == {valve.message.key}
 
 
 def test_what_the_loop_says_reaches_the_controller() -> None:

@@ -147,7 +147,7 @@ def test_faster_and_the_other_way_where_the_file_allows_it() -> None:
 
 def test_what_is_kept_of_commands_is_bounded() -> None:
     one = bench("canopen-forwarder", "slew")
-    valve = one.guard.valves[one.valve.message.sender.key]
+    valve = one.guard.valves[one.valve.message.key]
     axes, most = getattr(valve, "_axes", [valve]), 0
     for steps in range(1, MOST_KNOWN + 12):
         assert "limit=" in one.sent(steps)

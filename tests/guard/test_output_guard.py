@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
@@ -61,7 +61,9 @@ def drive(name: str) -> Drive:
     controller = Controller(deployment)
     joysticks, until = dict.fromkeys(deployment.axes, 0.0), dict.fromkeys(deployment.axes, BEGIN_S)
     stop = deployment.emergency_stop
-    presses = Sender(stop.config.bus, stop.message, None, stop.protection) if stop else None
+    presses = (
+        SentMessage(stop.config.bus, stop.message, None, stop.protection).sender() if stop else None
+    )
     feedback: list[Frame] = []
     tick_ms = deployment.config.tick_ms
     for number in range(round((BEGIN_S + MOVE_S + REST_S) * 1000) // tick_ms):
@@ -99,8 +101,6 @@ class Planted:
 
     def __init__(self, made: Drive, axis: str, at: int, frames: list[list[Frame]]) -> None:
         self.made, self.at, self.frames = made, at, frames
-        for bound in made.deployment.axes.values():  # its messages keep what was put last
-            bound.valve.put(0)
         self.controller = Controller(made.deployment)
         self.runner = self.controller.axes[axis]
         self.guarded = Guarded(self.controller)
@@ -109,12 +109,12 @@ class Planted:
     def run(self, wrong: Wrong) -> list[Frame]:
         """Plant it with the next command; frames of this valve that leave with it and behind it."""
         codec = self.runner.bound.valve
-        sound, key = self.runner._put, codec.message.sender.key
+        sound, key = self.runner._put, codec.message.key
 
-        def put(steps: int) -> None:
+        def put(raw: dict[str, Any], steps: int) -> None:
             self.runner._put = sound
-            sound(steps)
-            wrong(codec.message.raw, self.runner)
+            sound(raw, steps)
+            wrong(raw, self.runner)
 
         try:
             for number in range(self.at + 3):
@@ -135,7 +135,7 @@ class Planted:
     def caught(self, wrong: Wrong) -> bool:
         """Whether no frame has moved the axis, and it tripped for that."""
         codec = self.runner.bound.valve
-        layout = codec.message.sender.fields.layout
+        layout = codec.message.fields.layout
         for frame in self.run(wrong):
             assert codec.read(layout.decode(frame.data)) == 0
         assert self.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
@@ -149,7 +149,7 @@ class Planted:
 
 
 def _put(steps: int) -> Wrong:
-    return lambda _raw, runner: runner.bound.valve.put(steps)
+    return lambda raw, runner: runner.bound.valve.put(raw, steps)
 
 
 def _signal(runner: AxisRunner) -> Any:
@@ -169,7 +169,7 @@ def _beyond(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None
 
     def wrong(raw: dict[str, Any], runner: AxisRunner) -> None:
         signal = _signal(runner)
-        valve.put(valve.steps)
+        valve.put(raw, valve.steps)
         room = raw_limits(signal)[1] - raw[signal.name]
         if room > 0:
             raw[signal.name] += rng.randint(1, min(room, valve.steps))
@@ -217,7 +217,7 @@ def _flip(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
             ):
                 raw.update(flipped)
                 return
-        valve.put(valve.steps)  # all bits together
+        valve.put(raw, valve.steps)  # all bits together
 
     return wrong if abs(made.steps[at][axis]) < 0.3 * valve.steps else None
 

@@ -18,9 +18,9 @@ def test_a_frame_that_does_not_count_is_no_measurement() -> None:
     assert sensor is not None
     message = SwaySensorInput(sensor.message)
     signal = SwaySignal(message, sensor)
-    message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=False)
+    message.on_frame({"Across": 0, "Along": 100}, 0, accepted=False)
     assert signal.new_value() is None
-    message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)
+    message.on_frame({"Across": 0, "Along": 100}, 0, accepted=True)
     assert signal.new_value() == pytest.approx(math.radians(1.0))
     assert signal.new_value() is None
     assert SwaySignal(message, sensor).new_value() is None  # it came before
@@ -48,7 +48,7 @@ def test_only_a_good_figure_of_merit_measures(merit: int, counts: bool) -> None:
     across, along = SwaySignal(message, roll), SwaySignal(message, pitch)
     middle = 250 * (1 << 15)  # no angle
     raw = {"RollAngle": middle, "PitchAngle": middle, "RollMerit": merit, "PitchMerit": 0}
-    fault = message.on_frame(raw, {}, 0, accepted=True)
+    fault = message.on_frame(raw, 0, accepted=True)
     assert fault is (FrameFault.NONE if counts else FrameFault.INVALID_SIGNAL)
     assert (across.new_value() is not None) == counts
     assert along.new_value() == pytest.approx(0.0)
@@ -62,5 +62,5 @@ def test_more_than_a_turn_is_no_measurement(turns: float, counts: bool) -> None:
     assert sensor is not None
     message = SwaySensorInput(sensor.message)
     signal = SwaySignal(message, replace(sensor, factor=math.tau * turns))
-    message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)  # 1 in its unit
+    message.on_frame({"Across": 0, "Along": 100}, 0, accepted=True)  # 1 in its unit
     assert (signal.new_value() is not None) == counts

@@ -9,6 +9,7 @@ from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from tests.machine.gateway_files import problems as gateway_problems
 from tests.rigs.files import Machine
+from tests.rigs.sent import command_frame
 
 ROOT = Path(__file__).parents[2]
 FD = 'BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","J1939PG","StandardCAN_FD";\n'
@@ -39,12 +40,12 @@ def test_a_message_fills_the_next_longer_frame(machine: Machine, length: int) ->
     machine.in_dbc("SlewCommand: 2", f"SlewCommand: {length}")
     machine.in_dbc("JoystickLeft: 8", f"JoystickLeft: {length}")
     deployment = machine.load()
-    frame = deployment.axes["slew"].valve.message.frame()
+    frame = command_frame(deployment.axes["slew"].valve)
     least = min(n for n in FD_LENGTHS if n >= length)
     assert len(frame.data) == least
     assert frame.data[2:] == bytes(least - 2)
-    codec = deployment.joysticks["left"].codec
-    assert codec.decode(bytes(8) + b"\xcc" * (least - 8))[0]["Slew"] == 0
+    joystick = deployment.joysticks["left"]
+    assert joystick.decode(bytes(8) + b"\xcc" * (least - 8))[0]["Slew"] == 0
 
 
 @pytest.mark.parametrize(("length", "good"), [(12, True), (11, False)])

@@ -7,7 +7,7 @@ from cantools.database.can import Message, Signal
 from cantools.database.can.formats.dbc import DbcSpecifics
 from cantools.database.conversion import LinearConversion
 
-from canshaper.codec.codecs import Chosen
+from canshaper.codec.layout import Chosen
 from canshaper.config.protection import Checksum, Protected
 from canshaper.config.schema import DeploymentConfig, DirectionFlags, Scaling
 from canshaper.machine.corrections import Correction, chosen, corrected, scalings

@@ -8,6 +8,7 @@ from canshaper.controller.controller import Controller
 from canshaper.guard.bits import CommandBits, JoystickBits
 from canshaper.shaping.states import Reason
 from tests.rigs.files import Machine
+from tests.rigs.sent import command_frame
 
 SLEW = "Slew : 0|16@1- (0.1,0) [-100|100]"
 VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
@@ -23,7 +24,7 @@ def commands(machine: Machine, raws: Sequence[int]) -> list[float | Reason]:
     result = []
     for raw in raws:
         data = (raw & 0xFFFF).to_bytes(2, "little") + bytes(6)
-        command = joystick.codec.decode(data)[1]["Slew"]
+        command = joystick.decode(data)[1]["Slew"]
         asked = 0.0 if isinstance(command, Reason) or abs(command) <= 0.02 else command
         assert guard.command(data) == pytest.approx(asked, abs=1e-12)
         result.append(command)
@@ -101,8 +102,7 @@ def test_a_valve(machine: Machine, dbc: str, yaml: str, steps: int, raws: dict[i
     )
     assert guard.full == steps
     for step, raw in raws.items():
-        valve.put(step)
-        data = valve.message.frame().data
+        data = command_frame(valve, step).data
         assert data[0] == raw
         assert guard.steps(data) == step
 
@@ -138,7 +138,7 @@ def test_a_signal_means_the_same_to_every_axis(
 def test_axes_that_agree_share_a_signal(machine: Machine) -> None:
     machine.in_yaml(COMMAND, f"{COMMAND} invert: true,")
     machine.in_yaml("signal: NearFar,", "signal: Slew, invert: true,")
-    assert machine.load().joysticks["left"].codec.decode(b"\xf4\1" + bytes(6))[1] == {"Slew": -0.5}
+    assert machine.load().joysticks["left"].decode(b"\xf4\1" + bytes(6))[1] == {"Slew": -0.5}
 
 
 def test_neutral_of_a_valve_is_its_zero(machine: Machine) -> None:
@@ -192,8 +192,7 @@ def test_a_valve_command_in_a_multiplexed_message(machine: Machine) -> None:
     )
     machine.in_yaml("message: SlewCommand,", "message: SlewCommand, multiplexor: 7,")
     valve = machine.load().axes["slew"].valve
-    valve.put(100)
-    assert valve.message.frame().data == bytes((100, 1, 7))
+    assert command_frame(valve, 100).data == bytes((100, 1, 7))
 
 
 @pytest.mark.parametrize("key", ["multiplexor", "cycle_ms"])

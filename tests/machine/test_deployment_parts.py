@@ -42,10 +42,10 @@ def test_every_section_has_its_part(chosen: Machine) -> None:
     assert deployment.profile.key == ("crane", 1297, False)
     assert (deployment.listen_only, deployment.fd) == (False, frozenset())
     assert deployment.status is not None
-    assert deployment.status.sender.key == ("crane", 0x310, False)
+    assert deployment.status.message.key == ("crane", 0x310, False)
     assert deployment.status_ticks == 25
     assert deployment.identity_status is not None
-    assert deployment.identity_status.sender.key == ("crane", 0x311, False)
+    assert deployment.identity_status.message.key == ("crane", 0x311, False)
 
 
 def test_what_runs_is_told_by_the_bytes_of_the_files(machine: Machine) -> None:
@@ -241,7 +241,7 @@ def test_a_radius_is_an_input() -> None:
 
 def test_every_message_is_sent_once() -> None:
     sent = [0x200, 0x201, 0x202, 0x310, 0x311, 0x300, 0x301, 0x302]
-    assert [one.key for one in shipped("forwarder").senders()] == [
+    assert [one.key for one in shipped("forwarder").sent()] == [
         ("crane", can_id, False) for can_id in sent
     ]
 
@@ -285,6 +285,6 @@ def test_without_readers_no_status_is_sent_and_all_else_stays(machine: Machine) 
     assert (after.status, after.identity_status) == (None, None)
     assert [(a.status, a.status_ticks) for a in after.axes.values()] == [(None, 0)] * 3
     assert list(after.axes) == list(before.axes)
-    assert [one.key[1] for one in after.senders()] == [0x200, 0x201, 0x202]
+    assert [one.key[1] for one in after.sent()] == [0x200, 0x201, 0x202]
     assert before.unreported is after
     assert before.routing is before.routing

@@ -17,7 +17,7 @@ def test_every_message_has_its_protection(tmp_path: Path) -> None:
     assert isinstance(joystick.check, Profile1)
     slew, near_far = deployment.axes.values()
     assert slew.valve.message is near_far.valve.message
-    valves = slew.valve.message.sender.protection
+    valves = slew.valve.message.protection
     assert (valves.counts, type(valves.check)) == (16, Profile2)
     radius = deployment.motions["crane"].radius
     assert radius is not None
@@ -25,7 +25,7 @@ def test_every_message_has_its_protection(tmp_path: Path) -> None:
     assert deployment.emergency_stop is not None
     assert deployment.emergency_stop.protection.counts == 15
     assert deployment.status is not None
-    assert deployment.status.sender.protection == Protection(
+    assert deployment.status.message.protection == Protection(
         "Alive", 8, Checksum("crc8_sae_j1850", 6)
     )
 

@@ -169,10 +169,10 @@ def test_a_counter_and_checksum_on_a_shared_valve_message(tmp_path: Path) -> Non
     )
     axes = load(tmp_path, (old, new), (old, new)).axes
     message = axes["slew"].valve.message
-    assert message.sender.protection == Protection("Alive", 32, Checksum("sum", 5))
-    counts = []
+    assert message.protection == Protection("Alive", 32, Checksum("sum", 5))
+    counts, sender = [], message.sender()
     for _ in range(40):
-        data = message.frame().data
+        data = sender.frame().data
         counts.append(data[4] & 0x1F)
         assert data[5] == sum(data[:5]) & 0xFF
     assert counts == [(n + 1) % 32 for n in range(40)]

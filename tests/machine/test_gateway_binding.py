@@ -99,9 +99,10 @@ def test_both_signals_of_a_rocker_are_rewritten(tmp_path: Path) -> None:
     sent = valve.message
     assert isinstance(sent, RewrittenMessage)
     assert sent.ours == {"Slew", "NearFar", "Back"}
-    valve.put(-250)
-    assert (sent.raw["NearFar"], sent.raw["Back"]) == (0, 250)
-    assert sent.onto(b"\xff" * 8).data.hex() == "00000000fffa0001"
+    sender = sent.sender()
+    valve.put(sender.raw, -250)
+    assert (sender.raw["NearFar"], sender.raw["Back"]) == (0, 250)
+    assert sender.onto(b"\xff" * 8).data.hex() == "00000000fffa0001"
 
 
 def test_an_ecu_that_waits_for_a_tick_longer_than_we_do_is_enough(tmp_path: Path) -> None:
@@ -214,20 +215,21 @@ def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_pat
     assert flags
     sent = deployment.axes["slew"].valve.message
     assert isinstance(sent, RewrittenMessage)
-    assert sent.sender.key[1] & 0xFF == 51
+    assert sent.key[1] & 0xFF == 51
     assert sent.ours == {axis.command.signal, flags.neutral, flags.positive, flags.negative}
     group = next(p for p in excluded(deployment) if p.mask != 0x9FFFFFFF)
     assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF_FLAG
     assert group.mask == 0x03FFFFFF | EFF_FLAG
     assert deployment.routing.buses["far"].sent_groups == set()
-    neutral = sent.onto(bytes(8))
+    sender = sent.sender()
+    neutral = sender.onto(bytes(8))
     network = cantools.database.load_file(ROOT / "dbc" / "j1939-bjm-avc.dbc")
     values = network.decode_message(message.frame_id, neutral.data, decode_choices=False)
     assert isinstance(values, dict)
     assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (1, 0, 0)
-    deployment.axes["slew"].valve.put(-sent_steps(deployment))
+    deployment.axes["slew"].valve.put(sender.raw, -sent_steps(deployment))
     values = network.decode_message(
-        message.frame_id, sent.onto(bytes(8)).data, decode_choices=False
+        message.frame_id, sender.onto(bytes(8)).data, decode_choices=False
     )
     assert isinstance(values, dict)
     assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (0, 0, 1)

@@ -16,4 +16,4 @@ def test_a_deployment_can_be_handed_over(name: str) -> None:
     deployment = load_deployment(CONFIG / f"{name}.yaml")
     again = pickle.loads(pickle.dumps(deployment))
     assert again.identity == deployment.identity
-    assert [one.key for one in again.senders()] == [one.key for one in deployment.senders()]
+    assert [one.key for one in again.sent()] == [one.key for one in deployment.sent()]

@@ -18,6 +18,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping.registry import ADDED
 from canshaper.shaping.shapers import off
+from tests.rigs.sent import status_frame
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = [
@@ -86,7 +87,7 @@ def test_every_shipped_deployment_sends_it(name: str) -> None:
     deployment = load_deployment(ROOT / "config" / name)
     status = deployment.identity_status
     assert status is not None
-    frame = status.frame(deployment.identity.digest)
+    frame = status_frame(status, deployment.identity.digest)
     assert status.decode(frame.data) == {"Digest": deployment.identity.digest}
     assert frame[1:3] in deployment.routing.buses[frame.bus].sent
     assert status.decode(frame.data[:1]) is None
@@ -105,7 +106,7 @@ def said(deployment: Deployment, *digests: int) -> list[str]:
     assert status is not None
     monitor = Monitor(deployment)
     for i, value in enumerate(digests):
-        frame: Frame = status.frame(value)
+        frame: Frame = status_frame(status, value)
         monitor.receive(ReceivedFrame(i, frame.bus, "can0", *frame[1:], ""))
     return [event.text for event in monitor.events]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.codec.codecs import Chosen
+from canshaper.codec.layout import Chosen
 from tests.rigs.files import Machine
 
 SIGNED = 'Slew : 0|16@1- (0.1,0) [-100|100] "%" SHAPER'
@@ -40,8 +40,10 @@ def test_a_multiplexed_joystick_is_read_from_the_chosen_frames(machine: Machine)
         " SG_ Slew : 0|16", ' SG_ Page M : 40|4@1+ (1,0) [0|15] "" SHAPER\n SG_ Slew m3 : 0|16'
     )
     machine.in_yaml("message: JoystickLeft", "message: JoystickLeft\n    multiplexor: 3")
-    codec = machine.load().joysticks["left"].codec
-    assert codec.chosen == Chosen("Page", 3, False)
+    joystick = machine.load().joysticks["left"]
+    assert joystick.chosen == Chosen("Page", 3, False)
+    meant, other = (joystick.decode(bytes([*bytes(5), page, 0, 0]))[1] for page in (3, 2))
+    assert (meant, other) == ({"Slew": 0.0, "NearFar": 0.0}, {})
 
 
 def test_a_range_that_fits_no_flags_either_is_reported_alone(machine: Machine) -> None:
@@ -54,9 +56,11 @@ def test_a_range_that_fits_no_flags_either_is_reported_alone(machine: Machine) -
 
 def test_a_rocker_is_bound(machine: Machine) -> None:
     rocker(machine)
-    codec = machine.load().joysticks["left"].codec
-    assert codec.decode(bytes([100, 0, *bytes(6)]))[1] == {"Slew": 0.5, "NearFar": 0.0}
-    assert codec.decode(bytes([0, 200, *bytes(6)]))[1] == {"Slew": -1.0, "NearFar": 0.0}
+    joystick = machine.load().joysticks["left"]
+    assert joystick.decode(bytes([100, 0, *bytes(6)]))[1] == {"Slew": 0.5, "NearFar": 0.0}
+    assert joystick.decode(bytes([0, 200, *bytes(6)]))[1] == {"Slew": -1.0, "NearFar": 0.0}
+    with pytest.raises(ValueError, match="expected 8 bytes, got 9"):
+        joystick.decode(bytes(9))
 
 
 def test_both_signals_of_a_rocker_are_looked_up(machine: Machine) -> None:

@@ -116,7 +116,7 @@ def test_a_group_with_a_destination_may_command_a_valve_and_be_read(tmp_path: Pa
     bound = deployment.axes["slew"].feedback
     assert bound is not None
     assert bound.key == ("crane", 0x0CEF9C33, True)
-    assert deployment.axes["slew"].valve.message.frame().can_id == 0x0CEF339C
+    assert deployment.axes["slew"].valve.message.key[1] == 0x0CEF339C
 
 
 def test_a_group_is_one_of_j1939_only(tmp_path: Path) -> None:
@@ -139,14 +139,14 @@ def test_an_id_of_29_bits_is_no_service_of_canopen(tmp_path: Path) -> None:
     deployment = load(tmp_path, CANOPEN, (" 1696 ", f" {0x80000632} "))
     status = deployment.axes["slew"].status
     assert status is not None
-    assert status.sender.key == ("crane", 0x632, True)
+    assert status.message.key == ("crane", 0x632, True)
 
 
 def test_an_id_of_a_service_is_free_on_a_bus_without_canopen(machine: Machine) -> None:
     machine.dbc = machine.dbc.replace(" 768 ", f" {0x632} ")
     status = machine.load().axes["slew"].status
     assert status is not None
-    assert status.sender.key == ("crane", 0x632, False)
+    assert status.message.key == ("crane", 0x632, False)
 
 
 def test_a_node_of_a_bus_that_there_is_not(machine: Machine) -> None:

@@ -24,8 +24,8 @@ def test_an_id_is_an_input_a_valve_a_status_or_other_traffic() -> None:
     assert routes[joystick.key] == Route(Role.RECEIVED, joystick)
     axis = deployment.axes["slew"]
     assert axis.status is not None
-    assert routes[axis.valve.message.sender.key] == Route(Role.VALVE)
-    assert routes[axis.status.sender.key] == Route(Role.SENT)
+    assert routes[axis.valve.message.key] == Route(Role.VALVE)
+    assert routes[axis.status.message.key] == Route(Role.SENT)
     assert not {key[1:] for key in routes} & deployment.routing.others
     assert {key[1:] for key in routes} | deployment.routing.others == deployment.messages.ids()
 
@@ -33,12 +33,12 @@ def test_an_id_is_an_input_a_valve_a_status_or_other_traffic() -> None:
 def test_a_message_of_two_valves_names_both_axes_in_their_order() -> None:
     deployment = machine("forwarder")
     for axis in deployment.axes.values():
-        assert axis.name in deployment.routing.valves[axis.valve.message.sender.key]
+        assert axis.name in deployment.routing.valves[axis.valve.message.key]
     near_far = deployment.axes["near_far"]
     slew = dataclasses.replace(deployment.axes["slew"], valve=near_far.valve)
     axes = {"near_far": near_far, "slew": slew}
     shared = dataclasses.replace(deployment, axes=axes)
-    first, second = shared.routing.valves[near_far.valve.message.sender.key]
+    first, second = shared.routing.valves[near_far.valve.message.key]
     assert (first, second) == ("near_far", "slew")  # in their order
 
 

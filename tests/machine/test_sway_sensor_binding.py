@@ -7,6 +7,7 @@ import pytest
 
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
+from canshaper.machine.sway_sensor import sensor_timing
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 from tests.rigs.files import ROOT, Machine
 
@@ -35,8 +36,10 @@ def test_a_sensor_binds_to_its_message(machine: Machine) -> None:
     assert bound.message.key == ("crane", 0x400, False)
     assert (bound.signal.name, bound.cycle_s) == ("SwayParallel", 0.02)
     assert bound.factor == pytest.approx(-math.radians(1.0))
-    assert bound.timing(0.04) == SensorTiming(Measured.ANGLE, 0.04, 0.04, 0.1, 0.08)
-    assert bound.timing(0.01).period_s == 0.02
+    assert bound.timing == SensorTiming(Measured.ANGLE, 0.02, 0.04, 0.1, 0.08)
+    slow = sensor_timing(bound.config, bound.cycle_s, 0.04)
+    assert slow == SensorTiming(Measured.ANGLE, 0.04, 0.04, 0.1, 0.08)
+    assert sensor_timing(bound.config, bound.cycle_s, 0.01).period_s == 0.02
     assert bound.limits == SensorLimits(math.radians(0.1), math.radians(3.0), 0.6, None)
     assert bound.message.signals == (bound.signal,)
     assert bound.message.merits == {}
@@ -117,7 +120,7 @@ def test_an_inclination_is_an_angle(machine: Machine) -> None:
     sensing(machine, f"{INCLINED}, fusion_s: 3.4")
     bound = machine.load().axes["near_far"].sway_sensor
     assert bound is not None
-    assert bound.timing(0.02).measured is Measured.ANGLE
+    assert bound.timing.measured is Measured.ANGLE
     assert bound.config.noise == 0.1
 
 

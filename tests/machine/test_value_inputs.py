@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.codec.codecs import Chosen
+from canshaper.codec.layout import Chosen
 from tests.rigs.files import Machine
 
 VALUES_DBC = """BO_ 288 Values: 8 JOYSTICKS
@@ -78,4 +78,4 @@ def test_a_multiplexed_message_is_read_from_the_chosen_frames(valued: Machine) -
     valued.in_yaml(before, text % f"{VALUES}, signal: Weight, multiplexor: 3" + before)
     stop = valued.load().emergency_stop
     assert stop is not None
-    assert stop.codec.chosen == Chosen("Page", 3, False)
+    assert stop.chosen == Chosen("Page", 3, False)

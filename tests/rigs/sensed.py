@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from canshaper.config.sway_sensor import Kind
 from canshaper.machine.sway_sensor import SECOND_DAMPING
 from canshaper.shaping.axis import Axis
+from canshaper.shaping.free_swing import sensor_gains
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
@@ -144,7 +145,9 @@ class Setup:
             noise = math.radians(NOISE_DEG[self.measured])
             second = self.second_s and SwayMode.from_period(self.second_s, SECOND_DAMPING)
             limits = SensorLimits(noise, math.radians(3.0), second=second or None)
-            sensed = SensedSway(sway, self.timing(self.measured), limits, damps=self.damps)
+            timing = self.timing(self.measured)
+            gains = sensor_gains(MODE, TICK_S, timing, limits)
+            sensed = SensedSway(sway, timing, limits, gains, damps=self.damps)
             noisy = replace(self.sensor, noise_deg=NOISE_DEG[self.measured])
             kind: Kind = "rate" if self.measured is Measured.RATE else "angle"
             sensor = SwaySensor(noisy, "near_far", across=False, kind=kind)

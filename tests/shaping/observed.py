@@ -1,7 +1,10 @@
 """The sway and the sensor of the tests of the observer."""
 
-from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.sway_sensor import Measured, SensorTiming
+from canshaper.shaping.free_swing import sensor_gains
+from canshaper.shaping.observer import SwayObserver
+from canshaper.shaping.sensed import SensedSway
+from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 
 TICK_S = 0.02
 MODE = SwayMode(2.86, 0.05)
@@ -15,3 +18,15 @@ def timing(
 
 def pulses(tick: int) -> float:
     return (0.0, 1.0, -0.4, 0.7)[tick // 40 % 4]
+
+
+def sensed_sway(
+    sway: SwayModel, timing: SensorTiming, limits: SensorLimits, *, damps: bool
+) -> SensedSway:
+    gains = sensor_gains(sway.mode, sway.tick_s, timing, limits)
+    return SensedSway(sway, timing, limits, gains, damps=damps)
+
+
+def observer_of(sway: SwayModel, timing: SensorTiming, limits: SensorLimits) -> SwayObserver:
+    gains = sensor_gains(sway.mode, sway.tick_s, timing, limits)
+    return SwayObserver(sway, timing, limits, gains)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.shaping import sensed
-from canshaper.shaping.free_swing import FreeSwing
+from canshaper.shaping.free_swing import FreeSwing, sensor_gains
 from canshaper.shaping.observer import Errors
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
@@ -145,7 +145,8 @@ class Parts:
         self.sway = SwayModel(MODE, TICK_S)
         timing = SensorTiming(Measured.ANGLE, TICK_S, 0.0, 0.0, lost_s=LOST_S)
         limits = SensorLimits(NOISE, OFFSET, second=second)
-        self.sensed = sensed.SensedSway(self.sway, timing, limits, damps=True)
+        gains = sensor_gains(MODE, TICK_S, timing, limits)
+        self.sensed = sensed.SensedSway(self.sway, timing, limits, gains, damps=True)
 
     def begun(self) -> "Parts":
         """After the first measurement."""

@@ -4,12 +4,12 @@ import math
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 from canshaper.shaping.trust import Trust
+from tests.shaping.observed import sensed_sway
 
 TICK_S = 0.02
 MODE = SwayMode(2.86, 0.05)
@@ -26,7 +26,7 @@ class Rig:
         )
         timing = SensorTiming(Measured.ANGLE, TICK_S, 0.0, 0.0, lost_s=0.07)
         limits = SensorLimits(math.radians(0.1), math.radians(3.0))
-        self.sensed = self.axis.sensed = SensedSway(self.model, timing, limits, damps=damps)
+        self.sensed = self.axis.sensed = sensed_sway(self.model, timing, limits, damps=damps)
         self.offset_rad = offset_rad
         self.most = 1.0 if damps else 0.0
         self.command = 0.0

@@ -5,11 +5,11 @@ from typing import Any
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from tests.shaping.observed import sensed_sway
 from tests.shaping.sensed_rig import Rig
 from tests.shaping.taps import axis_with, tapped
 
@@ -96,7 +96,7 @@ def test_small_strokes_are_left_alone_only_while_swing_is_damped() -> None:
         axis = axis_with()
         sway = axis.sway
         assert sway is not None
-        axis.sensed = SensedSway(sway, TIMING, LIMITS, damps=True)
+        axis.sensed = sensed_sway(sway, TIMING, LIMITS, damps=True)
         sent[weight] = []
         for tick in range(len(plain)):
             axis.sensed.weight = weight

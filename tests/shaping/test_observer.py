@@ -16,10 +16,9 @@ from canshaper.shaping.free_swing import (
     TwoFreeSwings,
     observer_gains,
 )
-from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.sway import SwayMode, SwayModel, swing_over
 from canshaper.shaping.sway_sensor import Measured, SensorLimits
-from tests.shaping.observed import MODE, TICK_S, pulses, timing
+from tests.shaping.observed import MODE, TICK_S, observer_of, pulses, timing
 
 SCALE = 0.8
 LIMITS = SensorLimits(math.radians(0.1), math.radians(3.0))
@@ -94,7 +93,7 @@ def test_next_to_a_second_mode_the_gains_are_those_of_a_kalman_filter_of_both(
 def test_a_second_swing_is_kept_apart_from_the_first(measured: Measured) -> None:
     """Both swing freely, of the same size: the first one is what it really is."""
     second = SwayMode(9.0, 0.04)
-    observer = SwayObserver(
+    observer = observer_of(
         SwayModel(MODE, TICK_S), timing(measured), replace(LIMITS, second=second)
     )
     swings = SwayModel(MODE, TICK_S), SwayModel(second, TICK_S)
@@ -155,7 +154,7 @@ def test_free_swing_and_offset_are_found_and_predicted(measured: Measured) -> No
     """A grapple that swings while the crane drives, behind an exact model, with an offset."""
     delay_s, offset = 0.04, 0.02
     sway, free = SwayModel(MODE, TICK_S), SwayModel(MODE, TICK_S)
-    observer = SwayObserver(sway, timing(measured, delay_s=delay_s), LIMITS)
+    observer = observer_of(sway, timing(measured, delay_s=delay_s), LIMITS)
     free.angle = 0.1
     seen: list[float] = []
     for tick in range(1000):
@@ -178,7 +177,7 @@ def test_free_swing_and_offset_are_found_and_predicted(measured: Measured) -> No
 
 def test_a_retune_keeps_the_swing() -> None:
     sway = SwayModel(MODE, TICK_S)
-    observer = SwayObserver(sway, timing(Measured.ANGLE, delay_s=0.04, lag_s=0.1), LIMITS)
+    observer = observer_of(sway, timing(Measured.ANGLE, delay_s=0.04, lag_s=0.1), LIMITS)
     for tick in range(70):
         sway.step(pulses(tick))
         observer.step(pulses(tick), 0.0)
@@ -193,7 +192,7 @@ def test_each_idea_explains_what_it_is_about(measured: Measured) -> None:
     """A pendulum, the same turned round, a sensor that stands, and a grapple that is dragged."""
     world, worlds = SwayModel(MODE, TICK_S), 4
     observers = [
-        SwayObserver(SwayModel(MODE, TICK_S), timing(measured), LIMITS) for _ in range(worlds)
+        observer_of(SwayModel(MODE, TICK_S), timing(measured), LIMITS) for _ in range(worlds)
     ]
     rates, dragged, squares = measured is Measured.RATE, 0.0, [[0.0] * 4 for _ in range(worlds)]
     for tick in range(200):
@@ -220,7 +219,7 @@ def test_each_idea_explains_what_it_is_about(measured: Measured) -> None:
 def test_what_is_left_of_an_error_is_what_the_same_measurement_still_shows(
     measured: Measured,
 ) -> None:
-    observer = SwayObserver(SwayModel(MODE, TICK_S), timing(measured), LIMITS)
+    observer = observer_of(SwayModel(MODE, TICK_S), timing(measured), LIMITS)
     observer.begin(0.0, SCALE)
     for value in (0.3, -0.1, 0.2):
         left = observer.correct(observer.errors(value, SCALE))

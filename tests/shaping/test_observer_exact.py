@@ -14,10 +14,9 @@ from canshaper.shaping.free_swing import (
     FreeSwing,
     observer_gains,
 )
-from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.sway_sensor import Measured, SensorLimits
-from tests.shaping.observed import MODE, TICK_S, timing
+from tests.shaping.observed import MODE, TICK_S, observer_of, timing
 
 SCALE, TICKS = 0.8, 5
 PERIOD_S = TICKS * TICK_S
@@ -81,7 +80,7 @@ class Ideas:
 def test_the_four_ideas_are_four_kalman_filters(measured: Measured, delayed: int) -> None:
     """The crane drives all the time; measured is every fifth tick, and twice it begins again."""
     time = replace(timing(measured, delay_s=delayed * TICK_S), period_s=PERIOD_S)
-    observer, ideas = SwayObserver(SwayModel(MODE, TICK_S), time, LIMITS), Ideas(measured)
+    observer, ideas = observer_of(SwayModel(MODE, TICK_S), time, LIMITS), Ideas(measured)
     for tick in range(120):
         value = 0.1 + 0.2 * math.cos(0.13 * tick)
         if tick in (10, 70):
@@ -103,8 +102,8 @@ def test_a_second_mode_is_none_of_what_a_sensor_shows_that_shows_no_swing(
 ) -> None:
     """Alone and dragged are the same with and without one."""
     sway, time = SwayModel(MODE, TICK_S), timing(measured)
-    one = SwayObserver(sway, time, LIMITS)
-    other = SwayObserver(sway, time, replace(LIMITS, second=SwayMode(9.0, 0.04)))
+    one = observer_of(sway, time, LIMITS)
+    other = observer_of(sway, time, replace(LIMITS, second=SwayMode(9.0, 0.04)))
     for tick in range(20):
         value = 0.1 + 0.2 * math.cos(0.13 * tick)
         if not tick:
@@ -128,7 +127,7 @@ def test_a_lasting_error_bends_the_swing_by_the_gain_of_the_rate_a_period(
     """Measurements come in whole ticks, one at least; the gain is that of the steady state."""
     mode, quickness = SwayMode(0.6, 0.0), 0.05
     time = replace(timing(measured, quickness=quickness), period_s=period_s)
-    observer = SwayObserver(SwayModel(mode, TICK_S), time, LIMITS)
+    observer = observer_of(SwayModel(mode, TICK_S), time, LIMITS)
     a = np.eye(3)
     a[:2, :2] = swung(mode, between_s)
     c = np.array([[0.0, 1.0, 1.0] if measured is Measured.RATE else [1.0, 0.0, 1.0]])
@@ -142,16 +141,16 @@ def test_the_gains_are_those_of_four_seconds_and_the_last_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     every = [(float(number), 0.0, 0.0) for number in range(300)]
-    monkeypatch.setattr(free_swing, "kalman_gains", lambda *_: every)
+    monkeypatch.setattr(free_swing, "kalman_gains", lambda *_: tuple(every))
     got = observer_gains(MODE, TICK_S, timing(Measured.ANGLE), LIMITS)
-    assert got == [*every[:200], every[299]]
+    assert got == (*every[:200], every[299])
 
 
 @pytest.mark.parametrize("retuned", [False, True])
 def test_a_free_swing_goes_on_and_is_predicted_as_a_pendulum(retuned: bool) -> None:
     """Ahead by the lag and the delay, by the mode of the model that it was retuned to."""
     sway, mode = SwayModel(MODE, TICK_S), MODE
-    observer = SwayObserver(sway, timing(Measured.ANGLE, delay_s=0.06, lag_s=0.3), LIMITS)
+    observer = observer_of(sway, timing(Measured.ANGLE, delay_s=0.06, lag_s=0.3), LIMITS)
     if retuned:
         mode = SwayMode(1.9, 0.2)
         observer.retune(sway.retuned(mode, 0.0))
@@ -169,7 +168,7 @@ def test_a_free_swing_goes_on_and_is_predicted_as_a_pendulum(retuned: bool) -> N
 @BOTH
 def test_a_model_that_starts_again_hangs_still(measured: Measured) -> None:
     """Only the speed of the tip is left, which a gyro shows and an inclinometer does not."""
-    observer = SwayObserver(SwayModel(MODE, TICK_S), timing(measured), LIMITS)
+    observer = observer_of(SwayModel(MODE, TICK_S), timing(measured), LIMITS)
     for tick in range(20):
         observer.step(velocity_at(tick), 0.0)
     assert abs(observer.own(SCALE)) > 0.1

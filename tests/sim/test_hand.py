@@ -37,7 +37,7 @@ def test_a_daemon_reads_what_the_hand_holds(
     frames = {frame[:3]: frame for frame in hand.frames(0, Held(joysticks, anti_sway=anti_sway))}
     moved = {axis.config.command.signal for axis in deployment.axes.values()}
     for joystick in deployment.joysticks.values():
-        raw, commands = joystick.codec.decode(_frame_of(frames, joystick.key).data)
+        raw, commands = joystick.decode(_frame_of(frames, joystick.key).data)
         assert (
             joystick.config.anti_sway_off is None or raw[joystick.config.anti_sway_off] != anti_sway
         )
@@ -49,7 +49,7 @@ def test_at_rest_nothing_is_enabled(deployment: Deployment) -> None:
     hand = Hand(deployment)
     frames = {frame[:3]: frame for frame in hand.frames(0, Held())}
     for joystick in deployment.joysticks.values():
-        raw, commands = joystick.codec.decode(_frame_of(frames, joystick.key).data)
+        raw, commands = joystick.decode(_frame_of(frames, joystick.key).data)
         if joystick.enable is not None:
             assert raw[joystick.enable] == 0
         assert joystick.config.reset is None or raw[joystick.config.reset] == 0
@@ -60,7 +60,7 @@ def test_reset_and_enable_are_in_the_frame(deployment: Deployment) -> None:
     hand = Hand(deployment)
     frames = {frame[:3]: frame for frame in hand.frames(0, Held(enable=True, reset=True))}
     for joystick in deployment.joysticks.values():
-        raw, _ = joystick.codec.decode(_frame_of(frames, joystick.key).data)
+        raw, _ = joystick.decode(_frame_of(frames, joystick.key).data)
         if joystick.enable is not None:
             assert raw[joystick.enable] == 1
         assert joystick.config.reset is None or raw[joystick.config.reset] == 1
@@ -82,7 +82,7 @@ def test_the_button_for_the_next_profile_is_pressed_on_one_joystick() -> None:
     deployment = load_deployment(CONFIG / "j1939-profiles.yaml")
     frames = {f[1] & 0xFFFF00: f for f in Hand(deployment).frames(0, Held(next_profile=True))}
     pressed = {
-        name: joystick.codec.decode(frames[joystick.message.frame_id & 0xFFFF00].data)[0]["Button4"]
+        name: joystick.decode(frames[joystick.message.frame_id & 0xFFFF00].data)[0]["Button4"]
         for name, joystick in deployment.joysticks.items()
     }
     assert pressed == {"left": 1, "right": 3}  # not available

@@ -1,5 +1,6 @@
 """Frames of a crane, and what the page is shown of them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
 from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
+from tests.rigs.sent import status_frame
 
 CONFIG = Path(__file__).parents[2] / "config"
 PROFILES = ["normal", "quick", "fine", None]
@@ -45,11 +47,11 @@ class Watched:
     ) -> Frame:
         codec = self.deployment.axes[axis].status
         assert codec
-        return codec.frame(report(state, reason, sway_deg=sway_deg))
+        return status_frame(codec, report(state, reason, sway_deg=sway_deg))
 
     def valve(self, axis: str, steps: int) -> Frame:
         bound = self.deployment.axes[axis]
-        return bound.valve.message.sender.frame({bound.config.valve.signal: steps})
+        return bound.valve.message.sender().frame({bound.config.valve.signal: steps})
 
     def sway(self, across_deg: float, along_deg: float = 0.0) -> list[Frame]:
         across, along = (value * 3.14159265 / 180.0 for value in (across_deg, along_deg))
@@ -75,6 +77,15 @@ def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
     shown = watched.receive(Hand(watched.deployment).frames(0, Held(joysticks)))
     given = {axis: values["joystick"] for axis, values in shown["axes"].items()}
     assert given == pytest.approx({axis: joysticks.get(axis, 0.0) for axis in given}, abs=0.005)
+
+
+@pytest.mark.parametrize("change", [lambda data: data + b"\0", lambda data: data[:-1]])
+def test_a_joystick_frame_of_another_length_is_not_shown(
+    watched: Watched, change: Callable[[bytes], bytes]
+) -> None:
+    frames = Hand(watched.deployment).frames(0, Held({"slew": 0.5}))
+    shown = watched.receive([frame._replace(data=change(frame.data)) for frame in frames])
+    assert shown == Watched().view.values(0.0)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -175,7 +186,7 @@ def test_faults_are_reported_once(watched: Watched) -> None:
     assert codec
     counters = Counters()
     counters.add(FrameFault.COUNTER_JUMP)
-    frame = codec.frame({"LastFault": int(counters.last_fault), **counters.values})
+    frame = status_frame(codec, {"LastFault": int(counters.last_fault), **counters.values})
     shown = watched.receive([frame, frame])
     assert shown["fault"] == "counter jump"
     assert watched.reported == [("fault: counter jump", "warn")]
@@ -217,7 +228,7 @@ def test_the_set_in_force_says_which_profile(number: int, name: str | None) -> N
     codec = watched.deployment.axes["slew"].status
     assert codec
     one = report(State.READY, Reason.JOYSTICK_NEUTRAL, active_set=number)
-    axes = watched.receive([codec.frame(one)])["axes"]
+    axes = watched.receive([status_frame(codec, one)])["axes"]
     assert axes["slew"]["profile"] == name
     assert axes["near_far"]["profile"] is axes["lift"]["profile"] is None
 

@@ -2,10 +2,9 @@
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, group_of
-from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
+from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.input import Input
@@ -38,7 +37,7 @@ class SpeedFeedback:
         bus = deployment.config.buses[deployment.axes[axis].config.valve.bus]
         feedback = _find(deployment, message, signal, fd=bus.fd)
         self._bound = bound = _bound(deployment, axis, message, feedback[0], signal)
-        self._input = ValueInput(bound, feedback[1].name, *measurable(feedback[1]))
+        self._input = ValueInput(bound, feedback[1], *measurable(feedback[1]))
         self._keys = frozenset(bound.keys)
         _, can_id, _ = bound.key
         self._source = None if can_id & 0xFF == NULL else can_id & 0xFF
@@ -98,7 +97,7 @@ def _bound(
         return of_axis
     bus = deployment.axes[axis].config.valve.bus
     config = Input(bus=bus, message=name, timeout_ms=SILENT_MS)
-    return BoundInput(config, message, JoystickCodec(message, []), UNPROTECTED)
+    return BoundInput(config, message, Layout(message), UNPROTECTED, None)
 
 
 def _problem(deployment: Deployment, text: str) -> ConfigError:

@@ -87,7 +87,7 @@ class Loop:
         }
         self._valves: dict[tuple[str, int, bool], list[int]] = {}
         for i, axis in enumerate(deployment.axes.values()):
-            self._valves.setdefault(axis.valve.message.sender.key, []).append(i)
+            self._valves.setdefault(axis.valve.message.key, []).append(i)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._standstill = Standstill(deployment)
         self._seconds_ns = round(seconds * 1e9)

@@ -13,7 +13,6 @@ from canshaper.codec.layout import Layout
 from canshaper.commissioning.identification.driven_data import STANDS
 from canshaper.commissioning.identification.series import Array, Command
 from canshaper.controller.finder import InputFinder
-from canshaper.errors import WrongLengthError
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
@@ -46,10 +45,9 @@ def joystick_commands(
 
     Both are empty for a frame of another length; a command that is no value is left out.
     """
-    try:
-        raw, commands = joystick.codec.decode(data)
-    except WrongLengthError:
+    if len(data) != joystick.message.length:
         return {}, {}
+    raw, commands = joystick.decode(data)
     values = {}
     for name, axis in axes.items():
         config = axis.config.command
@@ -69,7 +67,7 @@ class Commands:
         self._by_valve: dict[tuple[int, bool], list[BoundAxis]] = {}
         self._layouts: dict[tuple[int, bool], tuple[Layout, int]] = {}
         for bound in self._axes.values():
-            key = bound.valve.message.sender.key[1:]
+            key = bound.valve.message.key[1:]
             self._by_valve.setdefault(key, []).append(bound)
             self._layouts[key] = Layout(bound.valve_message), bound.valve_message.length
         self._curves = {n: a.config.limits.curve() for n, a in self._axes.items()}

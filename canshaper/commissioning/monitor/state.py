@@ -102,15 +102,15 @@ class Monitor:
             self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
         for name, axis in deployment.axes.items():
             message = axis.valve_message
-            key = axis.valve.message.sender.key
+            key = axis.valve.message.key
             self.messages.setdefault(key, MessageRate(message.name, message.cycle_time))
             if axis.status:
-                self._axis_of[axis.status.sender.key] = name
-                self._status(axis.status.sender.key, axis.status.sender.fields.message)
+                self._axis_of[axis.status.message.key] = name
+                self._status(axis.status.message.key, axis.status.message.fields.message)
         if deployment.status:
-            self._status(deployment.status.sender.key, deployment.status.sender.fields.message)
+            self._status(deployment.status.message.key, deployment.status.message.fields.message)
         if identity := deployment.identity_status:
-            self._status(identity.sender.key, identity.sender.fields.message)
+            self._status(identity.message.key, identity.message.fields.message)
 
     def _status(self, key: Key, message: object) -> None:
         name, cycle = getattr(message, "name", ""), getattr(message, "cycle_time", None)
@@ -132,7 +132,7 @@ class Monitor:
             shaped, sway = (status.values[one] for one in ("ShapedCommand", "PredictedSway"))
             self.samples[name].append(Sample(frame.time_ns, shaped, sway))
         identity = self.deployment.identity_status
-        if identity and key == identity.sender.key and (values := identity.decode(frame.data)):
+        if identity and key == identity.message.key and (values := identity.decode(frame.data)):
             self._compare_identity(values["Digest"], frame.time_ns)
         changes = self.history.changes
         self.events.extend(changes)
@@ -157,9 +157,9 @@ class Monitor:
     def stale_s(self, axis: str, now_ns: int) -> float | None:
         """For how long the status of an axis is missing; None where it is fresh, or never came."""
         bound = self.deployment.axes[axis].status
-        return self.messages[bound.sender.key].silent_s(now_ns) if bound else None
+        return self.messages[bound.message.key].silent_s(now_ns) if bound else None
 
     def counters_stale_s(self, now_ns: int) -> float | None:
         """The same of the service's counters."""
         status = self.deployment.status
-        return self.messages[status.sender.key].silent_s(now_ns) if status else None
+        return self.messages[status.message.key].silent_s(now_ns) if status else None

@@ -77,7 +77,7 @@ class _Reader:
         self._history = History(deployment)
         self._valves: dict[Key, list[BoundAxis]] = defaultdict(list)
         for axis in deployment.axes.values():
-            self._valves[axis.valve.message.sender.key].append(axis)
+            self._valves[axis.valve.message.key].append(axis)
         self._candidates = {
             (message.frame_id, message.is_extended_frame): (message, Layout(message))
             for message in possible_joysticks(deployment)

@@ -6,13 +6,12 @@ because the axis is neutral until then. A fault is reset by an edge of the ready
 tripped until the operator resets it.
 """
 
-from typing import Any
-
 from canshaper.codec.canopen import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.valve import ValveMessage
-from canshaper.inputs.input import GOOD, Input
-from canshaper.machine.inputs import BoundStatusWord
+from canshaper.codec.sent import Sender
+from canshaper.config.schema import StatusWord
+from canshaper.inputs.input import GOOD, Input, Raw
+from canshaper.machine.inputs import Bound
 from canshaper.shaping.states import Reason
 
 STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIVE)
@@ -31,7 +30,7 @@ class ValveControl(Input):
     Args:
         bound: message with the status word.
         control: name of the signal with the control word.
-        message: message of the valve, which the control word is put into.
+        message: sends the message of the valve, which the control word is put into.
     """
 
     # Set by _go and _put.
@@ -40,7 +39,7 @@ class ValveControl(Input):
     _word: int
     _since_ns: int | None  # when this word was first put; None: at the next tick
 
-    def __init__(self, bound: BoundStatusWord, control: str, message: ValveMessage) -> None:
+    def __init__(self, bound: Bound[StatusWord], control: str, message: Sender) -> None:
         super().__init__(bound)
         self._signal = bound.config.signal
         self._status_timeout_ns = bound.config.timeout_ms * 1_000_000
@@ -52,13 +51,7 @@ class ValveControl(Input):
         self._reset_ns = 0
         self._go(0, None)
 
-    def on_frame(
-        self,
-        raw: dict[str, Any],
-        commands: dict[str, float | Reason],
-        arrived_ns: int,
-        accepted: bool,
-    ) -> FrameFault:
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """The low four bits have the state; that it has left ACTIVE takes no trust."""
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE

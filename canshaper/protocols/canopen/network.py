@@ -51,7 +51,7 @@ class CanopenNetwork(BusProtocol):
         joystick, valve = deployment.config.joysticks[config.command.joystick], config.valve
         control = None
         if bound and valve.cia408:
-            control = ValveControl(bound, valve.cia408.control, runner.bound.valve.message)
+            control = ValveControl(bound, valve.cia408.control, runner.valve)
             self.controls[name] = control
             self.bound.append((bound, control))
         if own := valve.cia408.node if valve.cia408 else valve.node:

@@ -3,8 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.rewrite import RewrittenMessage
-from canshaper.codec.valve import ValveMessage
+from canshaper.codec.rewrite import RewritingSender
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import BusProtocol, DrivenAxis, MessageKey
@@ -22,7 +21,8 @@ class ForwardedJoystick:
     and neutral after a trip.
 
     Args:
-        message: what leaves.
+        message: sends what leaves.
+        cycle_ms: time between two frames of the joystick.
         joystick: the joystick.
         runners: the axes with their velocities in it.
 
@@ -31,16 +31,18 @@ class ForwardedJoystick:
     """
 
     def __init__(
-        self, message: ValveMessage, joystick: JoystickInput, runners: Sequence[DrivenAxis]
+        self,
+        message: RewritingSender,
+        cycle_ms: int,
+        joystick: JoystickInput,
+        runners: Sequence[DrivenAxis],
     ) -> None:
-        assert isinstance(message, RewrittenMessage)  # only such axes have one
         self._message = message
         self._joystick = joystick
         self._runners = runners
         self._seen = joystick.raw
         self.moves = False
         self._passed_ns = 0
-        cycle_ms = message.sender.fields.message.cycle_time or 0
         self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
 
     def new_frame(self) -> bool:
@@ -60,7 +62,7 @@ class ForwardedJoystick:
         stopped = stopped or self._joystick.released  # the axes trip with the next tick only
         for runner in self._runners:
             if stopped or runner.tripping:  # the loop stood still, or the like: this is old
-                runner.bound.valve.put(0)
+                runner.put(0)
         self.moves = self._any_moves() and not stopped
         return self._message.onto(data)
 
@@ -103,12 +105,14 @@ class Gateway(BusProtocol):
         self._buses = gateway.between
         by_message: dict[MessageKey, list[DrivenAxis]] = {}
         for runner in (runner for runner in axes.values() if runner.bound.rewrites):
-            by_message.setdefault(runner.bound.valve.message.sender.key, []).append(runner)
+            by_message.setdefault(runner.valve.key, []).append(runner)
         self.forwarding: dict[MessageKey, ForwardedJoystick] = {}
         for key, runners in by_message.items():
-            bound = runners[0].bound
+            bound, message = runners[0].bound, runners[0].valve
+            assert isinstance(message, RewritingSender)  # of an axis that rewrites
             joystick = joysticks[bound.config.command.joystick]
-            self.forwarding[key] = ForwardedJoystick(bound.valve.message, joystick, runners)
+            cycle_ms = bound.valve_message.cycle_time or 0
+            self.forwarding[key] = ForwardedJoystick(message, cycle_ms, joystick, runners)
 
     def usual(self, frame: Frame) -> bool:
         """What no one knows there is what is passed on."""

@@ -61,7 +61,7 @@ def fallback_rules(deployment: Deployment) -> list[Rule]:
     rules = []
     for joystick, message in _passed(deployment):
         source = deployment.config.buses[joystick.key[0]].channel
-        destination = deployment.config.buses[message.sender.key[0]].channel
+        destination = deployment.config.buses[message.key[0]].channel
         if gateway.fallback == "pass":
             rules.append(Rule(source, destination, _of(joystick)))
         elif gateway.fallback == "neutral":
@@ -108,8 +108,8 @@ def channels(deployment: Deployment) -> tuple[str, str]:
 
 def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
     """Changes that make a frame of a joystick one with all its axes in neutral."""
-    length = message.sender.fields.message.length
-    checks, clear = kernel_check(message.sender.protection, length)
+    length = message.fields.message.length
+    checks, clear = kernel_check(message.protection, length)
     return (
         *changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length),
         *checks,

@@ -125,7 +125,7 @@ class CommandedByOthers:
 
     def __init__(self, runners: Sequence[DrivenAxis]) -> None:
         self._runners = [
-            (runner, _destination(runner.bound.valve.message.sender.key[1])) for runner in runners
+            (runner, _destination(runner.bound.valve.message.key[1])) for runner in runners
         ]
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:

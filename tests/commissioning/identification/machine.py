@@ -86,14 +86,14 @@ def candump(
     """Write a drive as candump does, with valve commands or without."""
     axes = (deployment or load_deployment(FILE)).axes
     noise = Coloured(seed, noise_deg, memory), Coloured(seed + 10_000, noise_deg, memory)
-    lines = []
+    lines, senders = [], {name: axis.valve.message.sender() for name, axis in axes.items()}
     for state, commands in drive:
         stamp = epoch_s + state.time_s
         if valves:
             for name, command in commands.items():
-                valve = axes[name].valve
-                valve.put(round(command * valve.steps))
-                frame = valve.message.frame()
+                valve, sender = axes[name].valve, senders[name]
+                valve.put(sender.raw, round(command * valve.steps))
+                frame = sender.frame()
                 data = frame.data.hex().upper()
                 lines.append(f"({stamp - TICK_S:.6f}) {channel} {frame.can_id:03X}#{data}")
         angles = math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)

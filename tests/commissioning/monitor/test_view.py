@@ -18,6 +18,7 @@ from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping.states import Reason, State
 from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
+from tests.rigs.sent import status_frame
 
 NOW = 1_763_750_000_000_000_000
 MS = 1_000_000
@@ -50,12 +51,12 @@ def status_frames(
 ) -> list[ReceivedFrame]:
     """Status of all axes and of the service."""
     frames = [
-        received(axis.status.frame(report(state, reason, 0.5, -0.25, 3.4)), time_ns)
+        received(status_frame(axis.status, report(state, reason, 0.5, -0.25, 3.4)), time_ns)
         for axis in deployment.axes.values()
         if axis.status
     ]
     assert deployment.status
-    return [*frames, received(deployment.status.frame(COUNTERS), time_ns)]
+    return [*frames, received(status_frame(deployment.status, COUNTERS), time_ns)]
 
 
 def j1939(source: str, folder: Path) -> Deployment:
@@ -220,7 +221,7 @@ def drive(deployment: Deployment, monitor: Monitor) -> None:
         for axis in deployment.axes.values():
             assert axis.status
             said = report(State.ACTIVE, Reason.JOYSTICK_MOVED, command, command, 4.0 * command)
-            monitor.receive(received(axis.status.frame(said), NOW - (300 - n) * 100 * MS))
+            monitor.receive(received(status_frame(axis.status, said), NOW - (300 - n) * 100 * MS))
 
 
 def test_a_wide_terminal_has_lines_over_time(deployment: Deployment) -> None:

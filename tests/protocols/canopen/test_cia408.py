@@ -234,9 +234,9 @@ def test_a_status_word_that_does_not_count_stops_and_does_not_start() -> None:
     key = rig.deployment.axes["slew"].status_word.key  # type: ignore[union-attr]
     control = rig.controller.inputs[key]
     assert isinstance(control, ValveControl)
-    control.on_frame({"StatusWord": HOLD}, {}, rig.now_ns, False)
+    control.on_frame({"StatusWord": HOLD}, rig.now_ns, False)
     assert control.gate(False, rig.now_ns).name == "VALVE_FAULT"  # type: ignore[union-attr]
     assert control.gate(False, rig.now_ns) is None  # what counted last still says active
     control.invalidate()
-    control.on_frame({"StatusWord": ACTIVE}, {}, rig.now_ns, False)
+    control.on_frame({"StatusWord": ACTIVE}, rig.now_ns, False)
     assert control.gate(True, rig.now_ns).name == "VALVE_NOT_READY"  # type: ignore[union-attr]

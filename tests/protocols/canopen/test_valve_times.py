@@ -21,14 +21,14 @@ class Valve:
     def __init__(self) -> None:
         axis = load_deployment(ROOT / "config" / FILE).axes["slew"]
         assert axis.status_word is not None
-        self.message = axis.valve.message
-        self.control = ValveControl(axis.status_word, "ControlWord", self.message)
+        self.sender = axis.valve.message.sender()
+        self.control = ValveControl(axis.status_word, "ControlWord", self.sender)
 
     def word(self, now_ns: int, status: int) -> int:
         """Control word of the tick at that time, with a status word that has just come."""
         self.control.receive(status.to_bytes(2, "little"), now_ns)
         self.control.gate(True, now_ns)
-        return self.message.frame().data[0]
+        return self.sender.frame().data[0]
 
     def active(self) -> "Valve":
         """Brought to work."""
@@ -120,7 +120,7 @@ def test_a_status_word_counts_for_its_timeout_and_no_longer(
 ) -> None:
     at_ns = UP[-1][0]
     assert valve.active().control.gate(False, at_ns + 300 * MS + late_ns) is reason
-    assert valve.message.frame().data[0] == (INIT if reason else ACTIVE)
+    assert valve.sender.frame().data[0] == (INIT if reason else ACTIVE)
 
 
 def test_after_invalidation_no_status_word_has_been_received(valve: Valve) -> None:
