@@ -180,11 +180,14 @@ class AxisRunner:
             self._full_speed_m_s = config.sway.full_speed_m_s
         self.bound = replace(self.bound, config=config)
 
-    def hold(self, last: int, now: int) -> None:
-        """Deadlines were missed, from one number to another: the last output was held."""
+    def hold(self, last: int, now: int) -> Transition | None:
+        """Deadlines were missed, from one number to another: the last output was held.
+
+        Returns:
+            The change of state, where the filter failed in them; else None.
+        """
         passed = now // self.period_ticks - last // self.period_ticks
-        if passed > 1:
-            self.axis.hold(passed - 1)
+        return self.axis.hold(passed - 1) if passed > 1 else None
 
     def tick(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
@@ -222,7 +225,7 @@ class AxisRunner:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
             axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
         transition = axis.act(command, self._added, damps=self._damps)
-        self._put(axis.raw)
+        self._put(axis.output.steps)
         return transition
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
