@@ -148,11 +148,7 @@ class Axis:
         at_rest = self.output.steps == 0 and not stage.commanded
         state = states.step(joystick, at_rest, may_add)
         if state is not old:
-            self._transfer.entered(state, old)
-            if state is not ACTIVE:
-                stage.interrupt_stroke()
-            if old is TRIPPED:
-                self.error = ""
+            self._entered(state, old)
         try:
             demand = path = damping = 0.0
             if state is ACTIVE or state is BYPASS_ON:
@@ -257,6 +253,15 @@ class Axis:
         if not self.neutral:
             raise ValueError("limits change in neutral only")
         self._stage.change_limits(limits)
+
+    def _entered(self, state: State, old: State) -> None:
+        self._transfer.entered(state, old)
+        if state is not ACTIVE:
+            self._stage.interrupt_stroke()
+        elif old is BYPASS_ON:
+            self._stage.start_filter()
+        if old is TRIPPED:
+            self.error = ""
 
     def _clamped_demand(self) -> float:
         """The last demand as the filter got it."""

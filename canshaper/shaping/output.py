@@ -6,7 +6,9 @@ In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
 
 1. Range. The operator bounds the output: it is never faster than he demands now or demanded within
    the tail, and never against his joystick, unless the limits allow that. The reference is clamped
-   to this range.
+   to this range. For a tail after anti-sway was switched on in motion there is no run-on: the
+   output is never faster than he demands now. What the axis did without the filter is in the memory
+   and in the sway model of the filter, which would run it once more.
 2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
    of the frame. The axis makes one short movement of them.
 3. Added velocity. The motion of two axes may add to that, in a range of its own.
@@ -88,11 +90,13 @@ class OutputStage:
         "_carry",
         "_dropped_at",
         "_grid_steps",
+        "_no_run_on",
         "_own_ramp",
         "_rates",
         "_recent",
         "_small",
         "_spreads",
+        "_tail",
         "_tick_s",
         "largest_added",
         "limits",
@@ -109,7 +113,9 @@ class OutputStage:
         self._grid_steps = grid_steps
         self._tick_s = tick_s
         self._spreads = spreads
-        self._recent = RecentCommand(round(limits.tail_s / tick_s))
+        self._tail = round(limits.tail_s / tick_s)  # ticks
+        self._recent = RecentCommand(self._tail)
+        self._no_run_on = 0  # ticks that are left without run-on
         self.change_limits(limits)
         self._own_ramp = 0.0  # what ``ramp`` would be if nothing had been added
         self._carry = 0.0  # what rounding has left out of an added velocity, summed up
@@ -141,7 +147,11 @@ class OutputStage:
 
         # 1. Range
         recent.add(demand)
-        low, high = allowed_range(demand, recent.low, recent.high, limits)
+        recent_low, recent_high = recent.low, recent.high
+        if self._no_run_on > 0:
+            self._no_run_on -= 1
+            recent_low, recent_high = min(demand, 0.0), max(demand, 0.0)
+        low, high = allowed_range(demand, recent_low, recent_high, limits)
         own = within(reference, low, high, limits.minimum)
 
         # 2. Small strokes
@@ -159,7 +169,7 @@ class OutputStage:
             if not abs(path) <= 1.0:
                 raise ValueError(f"added velocity is {path}")
             largest = self.largest_added if added else 0.0
-            low, high = range_with_added(demand, recent.low, recent.high, own, largest)
+            low, high = range_with_added(demand, recent_low, recent_high, own, largest)
             low, high = max(low, -limits.maximum), min(high, limits.maximum)
             target = own
             if added:
@@ -209,6 +219,10 @@ class OutputStage:
         self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
         self._carry = 0.0
 
+    def start_filter(self) -> None:
+        """Anti-sway was switched on in motion: nothing runs on for a tail, see the prologue."""
+        self._no_run_on = self._tail
+
     def rest(self) -> None:
         """Go to neutral at once, and forget all that was demanded or added."""
         self._recent.clear()
@@ -216,10 +230,12 @@ class OutputStage:
         output = self.output
         output.steps, output.setpoint, output.path, output.damping = 0, 0.0, 0.0, 0.0
         self.ramp = self._own_ramp = self._carry = self._dropped_at = 0.0
+        self._no_run_on = 0
 
     def hold(self, demand: float, ticks: int) -> None:
         """Count missed ticks, in which the demand held and the valve kept its output."""
         self._recent.age(ticks)
+        self._no_run_on -= ticks
         self._small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:
