@@ -214,11 +214,13 @@ class AxisRunner:
             # that one is lost, its return is no press.
             let_go = not command.enabled and command.fault is None
             enabled = not (let_go and fault is Reason.ENABLE_OFF)
-            command = CommandInput(fault=fault, enabled=enabled, reset=command.reset, trip=trip)
+            # The joystick stays known, where it is valid: it may be held against the run-on.
+            held, reset = command.command, command.reset
+            command = CommandInput(held, fault=fault, enabled=enabled, reset=reset, trip=trip)
         # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
         late = Reason.LOOP_OVERRUN if overrun and axis.state is not State.BYPASS_ON else None
         if late and command.enabled and command.fault is None:
-            command = CommandInput(fault=late, reset=command.reset, trip=command.trip)
+            command = command._replace(fault=late, bypass=False)
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:

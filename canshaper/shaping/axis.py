@@ -23,7 +23,7 @@ from canshaper.shaping.limits import OutputLimits, within
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper, spreads
-from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, TRIPPED, StateMachine
+from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, STOPPING, TRIPPED, StateMachine
 from canshaper.shaping.states import MOVING, CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import BumplessTransfer
@@ -157,6 +157,8 @@ class Axis:
                     demand = joystick.command
                 if not size < math.inf:  # it would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
+            elif state is STOPPING and abs(joystick.command) > self._neutral_band:
+                stage.stop_against(joystick.command)
             self.command = demand
 
             adds = may_add and state is ACTIVE

@@ -219,6 +219,15 @@ class OutputStage:
         self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
         self._carry = 0.0
 
+    def stop_against(self, held: float) -> None:
+        """End the run-on of a stop by the fall, where the joystick is held against it.
+
+        After a reversal the limits may let the output run on; then they do so here.
+        """
+        limits = self.limits
+        if held * self.ramp < 0.0 and not (limits.brake_shaped or limits.allow_reverse):
+            self._recent.clear()
+
     def start_filter(self) -> None:
         """Anti-sway was switched on in motion: nothing runs on for a tail, see the prologue."""
         self._no_run_on = self._tail

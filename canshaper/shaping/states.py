@@ -102,8 +102,9 @@ class CommandInput(NamedTuple):
     """The checked input of one axis in one tick.
 
     Attributes:
-        command: position of the joystick, [-1, 1]; without meaning while ``fault`` is set.
-        fault: why the joystick, or a switch that it needs, cannot be used; None: it can be.
+        command: position of the joystick, [-1, 1]; 0 where it is not valid.
+        fault: why the axis must not follow the joystick: it is not valid, or a switch, a node or
+            the loop has a fault; None: it may.
         enabled: False when a message showed the enable switch released. A lost message leaves it
             True: lost is a fault, which stops the axis through its filter; released trips it.
         bypass: the operator has switched anti-sway off.

@@ -122,6 +122,7 @@ class AxisJudge:
         if self.mode == began == WAIT and centred:
             self._go(FREE)
         deflection = deflection if abs(deflection) > axis.band else 0.0
+        self._stop_against(deflection)
         self._bounds(index, deflection, slewing)
         stops = began == FREE and self.mode == STOP and bool(faults)
         self._must_fall = stops and self._settled()
@@ -144,6 +145,13 @@ class AxisJudge:
             self._commands.clear()
             self._range = (0.0, 0.0)
             self.commanded = False
+
+    def _stop_against(self, deflection: float) -> None:
+        """Nothing runs on against a valid joystick, unless a reversal may."""
+        shaped = self.axis.brake_shaped or self.axis.allow_reverse
+        if self.mode == STOP and deflection * self.raw < 0.0 and not shaped:
+            self._commands.clear()
+            self._range = (0.0, 0.0)
 
     def _settled(self) -> bool:
         return self._steady >= SETTLED.get(self.axis.filter, SETTLED_OTHERS)
