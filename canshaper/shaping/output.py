@@ -11,7 +11,8 @@ In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
    and in the sway model of the filter, which would run it once more.
 2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
    of the frame. The axis makes one short movement of them.
-3. Added velocity. The motion of two axes may add to that, in a range of its own.
+3. Added velocity. The motion of two axes may add to that, in a range of its own. It counts every
+   demand within the tail, also one before a stop or a trip, after which nothing of it runs on.
 4. Ramp. The output changes by at most the rise or the fall of the axis.
 5. Grid. The output is rounded to steps of the frame, never out of the range.
 
@@ -88,6 +89,7 @@ class OutputStage:
 
     __slots__ = (
         "_carry",
+        "_demanded",
         "_dropped_at",
         "_grid_steps",
         "_no_run_on",
@@ -115,6 +117,7 @@ class OutputStage:
         self._spreads = spreads
         self._tail = round(limits.tail_s / tick_s)  # ticks
         self._recent = RecentCommand(self._tail)
+        self._demanded = RecentCommand(self._tail)  # the same, but no rest ends it
         self._no_run_on = 0  # ticks that are left without run-on
         self.change_limits(limits)
         self._own_ramp = 0.0  # what ``ramp`` would be if nothing had been added
@@ -148,7 +151,8 @@ class OutputStage:
         # 1. Range
         recent.add(demand)
         recent_low, recent_high = recent.low, recent.high
-        if self._no_run_on > 0:
+        no_run_on = self._no_run_on > 0
+        if no_run_on:
             self._no_run_on -= 1
             recent_low, recent_high = min(demand, 0.0), max(demand, 0.0)
         low, high = allowed_range(demand, recent_low, recent_high, limits)
@@ -163,14 +167,15 @@ class OutputStage:
 
         # 3. Added velocity, and 4. ramp
         added, total = path + damping, own
+        if self.largest_added:
+            self._demanded.add(demand)
         if not added and self._own_ramp == self.ramp and not self._dropped_at:
             self.ramp = self._own_ramp = rate_limited(own, self.ramp, rise, fall)
         else:
             if not abs(path) <= 1.0:
                 raise ValueError(f"added velocity is {path}")
             largest = self.largest_added if added else 0.0
-            low, high = range_with_added(demand, recent_low, recent_high, own, largest)
-            low, high = max(low, -limits.maximum), min(high, limits.maximum)
+            low, high = self._range_with_added(demand, own, largest, no_run_on)
             target = own
             if added:
                 total = within(own + added, low, high, 0.0)
@@ -194,6 +199,20 @@ class OutputStage:
         if added:
             carry = self._carry + total - output.setpoint
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
+
+    def _range_with_added(
+        self, demand: float, own: float, largest: float, no_run_on: bool
+    ) -> tuple[float, float]:
+        """Range of the own and the added velocity together, see ``range_with_added``.
+
+        Without run-on they are neither faster than the joystick nor, in neutral, than ``largest``.
+        """
+        low, high, maximum = self._demanded.low, self._demanded.high, self.limits.maximum
+        if no_run_on:
+            low = demand if demand < 0.0 else max(low, -largest)
+            high = demand if demand > 0.0 else min(high, largest)
+        low, high = range_with_added(demand, low, high, own, largest)
+        return max(low, -maximum), min(high, maximum)
 
     def _with_carry(self, total: float, low: float, high: float) -> float:
         """Correct a velocity for what rounding has left out in the ticks before.
@@ -233,8 +252,10 @@ class OutputStage:
         self._no_run_on = self._tail
 
     def rest(self) -> None:
-        """Go to neutral at once, and forget all that was demanded or added."""
+        """Go to neutral at once, and forget all that may run on."""
         self._recent.clear()
+        if self.largest_added:
+            self._demanded.add(0.0)
         self._small.clear()
         output = self.output
         output.steps, output.setpoint, output.path, output.damping = 0, 0.0, 0.0, 0.0
@@ -244,6 +265,7 @@ class OutputStage:
     def hold(self, demand: float, ticks: int) -> None:
         """Count missed ticks, in which the demand held and the valve kept its output."""
         self._recent.age(ticks)
+        self._demanded.age(ticks)
         self._no_run_on -= ticks
         self._small.hold(demand, self.output.applied, ticks)
 

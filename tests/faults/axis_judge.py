@@ -171,7 +171,6 @@ class AxisJudge:
         self.commanded = low < 0.0 or high > 0.0
         if index < self._shaped_since + axis.tail:  # the filter does not run on yet
             low, high = min(0.0, self.command), max(0.0, self.command)
-        down, up = low < 0.0, high > 0.0
         if axis.allow_faster:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
@@ -181,11 +180,12 @@ class AxisJudge:
             high = high if self.command >= 0.0 else 0.0
         added = axis.largest_added and (before or self.commanded or slewing) and self.mode == FREE
         if added and not self.joystick.bypasses():
-            # Where its operator commands nothing and holds nothing against it, another one may.
-            if not down and self.command <= 0.0:
-                low = -axis.largest_added
-            if not up and self.command >= 0.0:
-                high = axis.largest_added
+            # Where its operator holds nothing against it, another one may, no faster than he did.
+            most = axis.largest_added
+            if self.command <= 0.0:
+                low = min(low, max(self._range[0] or -most, -most))
+            if self.command >= 0.0:
+                high = max(high, min(self._range[1] or most, most))
         self.low, self.high = max(low, -axis.maximum), min(high, axis.maximum)
 
     def _range_since(self, first: int, index: int) -> tuple[float, float]:
