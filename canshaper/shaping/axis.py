@@ -78,6 +78,7 @@ class Axis:
         self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
         self.output = self._stage.output
         self._added_time = AddedTime(0)
+        self._asked = False  # the motion asked this axis for something in the last tick
 
     @property
     def raw(self) -> int:
@@ -139,11 +140,13 @@ class Axis:
         states, stage = self._states, self._stage
         old = states.state
         sensor_damps = self.sensed is not None and self.sensed.weight > 0.0
-        damps_now = may_add = False
+        asked = damps_now = may_add = False
         if stage.largest_added and not joystick.bypass:
             commanded, moved = stage.commanded, self.output.steps != 0
             damps_now = damps and sensor_damps and not commanded
-            may_add = self._added_time.allows(added != 0.0 or damps_now, commanded, moved)
+            asked = added != 0.0 or damps_now
+            may_add = self._added_time.allows(asked, commanded, moved)
+        self._asked = asked
 
         at_rest = self.output.steps == 0 and not stage.commanded
         state = states.step(joystick, at_rest, may_add)
@@ -198,8 +201,7 @@ class Axis:
         demand = self._clamped_demand()
         self._states.hold(ticks)
         self._stage.hold(demand, ticks)
-        was_added, moved = self.output.added != 0.0, self.output.steps != 0
-        self._added_time.allows(was_added, self.commanded, moved, ticks)
+        self._added_time.allows(self._asked, self.commanded, self.output.steps != 0, ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
                 self._transfer.hold(demand)

@@ -63,11 +63,6 @@ class Output:
         """The part of the setpoint that drives the sway model."""
         return self.setpoint - self.path
 
-    @property
-    def added(self) -> float:
-        """All that is added."""
-        return self.path + self.damping
-
 
 class OutputStage:
     """Limits of one axis, and what they remember from one tick to the next.

@@ -79,3 +79,18 @@ def test_after_a_bypass_in_neutral_the_slower_of_both_counts(sign: float, demand
     for _ in range(5):
         axis.tick(CommandInput(sign * 0.05), sign * 0.8)
     assert sign * axis.sent == pytest.approx(0.05, abs=SLACK)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
+    sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
+    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis.allow_added(LARGEST, 10 * TICK_S)
+    axis.tick(CommandInput())
+    for _ in range(30):
+        axis.tick(CommandInput(), sign * 0.2)
+    assert axis.raw == 0
+    for _ in range(5):
+        axis.hold(2)
+        axis.tick(CommandInput(), sign * 0.2)
+        assert axis.raw == 0
