@@ -7,8 +7,9 @@ In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
 1. Range. The operator bounds the output: it is never faster than he demands now or demanded within
    the tail, and never against his joystick, unless the limits allow that. The reference is clamped
    to this range. For a tail after anti-sway was switched on in motion there is no run-on: the
-   output is never faster than he demands now. What the axis did without the filter is in the memory
-   and in the sway model of the filter, which would run it once more.
+   output is never faster than he demands now, and rests in neutral. What the axis did without the
+   filter is in the memory and in the sway model of the filter, which would run it once more, also
+   after a rest.
 2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
    of the frame. The axis makes one short movement of them.
 3. Added velocity. The motion of two axes may add to that, in a range of its own. It counts every
@@ -144,13 +145,12 @@ class OutputStage:
         rise, fall = self._rates
 
         # 1. Range
-        recent.add(demand)
-        recent_low, recent_high = recent.low, recent.high
         no_run_on = self._no_run_on > 0
         if no_run_on:
             self._no_run_on -= 1
-            recent_low, recent_high = min(demand, 0.0), max(demand, 0.0)
-        low, high = allowed_range(demand, recent_low, recent_high, limits)
+            recent.clear()
+        recent.add(demand)
+        low, high = allowed_range(demand, recent.low, recent.high, limits)
         own = within(reference, low, high, limits.minimum)
 
         # 2. Small strokes
@@ -255,7 +255,7 @@ class OutputStage:
         output = self.output
         output.steps, output.setpoint, output.path, output.damping = 0, 0.0, 0.0, 0.0
         self.ramp = self._own_ramp = self._carry = self._dropped_at = 0.0
-        self._no_run_on = 0
+        self._no_run_on -= 1
 
     def hold(self, demand: float, ticks: int) -> None:
         """Count missed ticks, in which the demand held and the valve kept its output."""

@@ -61,6 +61,31 @@ def test_for_a_tail_the_output_is_no_faster_than_the_joystick(name: str, seed: i
             assert low - rounding - EDGE <= axis.sent <= high + rounding + EDGE
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_what_did_not_run_on_does_not_run_later(name: str) -> None:
+    """Neither when the tail is over, nor with a touch of the joystick from rest."""
+    for runner in runners(name):
+        limits, rounding = unshaped(runner, random.Random(f"{name} {runner.bound.name} later"))
+        axis, tail = runner.axis, round(limits.tail_s / runner.period_s)
+        for command, ticks in ((0.7, tail // 2), (0.0, 40)):
+            for _ in range(ticks):
+                axis.tick(CommandInput(command))
+        for _ in range(2 * tail):  # the end of the tail is in these
+            axis.tick(CommandInput())
+            assert axis.raw == 0
+        unshaped(runner, random.Random(f"{name} {runner.bound.name} touch"))
+        for _ in range(round(1.0 / limits.fall_per_s / runner.period_s) + 2):
+            axis.tick(CommandInput())
+        assert axis.raw == 0
+        fall = limits.fall_per_s * runner.period_s
+        axis.tick(CommandInput(0.5))
+        before = axis.sent
+        for _ in range(tail // 2):
+            axis.tick(CommandInput())
+            assert abs(axis.sent) <= max(0.0, abs(before) - fall) + rounding + EDGE
+            before = axis.sent
+
+
 @pytest.mark.parametrize("missed", [0, 3])
 def test_after_the_tail_the_filter_runs_on_again(missed: int) -> None:
     runner = runners("forwarder-robust")[0]
