@@ -33,12 +33,17 @@ class Unprintable(Exception):
         raise RuntimeError
 
 
+NOTED = ValueError("a")
+NOTED.add_note("of 3")
+
+
 @pytest.mark.parametrize(
     ("error", "text"),
     [
         (ZeroDivisionError("a mistake on line 7"), "ZeroDivisionError: a mistake on line 7"),
         (KeyError(), "KeyError"),
         (ValueError("a\n  b"), "ValueError: a b"),
+        (NOTED, "ValueError: a of 3"),
         (ValueError("x" * 1000), "ValueError: " + "x" * 188),
         (Unprintable(), f"{__name__}.Unprintable: <exception str() failed>"),
     ],
