@@ -24,7 +24,8 @@ from canshaper.config.uncertainty import MEASURES
 from canshaper.controller.counters import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
-from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
+from canshaper.shaping.state_machine import TRANSITIONS
+from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
 from tools.marks import marked, with_sections
 

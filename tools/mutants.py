@@ -159,7 +159,7 @@ def source_of(key: str, path: Path) -> tuple[str, str]:
 
 
 def function_of(mutant: str) -> str:
-    """Name a function as Python does: canshaper.shaping.axis.xǁAxisǁ_go__mutmut_3 is Axis._go."""
+    """Name a function as Python does: canshaper.shaping.axis.xǁAxisǁact__mutmut_3 is Axis.act."""
     name = re.sub(r"__mutmut_\d+$", "", mutant)
     return re.sub(r"xǁ(\w+)ǁ", r"\1.", name).replace(".x_", ".")
 

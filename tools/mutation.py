@@ -41,7 +41,10 @@ TESTS = {
     "daemon": DAEMON,
     "bus": ["tests/bus"],
 }
-CORE = [f"canshaper.shaping.{name}" for name in ("axis", "limits", "state_machine", "transfer")]
+CORE = [
+    f"canshaper.shaping.{name}"
+    for name in ("axis", "limits", "output", "state_machine", "transfer")
+]
 CORE_TESTS = [
     "test_added*.py",
     "test_axis*.py",

@@ -179,15 +179,13 @@ class Controller:
             self._stood_still = False
             self._invalidate()
         overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
-        changed = []
+        changed = self._before_axes(now_ns, last, now) if missed or self.motions else []
         silent = self.silent_buses if self._protocols else NOWHERE
-        if missed or self.motions:
-            self._before_axes(now_ns, last, now)
         for name, runner, message, rule in self._turns:
             period = runner.period_ticks
             if now // period - last // period:
                 transition = runner.tick(now_ns, self._stop, overrun)
-                self.moves |= runner.axis.raw != 0
+                self.moves |= runner.axis.output.steps != 0
                 if rule is not None:
                     if (own := rule.own(now_ns)) is not None:
                         yield own
@@ -221,15 +219,23 @@ class Controller:
             yield from protocol.frames(now_ns)
             self.events += protocol.changes()
 
-    def _before_axes(self, now_ns: int, last: int, now: int) -> None:
-        """Axes have held their output for what was missed; what moves as one adds to them."""
+    def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisRunner]:
+        """Count missed ticks for every axis, then let the motions add to theirs.
+
+        Returns:
+            The axes whose state has changed: their filters failed in a missed tick.
+        """
+        changed = []
         if now > last + 1:
             self.counters.add(FrameFault.MISSED_DEADLINE, now - last - 1)
-            for runner in self.axes.values():
-                runner.hold(last, now)
+            for name, runner in self.axes.items():
+                if (transition := runner.hold(last, now)) is not None:
+                    self._changed(name, runner, transition)
+                    changed.append(runner)
         for motion in self.motions:
             if (event := motion.step(now_ns, last, now)) is not None:
                 self.events.append(event)
+        return changed
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
         """Let load state and operator choose filters, sensors show sway, and axes move as one."""

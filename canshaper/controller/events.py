@@ -28,7 +28,8 @@ class StateEvent:
     def text(self) -> str:
         """For the log."""
         t = self.transition
-        return f"axis={self.axis} state={t.new.name} from={t.old.name} reason={t.reason.name}"
+        text = f"axis={self.axis} state={t.new.name} from={t.old.name} reason={t.reason.name}"
+        return f"{text} error={t.error}" if t.error else text
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ class _Member:
         if axis.sway is not moving.sway:  # changed while it runs
             assert axis.sway is not None
             moving.follow(axis.sway)
-        moving.applied, moving.sent = axis.applied, axis.sent
+        moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
         moving.commanded, moving.able = axis.commanded, axis.state in ABLE
 
 

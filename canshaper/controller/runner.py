@@ -191,11 +191,14 @@ class AxisRunner:
             self._full_speed_m_s = config.sway.full_speed_m_s
         self.bound = replace(self.bound, config=config)
 
-    def hold(self, last: int, now: int) -> None:
-        """Deadlines were missed, from one number to another: the last output was held."""
+    def hold(self, last: int, now: int) -> Transition | None:
+        """Deadlines were missed, from one number to another: the last output was held.
+
+        Returns:
+            The change of state, where the filter failed in them; else None.
+        """
         passed = now // self.period_ticks - last // self.period_ticks
-        if passed > 1:
-            self.axis.hold(passed - 1)
+        return self.axis.hold(passed - 1) if passed > 1 else None
 
     def tick(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
@@ -222,18 +225,20 @@ class AxisRunner:
             # that one is lost, its return is no press.
             let_go = not command.enabled and command.fault is None
             enabled = not (let_go and fault is Reason.ENABLE_OFF)
-            command = CommandInput(fault=fault, enabled=enabled, reset=command.reset, trip=trip)
+            # The joystick stays known, where it is valid: it may be held against the run-on.
+            held, reset = command.command, command.reset
+            command = CommandInput(held, fault=fault, enabled=enabled, reset=reset, trip=trip)
         # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
         late = Reason.LOOP_OVERRUN if overrun and axis.state is not State.BYPASS_ON else None
         if late and command.enabled and command.fault is None:
-            command = CommandInput(fault=late, reset=command.reset, trip=command.trip)
+            command = command._replace(fault=late, bypass=False)
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
             axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
         transition = axis.act(command, self._added, damps=self._damps)
-        self._put(self.valve.raw, axis.raw)
+        self._put(self.valve.raw, axis.output.steps)
         return transition
 
     def put(self, steps: int) -> None:

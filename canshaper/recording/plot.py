@@ -66,7 +66,7 @@ _NUMBERS = (
     ("residual", "residual_deg", "°"),
     ("run-on", "run_on_s", " s"),
 )
-_EVENT = re.compile(r"axis=(\S+) state=(\S+) .*reason=(\S+)")
+_EVENT = re.compile(r"axis=(\S+) state=(\S+) .*?reason=(\S+)")
 _MOVES = 1e-6
 _LATE = 0.8  # of the time axis: a reason from here on ends where its state does
 

@@ -1,44 +1,45 @@
-"""How far an axis carries out a velocity that the motion of two axes adds to its own.
+"""What the motion of two axes may add to the velocity of one of them.
 
-Its operator answers for the axis only where he commands it; what is added beyond that is the other
-operator's, and has bounds of its own.
+The operator of an axis answers for its motion only where he commands it. What the motion adds
+beyond that is the other operator's doing, so it has bounds of its own: in speed
+(``range_with_added``), and in time (``AddedTime``).
 """
 
 
 def range_with_added(
-    command: float, recent_low: float, recent_high: float, target: float, largest: float
+    demand: float, recent_low: float, recent_high: float, own: float, largest: float
 ) -> tuple[float, float]:
-    """Range of the axis' own velocity and the added one together.
+    """Range of an axis' own velocity and the added one together.
 
-    Never against a joystick that is held, but as far as the own part may run on; never faster than
-    commanded within the tail in that direction. In a direction that no one commanded within the
-    tail and no joystick is held against, at most ``largest``.
+    - Against a joystick that is held: no further than the own velocity already runs on.
+    - In a direction that was commanded within the tail: no faster than commanded there.
+    - In a direction that no one commanded, with the joystick released: no faster than ``largest``.
 
     Args:
-        command: the operator's command now, [-1, 1].
-        recent_low: smallest command within the tail, 0 or negative.
-        recent_high: largest command within the tail, 0 or positive.
-        target: the axis' own velocity before the rates.
+        demand: the operator's demand now, [-1, 1].
+        recent_low: smallest demand within the tail, 0 or negative.
+        recent_high: largest demand within the tail, 0 or positive.
+        own: the axis' own velocity, before the ramp.
         largest: largest velocity that may be added where no one commanded.
 
     Returns:
-        (low, high) with low <= 0 <= high and low <= target <= high.
+        (low, high) with low <= 0 <= high and low <= own <= high.
     """
     low, high = recent_low, recent_high
-    if command > 0.0:
+    if demand > 0.0:
         low = 0.0
-    elif command < 0.0:
+    elif demand < 0.0:
         high = 0.0
     else:
         if low == 0.0:
             low = -largest
         if high == 0.0:
             high = largest
-    return (target if target < low else low), (target if target > high else high)
+    return (own if own < low else low), (own if own > high else high)
 
 
 class AddedTime:
-    """How long an axis that no one commands may be moved by what is added.
+    """How long a motion may move an axis that no one commands.
 
     Args:
         ticks: longest time in motion, in ticks of the axis.
@@ -49,17 +50,17 @@ class AddedTime:
     def __init__(self, ticks: int) -> None:
         self._ticks = self._left = ticks
 
-    def allowed(self, added: float, *, commanded: bool, moved: bool, ticks: int = 1) -> bool:
-        """Whether so much may be added in this tick.
+    def allows(self, asked: bool, commanded: bool, moved: bool, ticks: int = 1) -> bool:
+        """Count time, and say whether the motion may move the axis now.
 
         Args:
-            added: the velocity to add; with 0 the next motion begins.
-            commanded: the operator commanded this axis within the tail.
-            moved: the axis was moved in the last tick.
-            ticks: for how many ticks that was.
+            asked: the motion asks for it. When it does not, the axis gets its full time back.
+            commanded: the operator demanded motion within the tail. Then too.
+            moved: the valve was open. An axis that stands uses up no time.
+            ticks: how many ticks have passed.
         """
-        if commanded or not added:
+        if commanded or not asked:
             self._left = self._ticks
         elif moved:
             self._left -= ticks
-        return self._left > 0
+        return asked and self._left > 0

@@ -1,54 +1,59 @@
-"""One axis: filter and output limits, as its state machine allows.
+"""One axis: its state machine, its filter and its output stage, tick by tick.
 
-Sans-I/O: every tick takes the checked input of that moment and returns what the valve frame shall
-carry.
+How it works
+------------
+The axis does no I/O and reads no clock. In each tick its caller gives it the checked input, and
+reads from ``output`` what the valve frame shall carry:
+
+1. ``act`` finds the output. The state machine takes the input (``state_machine.py``); the filter
+   takes the operator's demand (``transfer.py``); the output stage bounds what the filter asks for
+   (``output.py``). The valve frame can leave now.
+2. ``advance`` lets the sway model swing with that output. It can wait until the frame has left.
+
+The filter may come from another package, and may raise anything. Then the axis trips: its valve
+gets neutral in the same tick, and the transition keeps the error.
 """
 
 import math
+import traceback
 from collections.abc import Callable
 
-from canshaper.shaping.added import AddedTime, range_with_added
-from canshaper.shaping.limits import (
-    OutputLimits,
-    RecentCommand,
-    allowed_range,
-    on_grid,
-    rate_limited,
-    within,
-)
+from canshaper.shaping.added import AddedTime
+from canshaper.shaping.limits import OutputLimits, within
+from canshaper.shaping.output import OutputStage
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper, spreads
-from canshaper.shaping.small_strokes import SmallStrokes
-from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, TRIPPED, StateMachine
+from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, STOPPING, TRIPPED, StateMachine
 from canshaper.shaping.states import MOVING, CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import BumplessTransfer
 
-# Missed ticks that are gone through one by one: after more of them nothing moves any more, and the
-# first neutral frame waits.
+# Missed ticks that the filter and the model go through at most: after so many of them nothing moves
+# any more, and the first neutral frame must not wait.
 MOST_HELD = 2000
-# Largest quantisation error of an added velocity that is carried, full speed times ticks.
-MOST_CARRY = 0.1
+# Longest text of an error, so that its event stays a line.
+MOST_TEXT = 200
 
 
 class Axis:
-    """State machine, filter and limits of one axis.
+    """State machine, filter and output stage of one axis.
 
     Args:
         tick_s: time between two calls of ``tick``.
         limits: output limits.
         sway: sway model, or None where the axis has none.
         shaper: the filter.
-        neutral_band: |joystick| up to which it counts as neutral.
+        neutral_band: largest |joystick| that counts as neutral.
         stop_s: longest duration of STOPPING.
-        grid_steps: raw steps of the valve frame from zero to full command.
+        grid_steps: steps of the valve frame from zero to full command.
 
     Attributes:
-        raw: what the valve frame carries now, in grid steps (deadband included).
-        sent: the velocity that gives, [-1, 1].
-        applied: what the sway model was driven by: ``sent`` without the added part.
-        command: the operator's command that was in force at the last tick, [-1, 1].
-        sensed: what a sway sensor makes of the swing, where there is one.
+        command: what the operator demanded in the last tick, [-1, 1].
+        output: what the axis sends, with its parts: one object, which every tick overwrites.
+        sway: the sway model.
+        sensed: what a sway sensor adds to the model, where there is a sensor.
+        error: how the filter has failed, see ``Transition``; empty unless it has while the axis
+            entered TRIPPED or was in it.
     """
 
     def __init__(
@@ -62,31 +67,33 @@ class Axis:
         stop_s: float = 2.0,
         grid_steps: int = 125,
     ) -> None:
-        self.raw = 0
-        self.sent = 0.0
-        self.applied = 0.0
         self.command = 0.0
         self.sway = sway
         self.sensed: SensedSway | None = None
-        self._largest_added = 0.0
-        self._added_time = AddedTime(0)
-        self._transfer = BumplessTransfer(shaper, tick_s)
-        self._small = SmallStrokes(limits, grid_steps, tick_s)
-        self._spreads = spreads(shaper)
+        self.error = ""
         self._tick_s = tick_s
-        self._limits = limits
         self._neutral_band = neutral_band
-        self._grid_steps = grid_steps
-        self._rise = limits.rise_per_s * tick_s
-        self._fall = limits.fall_per_s * tick_s
         self._states = StateMachine(neutral_band, max(1, round(stop_s / tick_s)))
-        self._recent = RecentCommand(round(limits.tail_s / tick_s))
-        self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
-        self._own = 0.0  # the same without what is added
-        self._added = 0.0
-        self._path = 0.0  # of what is added, the part that makes no swing
-        self._carry = 0.0  # quantisation error of an added velocity
-        self._dropped = 0.0  # the output as it was when the right to add was lost
+        self._transfer = BumplessTransfer(shaper, tick_s)
+        self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
+        self.output = self._stage.output
+        self._added_time = AddedTime(0)
+        self._asked = False  # the motion asked this axis for something in the last tick
+
+    @property
+    def raw(self) -> int:
+        """What the valve frame carries now, in steps of its grid (deadband included)."""
+        return self.output.steps
+
+    @property
+    def sent(self) -> float:
+        """The velocity that gives, [-1, 1] of full speed."""
+        return self.output.setpoint
+
+    @property
+    def applied(self) -> float:
+        """The part of it that drives the sway model."""
+        return self.output.applied
 
     @property
     def state(self) -> State:
@@ -95,21 +102,21 @@ class Axis:
 
     @property
     def reason(self) -> Reason:
-        """Why it is in that state."""
+        """Why the axis is in that state."""
         return self._states.reason
 
     @property
     def commanded(self) -> bool:
-        """Whether the operator asked for motion within the tail."""
-        return self._recent.low != 0.0 or self._recent.high != 0.0
+        """Whether the operator demanded motion within the tail."""
+        return self._stage.commanded
 
     @property
     def neutral(self) -> bool:
-        """Whether the axis is at rest in a state that cannot move without the operator."""
+        """Whether the valve gets neutral in this state, whatever the filter asks for."""
         return self._states.state not in MOVING
 
     def tick(self, joystick: CommandInput, added: float = 0.0) -> Transition | None:
-        """A whole tick: ``act`` and ``advance``."""
+        """Run a whole tick: ``act`` and ``advance``."""
         transition = self.act(joystick, added)
         self.advance()
         return transition
@@ -117,90 +124,97 @@ class Axis:
     def act(
         self, joystick: CommandInput, added: float, *, damps: bool = False
     ) -> Transition | None:
-        """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
+        """Take the input of this tick, and find the output.
 
         Args:
             joystick: the checked input.
-            added: velocity that the motion of two axes adds to this one, [-1, 1] of full speed.
-                It is carried out while this axis is enabled, its joystick valid, anti-sway on, as
-                ``range_with_added`` says. The sway model is not driven by it: it is there to cause
-                no swing, so the model swings with what is left for the axis itself. One that is no
-                velocity trips the axis.
-            damps: the motion of two axes makes this one swing: what its filter makes of a swing
-                that a trusted sensor shows is carried out too, within the same bounds.
+            added: velocity that the motion of two axes asks this axis to add, [-1, 1] of full
+                speed. The axis adds it while it is ACTIVE and anti-sway is on, and where no one
+                commands it, for a limited time. A value that is no velocity trips the axis.
+            damps: the other axis of the motion makes this one swing, and this one shall damp that.
+                It does so while a trusted sensor shows the swing and no one commands the axis.
 
         Returns:
-            The change of state of this tick, or None.
+            The change of state of this tick, or in TRIPPED the first error of the filter; or None.
         """
-        states = self._states
-        if damps:
-            damps = self.sensed is not None and self.sensed.weight > 0.0 and not self.commanded
-        if not self._largest_added or joystick.bypass or not self._may_add(added or damps):
-            added, damps = 0.0, False
+        states, stage = self._states, self._stage
         old = states.state
-        state = states.step(joystick, added or damps, self.raw == 0 and not self.commanded)
+        sensor_damps = self.sensed is not None and self.sensed.weight > 0.0
+        asked = damps_now = may_add = False
+        if stage.largest_added and not joystick.bypass:
+            commanded, moved = stage.commanded, self.output.steps != 0
+            damps_now = damps and sensor_damps and not commanded
+            asked = added != 0.0 or damps_now
+            may_add = self._added_time.allows(asked, commanded, moved)
+        self._asked = asked
+
+        at_rest = self.output.steps == 0 and not stage.commanded
+        state = states.step(joystick, at_rest, may_add)
         if state is not old:
-            self._transfer.entered(state, old)
-            if state is not ACTIVE:
-                self._small.lose()
-        if state is not ACTIVE:
-            added, damps = 0.0, False
-        command = 0.0
+            self._entered(state, old)
         try:
+            demand = path = damping = 0.0
             if state is ACTIVE or state is BYPASS_ON:
-                command = joystick.command
-                size = abs(command)
-                if size <= self._neutral_band:
-                    command = 0.0
-                elif not size < math.inf:  # it would stay in the memory of a filter
-                    raise ValueError(f"command is {command}")
-            self.command = command
-            unlimited = self._transfer.unlimited(
-                command, self._limits.maximum, self._limited, added
-            )
-            self._path = added
-            if damps and not command:
-                added += within(unlimited, -self._largest_added, self._largest_added, 0.0)
+                size = abs(joystick.command)
+                if size > self._neutral_band:
+                    demand = joystick.command
+                if not size < math.inf:  # it would stay in the memory of the filter
+                    raise ValueError(f"command is {joystick.command}")
+            elif state is STOPPING and abs(joystick.command) > self._neutral_band:
+                stage.stop_against(joystick.command)
+            self.command = demand
+
+            adds = may_add and state is ACTIVE
+            if adds:
+                path = added
+            reference = self._transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
+            if adds and damps_now and not demand:
+                damping = within(reference, -stage.largest_added, stage.largest_added, 0.0)
+
             if state in MOVING:
-                self._drive(command, unlimited, added)
+                stage.drive(demand, reference, path, damping, sensor_damps)
             else:
-                self._rest()
-        except Exception:  # a filter of another package may raise anything
-            state = self._output_invalid()
-        self.applied = self.sent - self._path
+                stage.rest()
+                self._transfer.rest()
+        except Exception as error:  # a filter of another package may raise anything
+            return self._output_invalid(old, error)
         return None if state is old else Transition(old, state, states.reason)
 
     def advance(self) -> None:
-        """Let the model swing with what ``act`` found: work that can wait until that is sent."""
+        """Let the sway model swing with the output of ``act``."""
+        output = self.output
+        applied = output.setpoint - output.path
         if self.sway is not None:
-            self.sway.step(self.applied)
+            self.sway.step(applied)
         if self.sensed is not None:
-            self.sensed.step(self.applied, self.command, self._path)
+            self.sensed.step(applied, self.command, output.path)
 
-    def hold(self, ticks: int) -> None:
-        """Count that the last output was held for ``ticks`` missed ticks.
+    def hold(self, ticks: int) -> Transition | None:
+        """Count missed ticks, in which the valve kept the last output.
 
-        They count as time: late ticks lengthen neither the run-on nor a stop, and the filter saw
-        the last command in each of them. Only the rates do not catch up.
+        They count as time: they lengthen neither the run-on nor a stop, and in each of them the
+        filter saw the last demand. Only the ramp does not catch up.
+
+        Returns:
+            As ``act``; the state changes only if the filter failed.
         """
-        self._recent.age(ticks)
+        demand = self._clamped_demand()
         self._states.hold(ticks)
-        self._may_add(self._added, ticks)
-        maximum = self._limits.maximum
-        command = within(self.command, -maximum, maximum, 0.0)
-        self._small.hold(command, self.applied, ticks)
+        self._stage.hold(demand, ticks)
+        self._added_time.allows(self._asked, self.commanded, self.output.steps != 0, ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
-                self._transfer.hold(command)
+                self._transfer.hold(demand)
                 self.advance()
-        except Exception:  # the same
-            self._output_invalid()
+        except Exception as error:  # as in ``act``
+            return self._output_invalid(self._states.state, error)
+        return None
 
     def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
-        """Change sway data and filter, also in motion, without a jump of the output.
+        """Change sway data and filter, in motion too, without a jump of the output.
 
-        The model keeps the physical swing; the difference that the new filter makes at this
-        moment fades with ``transfer.BLEND_S``.
+        The model keeps the physical swing. The difference between both filters at this moment fades
+        with ``transfer.BLEND_S``.
 
         Raises:
             ValueError: mode or filter does not suit the tick; model and filter stay as they were.
@@ -210,127 +224,81 @@ class Axis:
         else:
             sway = self.sway.retuned(mode, self.applied)
         shaper = shaper_for(sway)
-        maximum = self._limits.maximum
-        self._transfer.replace(shaper, within(self.command, -maximum, maximum, 0.0))
-        self._spreads = spreads(shaper)
-        self._small.lose()
+        self._transfer.replace(shaper, self._clamped_demand())
+        self._stage.change_filter(spreads=spreads(shaper))
         self.sway = sway
         if self.sensed is not None:
             self.sensed.retune(sway)
 
     def allow_added(self, largest: float, time_s: float) -> None:
-        """Let a motion add velocity where no one commands this axis.
+        """Let a motion of two axes move this one where no one commands it.
 
         Args:
             largest: largest |velocity|, 0 to 1.
             time_s: longest time in motion.
         """
-        self._largest_added = largest
+        self._stage.largest_added = largest
         self._added_time = AddedTime(round(time_s / self._tick_s))
+
+    def drop_added(self) -> None:
+        """End what was added at once: the motion has lost the right to move this axis."""
+        self._stage.drop_added()
 
     def restore(self, state: State, reason: Reason) -> None:
         """Continue in a state in which the output is neutral, see ``StateMachine``."""
         self._states.restore(state, reason)
 
-    def drop_added(self) -> None:
-        """Who adds has lost the right to: nothing of it makes the next output faster."""
-        self._dropped = limited = self._limited
-        self._limited = within(self._own, min(0.0, limited), max(0.0, limited), 0.0)
-        self._carry = 0.0
-
     def limit(self, limits: OutputLimits) -> None:
-        """Change maximum and rates; of what the run-on remembers nothing changes.
+        """Change maximum and rates, but not the tail.
 
         Raises:
-            ValueError: the axis is in motion, where more speed would come without the operator.
+            ValueError: the axis moves, and would become faster without its operator.
         """
         if not self.neutral:
             raise ValueError("limits change in neutral only")
-        self._limits = limits
-        self._small = SmallStrokes(limits, self._grid_steps, self._tick_s)
-        self._rise = limits.rise_per_s * self._tick_s
-        self._fall = limits.fall_per_s * self._tick_s
+        self._stage.change_limits(limits)
 
-    def _may_add(self, added: float, ticks: int = 1) -> bool:
-        return self._added_time.allowed(
-            added, commanded=self.commanded, moved=self.raw != 0, ticks=ticks
-        )
+    def _entered(self, state: State, old: State) -> None:
+        self._transfer.entered(state, old)
+        if state is not ACTIVE:
+            self._stage.interrupt_stroke()
+        elif old is BYPASS_ON:
+            self._stage.start_filter()
+        if old is TRIPPED:
+            self.error = ""
 
-    def _drive(self, command: float, unlimited: float, added: float) -> None:
-        limits, recent = self._limits, self._recent
-        recent.add(command)
-        low, high = allowed_range(command, recent.low, recent.high, limits)
-        target = within(unlimited, low, high, limits.minimum)
-        if self._spreads:
-            one_movement = self._small.output(command, self.applied, target, low, high)
-            if self.sensed is None or not self.sensed.weight:  # else there is swing to damp
-                target = one_movement
-        self._added = added
-        if added or self._own != self._limited or self._dropped:
-            low, high, unrounded = self._drive_both(command, target)
-        else:
-            unrounded = 0.0
-            self._limited = self._own = rate_limited(target, self._limited, self._rise, self._fall)
-        limited = self._limited
-        if limited < low:  # on its way back in
-            low = limited
-        elif limited > high:
-            high = limited
-        self.raw, self.sent = on_grid(
-            limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
-        )
-        if added:
-            self._carry = within(self._carry + unrounded - self.sent, -MOST_CARRY, MOST_CARRY, 0.0)
+    def _clamped_demand(self) -> float:
+        """The last demand as the filter got it."""
+        maximum = self._stage.limits.maximum
+        return within(self.command, -maximum, maximum, 0.0)
 
-    def _drive_both(self, command: float, target: float) -> tuple[float, float, float]:
-        """Limit the axis' own part and the added one together.
+    def _output_invalid(self, old: State, error: Exception) -> Transition | None:
+        """Trip for an error of the filter. The model starts again: its state may be spoilt too.
 
-        The added part is a path to be run, slow and with few steps of the grid: the quantisation
-        error is carried and made up for while the axis moves anyway, never by a twitch: by one step
-        of the grid in a tick.
-
-        Returns:
-            The range that both have (low, high), and what they are together before the rates.
+        In TRIPPED the first reason stays, and the first error is reported, not one in each tick.
         """
-        if not abs(self._path) <= 1.0:
-            raise ValueError(f"added velocity is {self._path}")
-        limits, recent, maximum = self._limits, self._recent, self._limits.maximum
-        self._own = rate_limited(target, self._own, self._rise, self._fall)
-        largest = self._largest_added if self._added else 0.0
-        low, high = range_with_added(command, recent.low, recent.high, target, largest)
-        low, high = max(low, -maximum), min(high, maximum)
-        reference = unrounded = target
-        if self._added:
-            step = 1.0 / self._grid_steps
-            unrounded = within(target + self._added, low, high, 0.0)
-            reference = within(unrounded, low, high, max(limits.minimum, 0.5 * step))
-            if reference:
-                reference = within(
-                    reference + within(self._carry, -step, step, 0.0), low, high, 0.0
-                )
-        self._limited = rate_limited(reference, self._limited, self._rise, self._fall)
-        if self._dropped * self._limited < 0.0:  # the way to the other side begins at rest
-            self._limited = 0.0
-        self._dropped = 0.0
-        return low, high, unrounded
-
-    def _rest(self) -> None:
-        self._recent.clear()
-        self._small.clear()
+        state = self._states.state
+        if state is not TRIPPED:
+            self._states.trip(Reason.OUTPUT_INVALID)
+            self._transfer.entered(TRIPPED, state)
         self._transfer.rest()
-        self._limited = self._own = self.sent = 0.0
-        self._added = self._path = self._carry = self._dropped = 0.0
-        self.raw = 0
-
-    def _output_invalid(self) -> State:
-        """Neutral and latched, with a model that starts again: its state cannot be trusted."""
-        old = self._states.state
-        self._states.trip(Reason.OUTPUT_INVALID)
-        self._transfer.entered(TRIPPED, old)
-        self._rest()
+        self._stage.rest()
         self.command = 0.0
         if self.sway is not None:
             self.sway.angle = self.sway.rate = 0.0
         if self.sensed is not None:
             self.sensed.restart()
-        return TRIPPED
+        if self.error:
+            return None
+        self.error = _described(error)
+        return Transition(old, TRIPPED, self._states.reason, self.error)
+
+
+def _described(error: Exception) -> str:
+    """Put an error into one line: ``ZeroDivisionError: division by zero (moving_average.py:7)``.
+
+    The place is the innermost line of Python that raised it.
+    """
+    text = " ".join("".join(traceback.format_exception_only(error)).split())[:MOST_TEXT]
+    *_, (frame, line) = traceback.walk_tb(error.__traceback__)
+    return f"{text} ({frame.f_code.co_filename}:{line})"

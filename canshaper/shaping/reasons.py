@@ -177,9 +177,10 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "report 2 or 3 for a moment",
     ),
     Reason.OUTPUT_INVALID: ReasonText(
-        "the filter gave no number",
-        "the filter gave no number",
-        "report it; reset",
+        "the filter failed",
+        "the filter raised an error, or gave no number; log and black box name the exception with "
+        "its text, file and line",
+        "report it with the log to the author of the filter; reset",
         fmi=12,
     ),
     Reason.SEND_FAILED: ReasonText(

@@ -1,12 +1,14 @@
-"""States of an axis, the reasons for which it enters them, and what it decides on.
+"""The words of the state machine: states, reasons, reactions, its input and its transitions.
 
-The numbers are those of the status frames; ``make generate`` writes the tables of the DBC files and
-of docs/states.md from here. A new reason is a member here and a row in ``reasons.py``. State names
-follow OPC 40020-1 where it has one (BYPASS_ON).
+Status frames carry the numbers of states and reasons; ``make generate`` copies both enumerations
+into the DBC files and into docs/states.md. To add a reason, add a member here and a row in
+``reasons.py``. Its number decides the reaction, and with it the rows of the table in
+``state_machine.py`` that accept it. State names follow OPC 40020-1 where that standard has one
+(BYPASS_ON).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
@@ -77,59 +79,37 @@ class Reaction(Enum):
     """What a reason does to an axis."""
 
     NONE = "none"
-    """It is no fault: what the driver does, or what is waited for."""
+    """The reason is no fault: the driver did something, or the axis waits for something."""
     SHAPED_STOP = "shaped stop"
-    """At rest the axis stays there; in motion it stops through the filter, bounded in time."""
+    """An axis at rest stays at rest; a moving one stops through its filter, in bounded time."""
     NEUTRAL = "neutral at once"
-    """Neutral in the same tick, and latched."""
+    """The output is neutral in the same tick, and latched."""
 
 
-REACTION_OF: Mapping[Reason, Reaction] = {
-    reason: Reaction.NEUTRAL
-    if reason >= Reason.ENABLE_LOST
-    else (Reaction.SHAPED_STOP if reason >= Reason.JOYSTICK_TIMEOUT else Reaction.NONE)
-    for reason in Reason
-}
-"""By the number, so that who reads a log knows it without this table."""
+def _reaction(reason: Reason) -> Reaction:
+    if reason >= Reason.ENABLE_LOST:
+        return Reaction.NEUTRAL
+    if reason >= Reason.JOYSTICK_TIMEOUT:
+        return Reaction.SHAPED_STOP
+    return Reaction.NONE
 
-_STOPS, _TRIPS = (
-    frozenset(reason for reason, reaction in REACTION_OF.items() if reaction is kind)
-    for kind in (Reaction.SHAPED_STOP, Reaction.NEUTRAL)
-)
 
-TRANSITIONS: Mapping[tuple[State, State], frozenset[Reason]] = {
-    (State.NEUTRAL_WAIT, State.READY): frozenset({Reason.JOYSTICK_NEUTRAL}),
-    (State.READY, State.NEUTRAL_WAIT): _STOPS | {Reason.ENABLE_OFF, Reason.EMERGENCY_STOP_LOST},
-    (State.READY, State.ACTIVE): frozenset({Reason.JOYSTICK_MOVED, Reason.COMPENSATING}),
-    (State.READY, State.BYPASS_ON): frozenset({Reason.BYPASS_REQUESTED}),
-    (State.ACTIVE, State.READY): frozenset({Reason.AT_REST}),
-    (State.ACTIVE, State.BYPASS_ON): frozenset({Reason.BYPASS_REQUESTED}),
-    (State.ACTIVE, State.STOPPING): _STOPS,
-    (State.BYPASS_ON, State.READY): frozenset({Reason.AT_REST}),
-    (State.BYPASS_ON, State.ACTIVE): frozenset({Reason.BYPASS_RELEASED}),
-    (State.BYPASS_ON, State.STOPPING): _STOPS - {Reason.LOOP_OVERRUN},
-    (State.STOPPING, State.NEUTRAL_WAIT): frozenset({Reason.STOP_DONE}),
-    (State.NEUTRAL_WAIT, State.TRIPPED): _TRIPS - {Reason.ENABLE_LOST},
-    (State.READY, State.TRIPPED): _TRIPS - {Reason.ENABLE_LOST},
-    (State.ACTIVE, State.TRIPPED): _TRIPS,
-    (State.BYPASS_ON, State.TRIPPED): _TRIPS,
-    (State.STOPPING, State.TRIPPED): _TRIPS,
-    (State.TRIPPED, State.NEUTRAL_WAIT): frozenset({Reason.RESET}),
-}
-"""Every change of state with the reasons for which it may happen; there is no other."""
+REACTION_OF: Mapping[Reason, Reaction] = {reason: _reaction(reason) for reason in Reason}
+"""The number decides, so that a reader of a log knows the reaction without this table."""
 
 
 class CommandInput(NamedTuple):
-    """Input of one axis at one tick, already checked.
+    """The checked input of one axis in one tick.
 
     Attributes:
-        command: joystick in [-1, 1]; not looked at while ``fault`` is set.
-        fault: why the joystick (or a switch it needs) cannot be used; None when fresh and valid.
-        enabled: False where the enable switch was seen released, be the joystick as it may: a lost
-            frame gives a shaped stop, and a released switch an immediate one.
-        bypass: the operator asks for the unshaped joystick.
-        reset: reset switch (its rising edge counts); True while it is not known.
-        trip: a cause for neutral at once that is there now.
+        command: position of the joystick, [-1, 1]; 0 where it is not valid.
+        fault: why the axis must not follow the joystick: it is not valid, or a switch, a node or
+            the loop has a fault; None: it may.
+        enabled: False when a message showed the enable switch released. A lost message leaves it
+            True: lost is a fault, which stops the axis through its filter; released trips it.
+        bypass: the operator has switched anti-sway off.
+        reset: the reset switch is pressed; only its rising edge counts. True while it is unknown.
+        trip: a cause for neutral at once that is present in this tick.
     """
 
     command: float = 0.0
@@ -142,8 +122,17 @@ class CommandInput(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A change of state, with its reason."""
+    """One change of state.
+
+    Attributes:
+        old: the state before.
+        new: the state after.
+        reason: why it changed.
+        error: the exception of a filter in one line: its type, its text, and file and line that
+            raised it; empty where none did. Two transitions that differ in it only are equal.
+    """
 
     old: State
     new: State
     reason: Reason
+    error: str = field(default="", compare=False)

@@ -9,10 +9,12 @@ from collections.abc import Mapping, Sequence
 from canshaper.codec.frame import Frame
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
+from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.design.lockstep import LockStep, driven_part
 from canshaper.errors import DriveError
 from canshaper.machine.deployment import Deployment
+from canshaper.studio.view import Report
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.parameters import changed_parameters
@@ -29,6 +31,7 @@ class InProcessCrane:
         deployment: the machine; its buses are not opened.
         changes: parameters of the crane, NAME=VALUE.
         crane: which one it is, where the deployment has several; the others' joysticks stand still.
+        report: called with the error of a filter: a status frame carries only its reason.
 
     Attributes:
         cycle_ms: of the joysticks.
@@ -38,7 +41,11 @@ class InProcessCrane:
     """
 
     def __init__(
-        self, deployment: Deployment, changes: Sequence[str] = (), crane: str | None = None
+        self,
+        deployment: Deployment,
+        changes: Sequence[str] = (),
+        crane: str | None = None,
+        report: Report = lambda _text, _level: None,
     ) -> None:
         driven = driven_part(deployment, crane)
         self._hand = _HeldHand(driven)
@@ -46,6 +53,7 @@ class InProcessCrane:
         self.cycle_ms = self._hand.hand.cycle_ms
         self._controller = Controller(deployment)
         self._adjuster = Adjuster(self._controller)
+        self._report = report
         self._frames: list[Frame] = []
         try:
             plant = PlantNode(driven, changed_parameters([*changes]))
@@ -67,6 +75,9 @@ class InProcessCrane:
         self._due_ms += min(passed_ms, MOST_MS)
         while self._lock_step.time_ms < self._due_ms:
             self._lock_step.step()
+        for event in self._controller.events:
+            if isinstance(event, StateEvent) and event.transition.error:
+                self._report(event.text, "bad")
         self._controller.events.clear()
         frames, self._frames = self._frames, []
         return frames

@@ -132,7 +132,7 @@ class Stage:
         if crane:
             self.sliders, self.positions = {}, {}
         for name in (SHAPED, RAW):
-            here = InProcessCrane(whole, changes, crane)
+            here = InProcessCrane(whole, changes, crane, self._reporter(name))
             self._cycle_ms = here.cycle_ms
             self.cranes[name] = Seen(self._view(name), {}, shaped=name == SHAPED, here=here)
 

@@ -23,6 +23,7 @@ from canshaper.controller.guarded import Guarded
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
+from canshaper.shaping.shapers.gff import Gff
 from tests.blackbox.driven import SECOND, TRIP, drive
 from tests.daemon.bench import Bench, FakePort
 from tests.rigs.forwarder import ROOT
@@ -65,6 +66,29 @@ def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path)
     about = json.loads(zipfile.ZipFile(box).read("about.json"))
     assert about["why"].startswith("axis=slew state=TRIPPED")
     assert about["identity"] == load_deployment(tmp_path / "machine.yaml").identity.lines()
+
+
+def test_the_error_of_a_filter_is_in_log_and_file(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    step = Gff.step
+
+    def fails(self: Gff, command: float) -> float:
+        if command > 0.6:
+            raise ZeroDivisionError("line 7")
+        return step(self, command)
+
+    monkeypatch.setattr(Gff, "step", fails)
+    drive(bench, tmp_path / ".", TRIP, trips=())
+    line = fails.__code__.co_firstlineno + 2
+    text = "axis=slew state=TRIPPED from=ACTIVE reason=OUTPUT_INVALID"
+    text += f" error=ZeroDivisionError: line 7 ({__file__}:{line})"
+    assert text in [record.getMessage() for record in caplog.records]
+    path = tmp_path / "machine-0001.zip"
+    assert json.loads(zipfile.ZipFile(path).read("about.json"))["why"] == text
+    assert "state=TRIPPED from=ACTIVE reason=OUTPUT_INVALID error=ZeroDivisionError" in replayed(
+        path, "--verify", "--out", tmp_path / "out"
+    )
 
 
 @pytest.mark.slow

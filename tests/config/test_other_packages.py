@@ -40,6 +40,31 @@ print(json.dumps({
 }))
 """
 
+# A filter with a mistake, and what the daemon's log says of it.
+BROKEN = """
+from canshaper import Parameter, ShaperKind
+
+
+class Broken:
+    def step(self, command):
+        raise ZeroDivisionError("line 7")
+
+
+WINDOW = Parameter("window_s", 0.1, 10, "s", "time")
+KIND = ShaperKind(
+    "moving_average", "Fails.", lambda tick_s, window_s: Broken(), lambda mode, s: {}, (WINDOW,)
+)
+"""
+EVENTS = """
+import sys
+from canshaper import Controller, load_machine
+
+controller = Controller(load_machine(sys.argv[1]))
+for tick in range(3):
+    controller.tick(tick * 20_000_000)
+print(*(event.text for event in controller.events()), sep="\\n")
+"""
+
 
 def installed(directory: Path, module: str = "") -> Path:
     """The package of the example as an installer leaves it; with another module on request."""
@@ -131,6 +156,19 @@ def test_it_drives_an_axis_and_is_compared(packages: Path, tmp_path: Path) -> No
     assert result["same"]
     assert len(result["residual_deg"]) == 1
     assert result["residual_deg"][0] < 2.0  # off leaves 16 degrees
+
+
+@pytest.mark.slow
+def test_an_error_of_it_is_named_with_its_text_and_place(tmp_path: Path) -> None:
+    packages, (file, _) = installed(tmp_path / "packages", BROKEN), machine(tmp_path, "2")
+    done = python(packages, "-c", EVENTS, str(file))
+    assert done.returncode == 0, done.stderr
+    place = f"{packages / 'moving_average.py'}:7"
+    assert BROKEN.splitlines()[6].strip().startswith("raise ZeroDivisionError")
+    assert done.stdout.splitlines() == [
+        "axis=slew state=TRIPPED from=NEUTRAL_WAIT reason=OUTPUT_INVALID"
+        f" error=ZeroDivisionError: line 7 ({place})"
+    ]
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.shaping.states import State
+from canshaper.shaping.states import Reason, State
 from tests.rigs.forwarder import SLOW_VALVE, Rig
 
 STOP_TICKS = 100  # stop_s of the shipped slew axis
@@ -223,3 +223,20 @@ def test_a_slow_valve_stops_with_its_next_frame(changed_rig: Make) -> None:
     overrun(rig, Slew=1000)
     rig.run(10, Slew=1000)
     assert (rig.state(), rig.reason()) == (State.STOPPING, "LOOP_OVERRUN")
+
+
+@pytest.mark.parametrize("interlock", [False, True])
+def test_a_joystick_held_the_other_way_ends_the_run_on(rig: Rig, interlock: bool) -> None:
+    """In a stop that the joystick is no cause of: it is valid all the time."""
+    rig.moving()
+    runner = rig.controller.axes["slew"]
+    if interlock:
+        runner.add_interlock(lambda neutral, now_ns: Reason.NODE_FAULT)
+        late(rig, Slew=-1000)
+    else:
+        overrun(rig, Slew=1000)
+    assert rig.state() is State.STOPPING
+    limits = runner.bound.config.limits
+    for _ in range(round(1.0 / (limits.fall_per_s * runner.period_s)) + 1):
+        late(rig, Slew=-1000)
+    assert runner.axis.raw == 0

@@ -45,7 +45,7 @@ class Watched(Axis):
 
     def move(self, command: float, applied: float) -> None:
         """In motion, with this command and output."""
-        self.at_rest, self.command, self.applied = False, command, applied
+        self.at_rest, self.command, self.output.setpoint = False, command, applied
 
 
 class Choice:

@@ -11,7 +11,8 @@ import pytest
 from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
-from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
+from canshaper.shaping.state_machine import TRANSITIONS
+from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
 
 ROOT = Path(__file__).parents[2]

@@ -21,7 +21,7 @@ WAIT, FREE, STOP, LATCHED = range(4)
 WORDS = ("WAIT", "FREE", "STOP", "LATCHED")
 
 # States of the status message by their numbers in docs/states.md, and the ways between them.
-STOPPING, TRIPPED = 4, 5
+BYPASS_ON, STOPPING, TRIPPED = 3, 4, 5
 MOVING = (2, 3, STOPPING)
 WAYS = {(0, 1), (1, 0), (1, 2), (1, 3), (2, 3), (3, 2), (2, 1), (3, 1), (2, 4), (3, 4), (4, 0)}
 WAYS |= {(state, TRIPPED) for state in range(5)} | {(TRIPPED, 0)}
@@ -57,6 +57,7 @@ class AxisJudge:
         self._range = (0.0, 0.0)
         self._end = 0
         self._releases = self._presses = self._resets = self._disagreements = 0
+        self._shaped_since = -(10**9)  # deadline at which anti-sway was switched on in motion
         self._steady = 0
         self._count: int | None = None
         self._must_fall = False
@@ -120,7 +121,9 @@ class AxisJudge:
         self._pressed_again = released and pressed and self.mode == LATCHED
         if self.mode == began == WAIT and centred:
             self._go(FREE)
-        self._bounds(index, deflection if abs(deflection) > axis.band else 0.0, slewing)
+        deflection = deflection if abs(deflection) > axis.band else 0.0
+        self._stop_against(deflection)
+        self._bounds(index, deflection, slewing)
         stops = began == FREE and self.mode == STOP and bool(faults)
         self._must_fall = stops and self._settled()
 
@@ -143,6 +146,13 @@ class AxisJudge:
             self._range = (0.0, 0.0)
             self.commanded = False
 
+    def _stop_against(self, deflection: float) -> None:
+        """Nothing runs on against a valid joystick, unless a reversal may."""
+        shaped = self.axis.brake_shaped or self.axis.allow_reverse
+        if self.mode == STOP and deflection * self.raw < 0.0 and not shaped:
+            self._commands.clear()
+            self._range = (0.0, 0.0)
+
     def _settled(self) -> bool:
         return self._steady >= SETTLED.get(self.axis.filter, SETTLED_OTHERS)
 
@@ -156,7 +166,11 @@ class AxisJudge:
             return
         self.command = command if self.mode == FREE else 0.0
         low, high = self._range = self._range_since(index - axis.tail, index)
+        if self.state == BYPASS_ON and not self.joystick.bypasses():
+            self._shaped_since = index
         self.commanded = low < 0.0 or high > 0.0
+        if index < self._shaped_since + axis.tail:  # the filter does not run on yet
+            low, high = min(0.0, self.command), max(0.0, self.command)
         if axis.allow_faster:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
@@ -166,11 +180,12 @@ class AxisJudge:
             high = high if self.command >= 0.0 else 0.0
         added = axis.largest_added and (before or self.commanded or slewing) and self.mode == FREE
         if added and not self.joystick.bypasses():
-            # Where its operator commands nothing and holds nothing against it, another one may.
-            if not self._range[0] and self.command <= 0.0:
-                low = -axis.largest_added
-            if not self._range[1] and self.command >= 0.0:
-                high = axis.largest_added
+            # Where its operator holds nothing against it, another one may, no faster than he did.
+            most = axis.largest_added
+            if self.command <= 0.0:
+                low = min(low, max(self._range[0] or -most, -most))
+            if self.command >= 0.0:
+                high = max(high, min(self._range[1] or most, most))
         self.low, self.high = max(low, -axis.maximum), min(high, axis.maximum)
 
     def _range_since(self, first: int, index: int) -> tuple[float, float]:

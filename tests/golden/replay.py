@@ -12,7 +12,7 @@ from canshaper.codec.signals import FieldSet
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment
-from canshaper.shaping import axis
+from canshaper.shaping import output
 from canshaper.shaping.limits import with_deadband
 
 HERE = Path(__file__).parent
@@ -132,7 +132,7 @@ class Margin:
 def margin() -> Iterator[Margin]:
     """Watch the values that are rounded: the valve's steps and the fields of the status."""
     least = Margin()
-    on_grid, raw = axis.on_grid, FieldSet.raw
+    on_grid, raw = output.on_grid, FieldSet.raw
 
     def watched_grid(
         velocity: float, low: float, high: float, deadband: float, steps: int, **curve: Any
@@ -145,8 +145,8 @@ def margin() -> Iterator[Margin]:
         least.see((value - signal.offset) / signal.scale, f"{self.message.name}.{name}")
         return raw(self, name, value)
 
-    axis.on_grid, FieldSet.raw = watched_grid, watched_raw  # type: ignore[method-assign]
+    output.on_grid, FieldSet.raw = watched_grid, watched_raw  # type: ignore[method-assign]
     try:
         yield least
     finally:
-        axis.on_grid, FieldSet.raw = on_grid, raw  # type: ignore[method-assign]
+        output.on_grid, FieldSet.raw = on_grid, raw  # type: ignore[method-assign]

@@ -100,20 +100,19 @@ def test_whatever_is_asked_speed_and_time_are_bounded(
                 assert one.sent == 0.0
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_time_counts_while_the_axis_is_moved_and_no_one_commands_it(sign: float) -> None:
+def test_time_counts_while_the_axis_is_moved_and_no_one_commands_it() -> None:
     time = AddedTime(3)
     for _ in range(5):  # below what the valve can: it does not move
-        assert time.allowed(sign, commanded=False, moved=False)
-    assert time.allowed(sign, commanded=False, moved=True)
-    assert time.allowed(sign, commanded=False, moved=True)
-    assert not time.allowed(sign, commanded=False, moved=True)
-    assert not time.allowed(sign, commanded=False, moved=False)
-    assert time.allowed(sign, commanded=True, moved=True)
-    assert time.allowed(sign, commanded=False, moved=True, ticks=2)
-    assert not time.allowed(sign, commanded=False, moved=True)
-    assert time.allowed(0.0, commanded=False, moved=True)
-    assert time.allowed(sign, commanded=False, moved=True)
+        assert time.allows(asked=True, commanded=False, moved=False)
+    assert time.allows(asked=True, commanded=False, moved=True)
+    assert time.allows(asked=True, commanded=False, moved=True)
+    assert not time.allows(asked=True, commanded=False, moved=True)
+    assert not time.allows(asked=True, commanded=False, moved=False)
+    assert time.allows(asked=True, commanded=True, moved=True)
+    assert time.allows(asked=True, commanded=False, moved=True, ticks=2)
+    assert not time.allows(asked=True, commanded=False, moved=True)
+    assert not time.allows(asked=False, commanded=False, moved=True)
+    assert time.allows(asked=True, commanded=False, moved=True)
 
 
 def test_when_the_time_is_over_it_falls_and_rests() -> None:

@@ -47,7 +47,7 @@ def test_what_was_added_beyond_the_own_part_stops_before_the_own_part_begins(sig
     for _ in range(20):
         axis.tick(CommandInput(), -sign)
     assert sign * axis.sent < -0.5
-    assert sign * axis._own > 0.1
+    assert sign * axis._stage._own_ramp > 0.1
     axis.drop_added()
     seen = []
     for _ in range(3):
@@ -66,7 +66,7 @@ def test_what_was_added_to_an_own_part_that_turns_ends_before_the_other_side(sig
             axis.tick(CommandInput(sign * command))
     for _ in range(27):
         axis.tick(CommandInput(), -sign * 0.1)
-    assert sign * axis._own == pytest.approx(-0.04)
+    assert sign * axis._stage._own_ramp == pytest.approx(-0.04)
     assert sign * axis.sent == pytest.approx(-0.14, abs=SLACK)
     axis.drop_added()
     axis.tick(CommandInput())
@@ -148,7 +148,7 @@ def test_what_falls_is_rounded_to_the_side_of_rest(sign: float) -> None:
         axis.tick(CommandInput(), sign * 0.2)
     for _ in range(40):
         axis.tick(CommandInput())
-        assert 0.0 <= sign * axis.sent <= sign * axis._limited + 1e-12
+        assert 0.0 <= sign * axis.sent <= sign * axis._stage.ramp + 1e-12
 
 
 def test_with_anti_sway_off_nothing_that_is_added_begins_a_motion() -> None:

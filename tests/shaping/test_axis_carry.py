@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from canshaper.shaping.axis import MOST_CARRY, Axis
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.output import MOST_CARRY
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State

@@ -41,9 +41,9 @@ class Watched:
         return [arguments for called, arguments in self.calls if called == name]
 
 
-def watched(axis: Axis, part: str) -> Watched:
-    watch = Watched(getattr(axis, part))
-    setattr(axis, part, watch)
+def watched(whole: Any, part: str) -> Watched:
+    watch = Watched(getattr(whole, part))
+    setattr(whole, part, watch)
     return watch
 
 
@@ -56,7 +56,7 @@ def moving() -> Axis:
 
 
 def test_a_stop_loses_the_travel_of_small_strokes(moving: Axis) -> None:
-    small = watched(moving, "_small")
+    small = watched(moving._stage, "_small")
     moving.tick(OUT)
     assert not small.with_name("lose")
     moving.tick(CommandInput(enabled=False))
@@ -64,14 +64,14 @@ def test_a_stop_loses_the_travel_of_small_strokes(moving: Axis) -> None:
 
 
 def test_missed_ticks_count_for_small_strokes(moving: Axis) -> None:
-    small = watched(moving, "_small")
+    small = watched(moving._stage, "_small")
     moving.hold(5)
     ((command, applied, ticks),) = small.with_name("hold")
     assert (command, applied, ticks) == (moving.command, moving.applied, 5)
 
 
 def test_a_retune_loses_the_travel_of_small_strokes(moving: Axis) -> None:
-    small = watched(moving, "_small")
+    small = watched(moving._stage, "_small")
     moving.retune(SwayMode(2.4, 0.05), lambda sway: Gff(sway, (-5.0, -4.0)))
     assert small.with_name("lose")
 

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
+import pytest
+
 from canshaper.machine.deployment import Deployment
+from canshaper.shaping.shapers.gff import Gff
 from canshaper.shipped import deployment_path
 from canshaper.studio.crane import copied
 from canshaper.studio.in_process import MOST_MS, InProcessCrane
@@ -39,3 +42,19 @@ def test_a_computer_that_was_asleep_goes_on_where_it_was(tmp_path: Path) -> None
     commands(crane, REST, 50)
     frames = [f for f in crane.frames(SLEWING, 3_600_000) if f.can_id == 0x200]
     assert len(frames) == MOST_MS // 20
+
+
+def test_the_error_of_a_filter_is_reported_with_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(self: Gff, command: float) -> float:
+        raise ZeroDivisionError("line 7")
+
+    reported: list[tuple[str, str]] = []
+    crane = InProcessCrane(deployment(tmp_path), report=lambda *event: reported.append(event))
+    monkeypatch.setattr(Gff, "step", fails)
+    commands(crane, REST, 5)
+    text, level = reported[0]
+    line = fails.__code__.co_firstlineno + 1
+    assert text.endswith(f"ZeroDivisionError: line 7 ({__file__}:{line})")
+    assert (level, len(reported)) == ("bad", 2)  # one for each axis with this filter

@@ -1,0 +1,280 @@
+"""The output stage of one axis: from the reference of its filter to the steps of its valve frame.
+
+How it works
+------------
+In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
+
+1. Range. The operator bounds the output: it is never faster than he demands now or demanded within
+   the tail, and never against his joystick, unless the limits allow that. The reference is clamped
+   to this range. For a tail after anti-sway was switched on in motion there is no run-on: the
+   output is never faster than he demands now, and rests in neutral. What the axis did without the
+   filter is in the memory and in the sway model of the filter, which would run it once more, also
+   after a rest.
+2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
+   of the frame. The axis makes one short movement of them.
+3. Added velocity. The motion of two axes may add to that, in a range of its own. It counts every
+   demand within the tail, also one before a stop or a trip, after which nothing of it runs on.
+4. Ramp. The output changes by at most the rise or the fall of the axis.
+5. Grid. The output is rounded to steps of the frame, never out of the range.
+
+Two ramps run side by side. ``ramp`` is the output, with all that is added. ``_own_ramp`` is what
+the output would be if nothing had been added: it is where the output goes at once when the motion
+loses the right to add. Once nothing is added and both have met, one computation does for both.
+"""
+
+from dataclasses import dataclass
+
+from canshaper.shaping.added import range_with_added
+from canshaper.shaping.limits import (
+    OutputLimits,
+    RecentCommand,
+    allowed_range,
+    on_grid,
+    rate_limited,
+    within,
+)
+from canshaper.shaping.small_strokes import SmallStrokes
+
+# Largest quantisation error of an added velocity that is carried, full speed times ticks.
+MOST_CARRY = 0.1
+
+
+@dataclass(slots=True)
+class Output:
+    """What an axis sends in one tick, and what of it is added for the sake of another axis.
+
+    Velocities are fractions of full speed, [-1, 1].
+
+    Attributes:
+        steps: what the valve frame carries, in steps of its grid, deadband included.
+        setpoint: the velocity that these steps give.
+        path: velocity that the motion of two axes adds to keep the grapple on its path. It causes
+            no swing, so the sway model is not driven by it.
+        damping: velocity that is added to damp the swing which the other axis has caused. It is
+            meant to move the grapple, so the sway model is driven by it.
+    """
+
+    steps: int = 0
+    setpoint: float = 0.0
+    path: float = 0.0
+    damping: float = 0.0
+
+    @property
+    def applied(self) -> float:
+        """The part of the setpoint that drives the sway model."""
+        return self.setpoint - self.path
+
+
+class OutputStage:
+    """Limits of one axis, and what they remember from one tick to the next.
+
+    Args:
+        limits: limits of the axis.
+        grid_steps: steps of the valve frame from zero to full command.
+        tick_s: time between two ticks.
+        spreads: whether the filter spreads the demand over time, see ``Shaper``.
+
+    Attributes:
+        limits: limits of the axis.
+        output: the output of the last tick: one object, which every tick overwrites.
+        ramp: the velocity of the last tick before it was rounded. If the ramp went on from the
+            rounded one, it would stick on a coarse grid.
+        largest_added: largest |velocity| that the motion of two axes may give to this axis while no
+            one commands it; 0 where it may add nothing.
+    """
+
+    __slots__ = (
+        "_carry",
+        "_demanded",
+        "_dropped_at",
+        "_grid_steps",
+        "_no_run_on",
+        "_own_ramp",
+        "_rates",
+        "_recent",
+        "_small",
+        "_spreads",
+        "_tail",
+        "_tick_s",
+        "largest_added",
+        "limits",
+        "output",
+        "ramp",
+    )
+
+    def __init__(
+        self, limits: OutputLimits, grid_steps: int, tick_s: float, *, spreads: bool
+    ) -> None:
+        self.output = Output()
+        self.ramp = 0.0
+        self.largest_added = 0.0
+        self._grid_steps = grid_steps
+        self._tick_s = tick_s
+        self._spreads = spreads
+        self._tail = round(limits.tail_s / tick_s)  # ticks
+        self._recent = RecentCommand(self._tail)
+        self._demanded = RecentCommand(self._tail)  # the same, but no rest ends it
+        self._no_run_on = 0  # ticks that are left without run-on
+        self.change_limits(limits)
+        self._own_ramp = 0.0  # what ``ramp`` would be if nothing had been added
+        self._carry = 0.0  # what rounding has left out of an added velocity, summed up
+        self._dropped_at = 0.0  # ``ramp`` when the right to add was lost, until the next tick
+
+    @property
+    def commanded(self) -> bool:
+        """Whether the operator demanded motion within the tail."""
+        return self._recent.low != 0.0 or self._recent.high != 0.0
+
+    def drive(
+        self, demand: float, reference: float, path: float, damping: float, sensor_damps: bool
+    ) -> None:
+        """Find the output of one tick of a moving axis.
+
+        Args:
+            demand: velocity that the operator demands.
+            reference: velocity that the filter asks for; it may be anything.
+            path: velocity that is added for the path, see ``Output``.
+            damping: velocity that is added for damping, see ``Output``.
+            sensor_damps: a trusted sensor shows the swing, and the filter damps it. That takes more
+                than the one movement of a small stroke.
+
+        Raises:
+            ValueError: the reference is no number, or the added velocity is no velocity.
+        """
+        limits, recent, output = self.limits, self._recent, self.output
+        rise, fall = self._rates
+
+        # 1. Range
+        no_run_on = self._no_run_on > 0
+        if no_run_on:
+            self._no_run_on -= 1
+            recent.clear()
+        recent.add(demand)
+        low, high = allowed_range(demand, recent.low, recent.high, limits)
+        own = within(reference, low, high, limits.minimum)
+
+        # 2. Small strokes
+        if self._spreads:
+            applied = output.setpoint - output.path
+            movement = self._small.output(demand, applied, own, low, high)
+            if not sensor_damps:
+                own = movement
+
+        # 3. Added velocity, and 4. ramp
+        added, total = path + damping, own
+        if self.largest_added:
+            self._demanded.add(demand)
+        if not added and self._own_ramp == self.ramp and not self._dropped_at:
+            self.ramp = self._own_ramp = rate_limited(own, self.ramp, rise, fall)
+        else:
+            if not abs(path) <= 1.0:
+                raise ValueError(f"added velocity is {path}")
+            largest = self.largest_added if added else 0.0
+            low, high = self._range_with_added(demand, own, largest, no_run_on)
+            target = own
+            if added:
+                total = within(own + added, low, high, 0.0)
+                target = self._with_carry(total, low, high)
+            self._own_ramp = rate_limited(own, self._own_ramp, rise, fall)
+            self.ramp = rate_limited(target, self.ramp, rise, fall)
+            if self._dropped_at * self.ramp < 0.0:  # the way to the other side begins at rest
+                self.ramp = 0.0
+            self._dropped_at = 0.0
+
+        # 5. Grid
+        ramp = self.ramp
+        if ramp < low:  # the range has become smaller, and the ramp is on its way back into it
+            low = ramp
+        elif ramp > high:
+            high = ramp
+        output.path, output.damping = path, damping
+        output.steps, output.setpoint = on_grid(
+            ramp, low, high, limits.deadband, self._grid_steps, curve=limits.curve
+        )
+        if added:
+            carry = self._carry + total - output.setpoint
+            self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
+
+    def _range_with_added(
+        self, demand: float, own: float, largest: float, no_run_on: bool
+    ) -> tuple[float, float]:
+        """Range of the own and the added velocity together, see ``range_with_added``.
+
+        Without run-on they are neither faster than the joystick nor, in neutral, than ``largest``.
+        """
+        low, high, maximum = self._demanded.low, self._demanded.high, self.limits.maximum
+        if no_run_on:
+            low = demand if demand < 0.0 else max(low, -largest)
+            high = demand if demand > 0.0 else min(high, largest)
+        low, high = range_with_added(demand, low, high, own, largest)
+        return max(low, -maximum), min(high, maximum)
+
+    def _with_carry(self, total: float, low: float, high: float) -> float:
+        """Correct a velocity for what rounding has left out in the ticks before.
+
+        An added velocity is slow: a few steps of the grid, or less than one. What rounding leaves
+        out of it is carried, and corrected in the next ticks by at most one step in each. The carry
+        starts no movement: the operator would see a twitch.
+
+        Args:
+            total: the axis' own velocity and the added one together, within the range.
+            low: lower end of the range.
+            high: upper end of the range.
+        """
+        step = 1.0 / self._grid_steps
+        target = within(total, low, high, max(self.limits.minimum, 0.5 * step))
+        if target:
+            target = within(target + within(self._carry, -step, step, 0.0), low, high, 0.0)
+        return target
+
+    def drop_added(self) -> None:
+        """Go back to the axis' own ramp at once, but never faster and not to the other side."""
+        self._dropped_at = ramp = self.ramp
+        self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
+        self._carry = 0.0
+
+    def stop_against(self, held: float) -> None:
+        """End the run-on of a stop by the fall, where the joystick is held against it.
+
+        After a reversal the limits may let the output run on; then they do so here.
+        """
+        limits = self.limits
+        if held * self.ramp < 0.0 and not (limits.brake_shaped or limits.allow_reverse):
+            self._recent.clear()
+
+    def start_filter(self) -> None:
+        """Anti-sway was switched on in motion: nothing runs on for a tail, see the prologue."""
+        self._no_run_on = self._tail
+
+    def rest(self) -> None:
+        """Go to neutral at once, and forget all that may run on."""
+        self._recent.clear()
+        if self.largest_added:
+            self._demanded.add(0.0)
+        self._small.clear()
+        output = self.output
+        output.steps, output.setpoint, output.path, output.damping = 0, 0.0, 0.0, 0.0
+        self.ramp = self._own_ramp = self._carry = self._dropped_at = 0.0
+        self._no_run_on -= 1
+
+    def hold(self, demand: float, ticks: int) -> None:
+        """Count missed ticks, in which the demand held and the valve kept its output."""
+        self._recent.age(ticks)
+        self._demanded.age(ticks)
+        self._no_run_on -= ticks
+        self._small.hold(demand, self.output.applied, ticks)
+
+    def change_limits(self, limits: OutputLimits) -> None:
+        """Take other limits, at rest. Demands within the tail still count."""
+        self.limits = limits
+        self._rates = limits.rise_per_s * self._tick_s, limits.fall_per_s * self._tick_s
+        self._small = SmallStrokes(limits, self._grid_steps, self._tick_s)
+
+    def change_filter(self, *, spreads: bool) -> None:
+        """Go on with another filter. A stroke under way belongs to the old one."""
+        self._spreads = spreads
+        self._small.lose()
+
+    def interrupt_stroke(self) -> None:
+        """Treat no stroke as small until the axis rests: the filter no longer shapes it."""
+        self._small.lose()

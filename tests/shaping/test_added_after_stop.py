@@ -1,0 +1,96 @@
+"""How fast the motion may move an axis after a stop: the demand of before still counts."""
+
+import pytest
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.states import CommandInput, Reason, State
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+TICK_S, TAIL = 0.02, 50
+DEMAND, LARGEST = 0.09, 0.25
+SLACK = 0.5 / 125
+LIMITS = OutputLimits(tail_s=TAIL * TICK_S, rise_per_s=10.0, fall_per_s=10.0)
+TRIP = CommandInput(enabled=False)
+LOST = CommandInput(fault=Reason.JOYSTICK_TIMEOUT)
+
+
+def stopped(sign: float, stop: CommandInput) -> Axis:
+    """Demanded once, stopped with the next tick, and ready again in the fourth one after it."""
+    sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
+    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off(), stop_s=2 * TICK_S)
+    axis.allow_added(LARGEST, 6.0)
+    for joystick in (CommandInput(), CommandInput(sign * DEMAND), stop, stop):
+        axis.tick(joystick)
+    axis.tick(CommandInput())
+    axis.tick(CommandInput())
+    assert axis.state is State.READY
+    assert not axis.commanded
+    return axis
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("stop", [TRIP, LOST])
+def test_in_the_direction_of_the_demand_no_faster_until_the_tail_is_over(
+    sign: float, stop: CommandInput
+) -> None:
+    axis = stopped(sign, stop)
+    for _ in range(TAIL - 4):
+        axis.tick(CommandInput(), sign * 0.5)
+        assert sign * axis.sent <= DEMAND + SLACK
+    assert sign * axis.sent == pytest.approx(DEMAND, abs=2 * SLACK)
+    axis.tick(CommandInput(), sign * 0.5)
+    assert sign * axis.sent > DEMAND + SLACK
+    for _ in range(5):
+        axis.tick(CommandInput(), sign * 0.5)
+        assert sign * axis.sent <= LARGEST + SLACK
+    assert sign * axis.sent == pytest.approx(LARGEST, abs=2 * SLACK)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("stop", [TRIP, LOST])
+def test_in_the_other_direction_up_to_the_largest_at_once(sign: float, stop: CommandInput) -> None:
+    axis = stopped(sign, stop)
+    for _ in range(5):
+        axis.tick(CommandInput(), sign * -0.5)
+    assert sign * axis.sent == pytest.approx(-LARGEST, abs=SLACK)
+
+
+def test_missed_ticks_count_towards_the_tail() -> None:
+    axis = stopped(1.0, TRIP)
+    axis.hold(TAIL)
+    axis.tick(CommandInput(), 0.5)
+    assert axis.sent > DEMAND + SLACK
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("demand", [0.1, 0.6])
+def test_after_a_bypass_in_neutral_the_slower_of_both_counts(sign: float, demand: float) -> None:
+    sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
+    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis.allow_added(LARGEST, 6.0)
+    for joystick in (CommandInput(), *[CommandInput(sign * demand, bypass=True)] * 10):
+        axis.tick(joystick)
+    for _ in range(20):
+        axis.tick(CommandInput(), sign * 0.8)
+    assert sign * axis.sent == pytest.approx(min(demand, LARGEST), abs=2 * SLACK)
+    axis.tick(CommandInput(sign * 0.05), sign * 0.8)
+    for _ in range(5):
+        axis.tick(CommandInput(sign * 0.05), sign * 0.8)
+    assert sign * axis.sent == pytest.approx(0.05, abs=SLACK)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
+    sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
+    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis.allow_added(LARGEST, 10 * TICK_S)
+    axis.tick(CommandInput())
+    for _ in range(30):
+        axis.tick(CommandInput(), sign * 0.2)
+    assert axis.raw == 0
+    for _ in range(5):
+        axis.hold(2)
+        axis.tick(CommandInput(), sign * 0.2)
+        assert axis.raw == 0
