@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from canshaper.codec.codecs import Chosen, JoystickCodec, Sender
 from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, Protection
-from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.signals import VelocitySignal, named_fault
 from canshaper.codec.valve import ValveCodec, ValveMessage
 from canshaper.errors import WrongLengthError
 from canshaper.shaping.states import Reason
@@ -177,10 +177,12 @@ def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
         "Fast",
     ],
 )
-def test_ordinary_words_are_no_errors(name: str) -> None:
+def test_ordinary_words_say_no_error_but_their_values_are_no_velocities(name: str) -> None:
     text = DBC.replace('50 "SNA"', f'50 "{name}"')
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Joystick")
-    assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == 0.5
+    assert named_fault(name) is None
+    velocity = VelocitySignal.of(signal(message, "Plain"))
+    assert velocity.read({"Plain": 50}) == Reason.JOYSTICK_ERROR
 
 
 @pytest.mark.parametrize(
