@@ -276,7 +276,9 @@ class GuardedJoystick(GuardedInput):
                         axis.forbid()
             if len(self._unread) == MOST_UNREAD:
                 self.read()
-        self.received_ns = now_ns
+        # A stamp that lies back makes no frame before it older: the stop for it begins now.
+        before_ns = self.received_ns
+        self.received_ns = now_ns if now_ns > before_ns else before_ns
 
     def read(self) -> None:
         """Read the commands of the frames that came since this was called last."""
