@@ -9,6 +9,7 @@
      |    +-- WrongBusError         it is another device than the deployment names
      |    +-- WrongDeviceError      so is an interface
      |    +-- GatewayError          the kernel's gateway refuses
+     +-- InternalError          a part of the program raised what it should not
      +-- ControlError           a running daemon cannot be reached, or refuses
      +-- NodeError              so with a node of CANopen that is to be set
      +-- WrongLengthError       a frame is shorter or longer than its message
@@ -62,6 +63,10 @@ class Problem:
 
 class CanshaperError(Exception):
     """The root of all."""
+
+
+class InternalError(CanshaperError):
+    """A part of the program raised what it should not; every valve was sent neutral."""
 
 
 class ConfigError(CanshaperError):
@@ -181,3 +186,11 @@ class IdentificationError(MeasurementError, ValueError):
 
 class CalibrationError(MeasurementError):
     """The measurement makes no curve of a valve; says why and what to do."""
+
+
+def raised(error: BaseException) -> str:
+    """Type, text and place of an exception, in one line."""
+    text, at = " ".join(f"{type(error).__name__}: {error}".split()), error.__traceback__
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    return f"{text} at {at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at else text

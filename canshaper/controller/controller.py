@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.counters import Counters
-from canshaper.controller.events import FeedbackEvent, StateEvent
+from canshaper.controller.events import FeedbackEvent, OutputFaultEvent, StateEvent
 from canshaper.controller.inputs import MachineInputs, received_by
 from canshaper.controller.motion import motion_runners
 from canshaper.controller.outputs import ValveOutputs
@@ -203,6 +203,9 @@ class Controller:
     def _changed(self, name: str, runner: AxisRunner, transition: Transition) -> None:
         """An axis has another state; one that trips is no longer moved by another, nor moves it."""
         self.events.append(StateEvent(name, transition))
+        if runner.fault:
+            self.events.append(OutputFaultEvent(name, runner.fault))
+            runner.fault = ""
         if transition.new is State.TRIPPED:
             for motion in self.motions:
                 motion.on_trip(runner)

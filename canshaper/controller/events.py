@@ -125,3 +125,16 @@ class RefusalEvent:
         """For the log."""
         bus, can_id, _, data = self.frame
         return f"output=refused bus={bus} id={can_id:#x} data={data.hex()} {self.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFaultEvent:
+    """What an axis computed is no setpoint."""
+
+    axis: str
+    why: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"axis={self.axis} output=invalid {self.why}"

@@ -7,6 +7,7 @@ from typing import Self
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import AxisConfig
 from canshaper.controller.sets import SetChooser
+from canshaper.errors import raised
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
@@ -38,6 +39,7 @@ class AxisRunner:
         period_ticks, period_s: time between two commands to its valve.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
+        fault: what was wrong with the last setpoint that could not be encoded; for the log.
         chooser: which sway data and filter are in force, where there is a choice.
     """
 
@@ -67,6 +69,7 @@ class AxisRunner:
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.add_velocity(0.0, damps=False)
         self.alone = False
+        self.fault = ""
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
         self._radius: ValueInput | None = None
@@ -221,8 +224,15 @@ class AxisRunner:
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
             axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
+        state = axis.state
         transition = axis.act(command, self._added, damps=self._damps)
-        self._put(axis.raw)
+        try:
+            self._put(axis.raw)
+        except Exception as error:  # nothing of it is left in the message
+            self.fault = raised(error)
+            axis.invalidate()
+            self._put(axis.raw)
+            transition = Transition(state, axis.state, axis.reason)
         return transition
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:

@@ -166,7 +166,7 @@ class Axis:
             else:
                 self._rest()
         except Exception:  # a filter of another package may raise anything
-            state = self._output_invalid()
+            state = self.invalidate()
         self.applied = self.sent - self._path
         return None if state is old else Transition(old, state, states.reason)
 
@@ -194,7 +194,7 @@ class Axis:
                 self._transfer.hold(command)
                 self.advance()
         except Exception:  # the same
-            self._output_invalid()
+            self.invalidate()
 
     def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
         """Change sway data and filter, also in motion, without a jump of the output.
@@ -322,13 +322,13 @@ class Axis:
         self._added = self._path = self._carry = self._dropped = 0.0
         self.raw = 0
 
-    def _output_invalid(self) -> State:
+    def invalidate(self) -> State:
         """Neutral and latched, with a model that starts again: its state cannot be trusted."""
         old = self._states.state
         self._states.trip(Reason.OUTPUT_INVALID)
         self._transfer.entered(TRIPPED, old)
         self._rest()
-        self.command = 0.0
+        self.command = self.applied = 0.0
         if self.sway is not None:
             self.sway.angle = self.sway.rate = 0.0
         if self.sensed is not None:
