@@ -9,6 +9,7 @@
      |    +-- WrongBusError         it is another device than the deployment names
      |    +-- WrongDeviceError      so is an interface
      |    +-- GatewayError          the kernel's gateway refuses
+     +-- InternalError          a part of the program raised what it should not
      +-- ControlError           a running daemon cannot be reached, or refuses
      +-- NodeError              so with a node of CANopen that is to be set
      +-- PageMessageError       what a page sent is no message
@@ -29,12 +30,14 @@ Those about data (``UsageError``, ``LogError``, ``DesignError``, ``Identificatio
 ``PageMessageError``) are ``ValueError`` too.
 """
 
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 # Of one file, and of one problem: a person reads no more.
 MOST_PROBLEMS = 100
 MOST_LETTERS = 2000
+MOST_OF_RAISED = 200  # of an exception of another package
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,10 @@ class Problem:
 
 class CanshaperError(Exception):
     """The root of all."""
+
+
+class InternalError(CanshaperError):
+    """A part of the program raised what it should not; every valve was sent neutral."""
 
 
 class ConfigError(CanshaperError):
@@ -176,3 +183,16 @@ class IdentificationError(MeasurementError, ValueError):
 
 class CalibrationError(MeasurementError):
     """The measurement makes no curve of a valve; says why and what to do."""
+
+
+def raised(error: BaseException) -> str:
+    """Put an exception into one line: ``ZeroDivisionError: division by zero (filter.py:7)``.
+
+    The place is the innermost line of Python that raised it.
+    """
+    text = " ".join("".join(traceback.format_exception_only(error)).split())[:MOST_OF_RAISED]
+    places = list(traceback.walk_tb(error.__traceback__))
+    if not places:
+        return text
+    frame, line = places[-1]
+    return f"{text} ({frame.f_code.co_filename}:{line})"

@@ -122,6 +122,10 @@ class BlackBox:
         return {"tried": self._done, "fault": self._fault, "folder": str(self._folder or ""),
                 "waits": waits}  # fmt: skip
 
+    def failed(self, why: str) -> None:
+        """The program failed: what is recorded so far is written at the end."""
+        self._why = why
+
     def close(self) -> None:
         """The daemon ends, with every valve neutral: what is to be written is written now."""
         self._flush()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from canshaper.cli.answers import MOST_OFFERED, NONE, ask, name, one, period_ms, whole
 from canshaper.cli.common import echo
 from canshaper.cli.node_questions import Nodes
-from canshaper.cli.scaling_questions import command_scaling, valve_scaling
+from canshaper.cli.scaling_questions import code_meanings, command_scaling, valve_scaling
 from canshaper.cli.swing_questions import sensor_of, slewing_of, swing_of
 from canshaper.errors import UsageError
 
@@ -40,6 +40,8 @@ def add_axes(
         sender, signal = valve
         cycle = sender.cycle_time or period_ms(sender.name)
         scaling, of_valve = command_scaling(command, message), valve_scaling(signal)
+        back = [s for s in message.signals if s.name == scaling.negative]
+        codes = {n: m for s in (command, *back) for n, m in code_meanings(s, scaling).items()}
         timeout_ms = _timeout(axis, cycle, nodes.timer_ms(sender.name))
         cia408 = nodes.cia408(sender.name)
         status = suggest.status_of(others, axis)
@@ -66,6 +68,7 @@ def add_axes(
                 None if sender.cycle_time else cycle,
                 cia408,
                 None if cia408 else nodes.supervised(sender.name),
+                codes,
             )
         )
 

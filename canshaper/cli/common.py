@@ -18,6 +18,7 @@ from canshaper.errors import (
     CalibrationError,
     ConfigError,
     ControlError,
+    InternalError,
     NodeError,
     Problem,
     UsageError,
@@ -33,6 +34,7 @@ EXIT_WRONG = 2  # of a file, an option, or what is not installed
 EXIT_INTERRUPTED = 130  # by SIGINT, as a shell has it
 # What ends a command with another code.
 EXITS: dict[type[Exception], int] = {
+    InternalError: 1,
     ControlError: 1,
     CalibrationError: 1,
     NodeError: 1,

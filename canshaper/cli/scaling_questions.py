@@ -52,6 +52,23 @@ def valve_scaling(signal: "Signal") -> "FirstScaling":
     return _around_zero(signal) if suggest.two_sided(signal) else _around_middle(signal)
 
 
+def code_meanings(signal: "Signal", scaling: "FirstScaling | None" = None) -> dict[str, str]:
+    """Which values of a signal that the DBC names are measurements, where it does not say it."""
+    from canshaper.config.schema import Scaling
+    from canshaper.machine.corrections import Correction, scaled
+    from canshaper.machine.named_codes import is_guess
+
+    if scaling:
+        given = Scaling(full=scaling.full, zero=scaling.zero, invert=scaling.invert)
+        signal = scaled(signal, Correction(given, bool(scaling.flags or scaling.negative)))
+    kinds, meanings = ["fault", "value"], {}
+    for raw, name in (signal.choices or {}).items():
+        if is_guess(signal, raw, str(name)):
+            text = f'  {signal.name}: {raw} is "{name}", of {", ".join(kinds)}'
+            meanings[str(name)] = ask(text, one(kinds), "fault")
+    return meanings
+
+
 def _around_zero(signal: "Signal") -> "FirstScaling":
     from canshaper.config.first import FirstScaling
 

@@ -4,6 +4,7 @@ import re
 from typing import TYPE_CHECKING
 
 from canshaper.cli.answers import MOST_OFFERED, NONE, ask, confirmed, number, one
+from canshaper.cli.scaling_questions import code_meanings
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
@@ -68,7 +69,8 @@ def sensor_of(
     least, most = limits(SwaySensor, "timeout_ms")
     timeout_ms = int(min(max(SENSOR_CYCLES * (message.cycle_time or 0), least), most))
     if (signal.unit or "").endswith("/s"):
-        return FirstSensor(message.name, signal.name, "rate", timeout_ms)
+        codes = code_meanings(signal)
+        return FirstSensor(message.name, signal.name, "rate", timeout_ms, codes=codes)
     text = "    angle in the joint, or inclination against the vertical"
     kind = ask(text, one(["angle", "inclination"]), "angle")
     fusion_s = None
@@ -76,7 +78,8 @@ def sensor_of(
         shortest, longest = LEAST_FUSION * swing_s, limits(SwaySensor, "fusion_s")[1]
         text = "    time constant with which accelerations correct its gyro, s (its data sheet)"
         fusion_s = ask(text, number(shortest, longest), f"{max(5.0, shortest):.2g}")
-    return FirstSensor(message.name, signal.name, kind, timeout_ms, fusion_s)
+    codes = code_meanings(signal)
+    return FirstSensor(message.name, signal.name, kind, timeout_ms, fusion_s, codes=codes)
 
 
 def slewing_of(axis: str) -> "FirstSlewing | None":
@@ -132,4 +135,7 @@ def motion_of(axes: "list[FirstAxis]", others: "list[Message]") -> "FirstMotion 
         return FirstMotion(slew, near_far)
     text = f"Measured radius of the tip, of {', '.join(radii[:MOST_OFFERED])}, - for none"
     radius = ask(text, one([*radii, NONE]), radii[0])
-    return FirstMotion(slew, near_far, None if radius == NONE else radius)
+    if radius == NONE:
+        return FirstMotion(slew, near_far)
+    signals = {f"{message.name}.{s.name}": s for message in others for s in message.signals}
+    return FirstMotion(slew, near_far, radius, code_meanings(signals[radius]))

@@ -7,7 +7,7 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.frame import Frame, new_frame
 from canshaper.codec.protection import Protection
 from canshaper.codec.sent import Sender, SentMessage
-from canshaper.codec.signals import raw_limits, special_codes
+from canshaper.codec.signals import named_fault, raw_limits
 
 
 class RewrittenMessage(SentMessage):
@@ -98,7 +98,8 @@ class RewritingSender(Sender):
 def _at_rest(signal: Signal, start: Any) -> Any:
     """Raw value that asks for nothing: the start value, and no velocity but 0."""
     low, high = signal.minimum, signal.maximum
-    if low is None or high is None or not low < 0 < high or start in special_codes(signal):
+    name = str((signal.choices or {}).get(start, ""))
+    if low is None or high is None or not low < 0 < high or named_fault(name):
         return start
     rest = 0.0 - signal.offset / signal.scale
     return rest if signal.is_float else round(rest)

@@ -16,19 +16,22 @@ from canshaper.shaping.states import Reason
 
 # Part of a raw step: what the rounding of decimals may take.
 STEP_ROUNDING = 1e-6
+# Of full scale; covers the rounding of scale and offset, and is less than any resolution.
+ROUNDING = 1e-6
 LEAST_STEPS = 10
 """Raw steps to full command that a valve can be moved with."""
 FULL_SET_POINT = 0x4000
 """Of a valve of CiA 408; +-0x7FFF would be float, in which it drops its load."""
 
-# Names that the tables of a DBC give to raw values that are no measurement, as words in small
-# letters: SensorError is "sensor error". In a name without any gap, such as sensorerror, they are
-# found too, but not in Default, Interrupted, Terrain and Preserved.
+# Names that the tables of a DBC give to raw values, as words in small letters: SensorError is
+# "sensor error". In a name without any gap, such as sensorerror, those of an error are found too,
+# but not in Default, Interrupted, Terrain and Preserved.
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _NOT_AVAILABLE = re.compile(r"not ?avail|unavail|\bsna\b|^n ?a$")
 _ERROR = re.compile(
     r"\berr(?!and)|err\b|error|(?<!\bde)fault|fail|invalid|not ?valid|(?<!\bp)reserved|defect"
 )
+_NEUTRAL = re.compile(r"neutral|neutral position|cent(er|re)|zero|released")
 
 
 def find_signal(message: Message, name: str) -> Signal | None:
@@ -121,16 +124,44 @@ def set_point_fault(signal: Signal) -> str | None:
     return None
 
 
+def _words(name: str) -> str:
+    return " ".join(_WORD.findall(name)).lower()
+
+
+def named_fault(name: str) -> Reason | None:
+    """Why a value is no measurement, where its name in the DBC says so."""
+    words = _words(name)
+    if _NOT_AVAILABLE.search(words):
+        return Reason.JOYSTICK_NOT_AVAILABLE
+    return Reason.JOYSTICK_ERROR if _ERROR.search(words) else None
+
+
+def is_neutral(signal: Signal, raw: float, name: str) -> bool:
+    """Whether a named value is neutral by its name and exactly 0, so that it moves nothing."""
+    at_zero = math.isclose(raw * signal.scale, -signal.offset)
+    return at_zero and _NEUTRAL.fullmatch(_words(name)) is not None
+
+
+def in_range(signal: Signal, value: float) -> bool:
+    """Whether a value can be a measurement by the range of its signal; without one every value."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high <= low:
+        return True
+    rounding = ROUNDING * (high - low)
+    return bool(low - rounding <= value <= high + rounding)
+
+
 def special_codes(signal: Signal) -> dict[Any, Reason]:
-    """Raw values that are no measurement by the table of the DBC."""
-    special: dict[Any, Reason] = {}
-    for raw, name in (signal.choices or {}).items():
-        words = " ".join(_WORD.findall(str(name))).lower()
-        if _NOT_AVAILABLE.search(words):
-            special[raw] = Reason.JOYSTICK_NOT_AVAILABLE
-        elif _ERROR.search(words):
-            special[raw] = Reason.JOYSTICK_ERROR
-    return special
+    """Raw values that are no measurement, with the reason: all that the DBC names, but neutral.
+
+    Which named values are measurements stands in the deployment file: in a message that is bound
+    they have no name (``Listing.without_values``). Words choose the reason only.
+    """
+    return {
+        raw: named_fault(str(name)) or Reason.JOYSTICK_ERROR
+        for raw, name in (signal.choices or {}).items()
+        if not is_neutral(signal, raw, str(name))
+    }
 
 
 def special_name(signal: Signal, value: float) -> str | None:
@@ -154,10 +185,6 @@ def radius_range(signal: Signal) -> str | None:
     if low < 0.0:
         return f"{signal.name}: expected a range from 0 m or more, got [{low:g}|{high:g}]"
     return None
-
-
-# Of full scale; covers the rounding of scale and offset, and is less than any resolution.
-ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)

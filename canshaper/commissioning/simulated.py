@@ -5,6 +5,7 @@ from pathlib import Path
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
@@ -74,7 +75,7 @@ def log_simulated(
             time_ns, channel = round(1e9 * time_s), buses[frame.bus].channel
             log.write(ReceivedFrame(time_ns, frame.bus, channel, *frame[1:], "").line())
 
-        lock_step = LockStep(deployment, Controller(deployment), plant, [hand], write)
+        lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand], write)
         while lock_step.time_ms < 1000.0 * script.duration_s:
             lock_step.step()
             if lock_step.time_ms % 1000 == 0:

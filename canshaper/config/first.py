@@ -100,6 +100,7 @@ class FirstMotion:
     slew: str
     near_far: str
     radius: str | None = None
+    radius_codes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,7 @@ class FirstSensor:
     timeout_ms: int
     fusion_s: float | None = None
     node: str | None = None
+    codes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -170,6 +172,8 @@ class FirstAxis:
     cia408: FirstCia408 | None = None
     node: str | None = None
     """Of a valve on CANopen without CiA 408."""
+    codes: Mapping[str, str] = field(default_factory=dict)
+    """Of its command, see ``NamedCodes``."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """The text of a first deployment file."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 
 from canshaper.config.first import (
     FIRST_MAX_PCT,
@@ -138,7 +139,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
     yield f"  {axis.name}:"
     command = f"joystick: {axis.joystick}, signal: {axis.command_signal}"
-    command += _scaling(axis.scaling)
+    command += _scaling(axis.scaling) + _codes(axis.codes)
     valve += _scaling(axis.valve_scaling)
     valve += f", cycle_ms: {axis.cycle_ms}" if axis.cycle_ms else ""
     valve += f", node: {axis.node}" if axis.node else ""
@@ -165,6 +166,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     if sensor := axis.sensor:
         fusion = "" if sensor.fusion_s is None else f", fusion_s: {sensor.fusion_s:g}"
         keys = f"message: {sensor.message}, signal: {sensor.signal}, kind: {sensor.kind}{fusion}"
+        keys += _codes(sensor.codes)
         yield "    # Sign, delay and noise: `canshaper sensor FILE --live --write`. Then use: damp."
         timeout = f"timeout_ms: {sensor.timeout_ms}"
         timeout += f", node: {sensor.node}" if sensor.node else ""
@@ -193,6 +195,12 @@ def _scaling(scaling: FirstScaling) -> str:
     return text
 
 
+def _codes(codes: Mapping[str, str]) -> str:
+    """What named values mean, after a comma."""
+    means = ", ".join(f"{json.dumps(n, ensure_ascii=False)}: {m}" for n, m in codes.items())
+    return f", codes: {{ {means} }}" if means else ""
+
+
 def _motion(motion: FirstMotion) -> Iterator[str]:
     yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
     yield "motion:"
@@ -201,5 +209,5 @@ def _motion(motion: FirstMotion) -> Iterator[str]:
     yield f"    near_far: {motion.near_far}"
     if motion.radius:
         message, _, signal = motion.radius.partition(".")
-        where = f"bus: crane, message: {message}, signal: {signal}"
+        where = f"bus: crane, message: {message}, signal: {signal}{_codes(motion.radius_codes)}"
         yield f"    radius: {{ {where}, timeout_ms: {RADIUS_TIMEOUT_MS} }}"

@@ -4,11 +4,12 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from canshaper.config.codes import NamedCodes
 from canshaper.config.input import Input
 from canshaper.config.section import Section, number
 
 
-class Radius(Input):
+class Radius(NamedCodes, Input):
     """Radius of the tip, measured."""
 
     signal: str = Field(description="signal with the radius in m")

@@ -6,6 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from canshaper.config.codes import NamedCodes
 from canshaper.config.filters import Filter
 from canshaper.config.input import Input
 from canshaper.config.section import Section, number
@@ -34,7 +35,7 @@ class Profile(Section):
         return self
 
 
-class LoadState(Input):
+class LoadState(NamedCodes, Input):
     """A signal that says what hangs on the crane: closed or open, weight of the load, period."""
 
     signal: str = Field(description="signal with the value that the breakpoints name")

@@ -5,6 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from canshaper.config.bus import Bus
+from canshaper.config.codes import NamedCodes
 from canshaper.config.control import Control
 from canshaper.config.filters import Filter
 from canshaper.config.gateway import Gateway
@@ -99,7 +100,7 @@ class Scaling(Section):
         return self.full is not None or self.zero is not None or self.invert
 
 
-class Command(Scaling):
+class Command(NamedCodes, Scaling):
     """Where an axis gets its command from."""
 
     joystick: str = Field(description="name of a joystick")
@@ -173,7 +174,7 @@ class Valve(Scaling, Protected):
         return self
 
 
-class Feedback(Input):
+class Feedback(NamedCodes, Input):
     """What a valve says of itself: estimated flow, or position of the spool."""
 
     signal: str = Field(

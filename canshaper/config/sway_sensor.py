@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from canshaper.config.codes import NamedCodes
 from canshaper.config.input import Input
 from canshaper.config.origin import Origin
 from canshaper.config.section import number
@@ -12,7 +13,7 @@ from canshaper.shaping.sway_sensor import Measured
 Kind = Literal["angle", "inclination", "rate"]
 
 
-class SwaySensor(Input):
+class SwaySensor(NamedCodes, Input):
     """Measures the swing of the tool in the plane of the axis.
 
     An angle is that of a joint, an inclination that of the tool against the vertical, a rate that

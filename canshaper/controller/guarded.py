@@ -37,6 +37,10 @@ class Guarded:
         why = self._refusal(passed, now_ns)
         return self._instead(passed, why, now_ns) if why else passed
 
+    def demand(self, axis: str, part: float, now_ns: int) -> None:
+        """Take a demand of a measurement in the place of a joystick; see ``GuardedAxis``."""
+        self._guard.axes[axis].demand(part, now_ns)
+
     @property
     def moves(self) -> bool:
         """Whether the frame that was handed out last may move a valve."""

@@ -41,6 +41,7 @@ class AxisRunner:
         period_ticks, period_s: time between two commands to its valve.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
+        fault: what was wrong with the last setpoint that could not be encoded; for the log.
         chooser: which sway data and filter are in force, where there is a choice.
     """
 
@@ -237,8 +238,13 @@ class AxisRunner:
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
             axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
+        state = axis.state
         transition = axis.act(command, self._added, damps=self._damps)
-        self._put(self.valve.raw, axis.output.steps)
+        try:
+            self._put(self.valve.raw, axis.output.steps)
+        except Exception as error:  # nothing of it is left in the message
+            transition = axis.invalidate(state, error)
+            self.put(0)
         return transition
 
     def put(self, steps: int) -> None:

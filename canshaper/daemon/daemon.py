@@ -33,7 +33,7 @@ from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.reloads import Reloads
 from canshaper.daemon.reporter import Reporter, flush
 from canshaper.daemon.standstill import Standstill
-from canshaper.errors import BusError
+from canshaper.errors import BusError, InternalError, raised
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 
@@ -41,6 +41,7 @@ log = logging.getLogger("canshaper")
 
 # No one receives our frames there, or we no one's.
 _AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE)
+INTERNAL_ERROR = "INTERNAL_ERROR"
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))
 
 
@@ -73,7 +74,12 @@ class Daemon:
         self._control = self._open_control(deployment)
 
     def run(self) -> None:
-        """Run until SIGTERM or SIGINT; then every valve is sent neutral and the buses close."""
+        """Run until SIGTERM or SIGINT; then every valve is sent neutral and the buses close.
+
+        Raises:
+            InternalError: a part of the program raised something, after the same end.
+        """
+        failure = ""
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else its reader's end is lost
@@ -93,9 +99,14 @@ class Daemon:
             while not self._stop:
                 wait = self._wait if self._line else None
                 run_at_deadlines(self._tick_ns, self._body, wait, self._follower)
+        except Exception as error:
+            failure = f"reason={INTERNAL_ERROR} {raised(error)}"
         finally:
             self._manager.stopping()
             self._send_neutral()
+            if failure:
+                log.critical("failed %s", failure)
+                self._black_box.failed(failure)
             close_ports(self._ports.values())
             if self._line:
                 self._line.close()
@@ -105,6 +116,8 @@ class Daemon:
             self._black_box.close()
         listened = self._controller.deployment.listen_only
         log.info("stopped valves=%s", "not-sent" if listened else "neutral")
+        if failure:
+            raise InternalError(failure)
 
     # -- one tick ------------------------------------------------------------------------------
 

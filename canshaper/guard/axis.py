@@ -119,6 +119,19 @@ class GuardedAxis(CommandedAxis):
         self._period = bound.period_ticks
         self._last: Command = NEUTRAL, 0.0, self._down, self._down + self._step
 
+    def demand(self, part: float, now_ns: int) -> None:
+        """Take a demand in the place of the joystick's, whose enable and age still count.
+
+        Args:
+            part: of the full command of the valve, [-1, 1].
+            now_ns: monotonic time.
+        """
+        self.demanded = True
+        opening = self._openings[part < 0.0]
+        speed = opening.velocity(math.ceil(abs(part) * self.bits.full))
+        # In the dead band too it is a command, as ``_learn`` has it.
+        self.take(math.copysign(max(speed, 2 * EPSILON), part) if part else 0.0, now_ns)
+
     def moves(self, data: bytes) -> bool:
         """Whether a frame is anything but neutral."""
         return len(data) != self._length or self.bits.steps(data) != 0

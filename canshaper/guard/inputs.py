@@ -29,11 +29,13 @@ class CommandedAxis:
         joystick_commands: those that were read, by their bytes.
         valid_until_ns: until when the last command may leave again, if nothing forbids it
             meanwhile.
+        demanded: whether something else stands for its joystick, see ``GuardedAxis.demand``.
         sure, sure_ns: speed that was commanded at least in the direction of the last command, and
             until when that holds, if nothing forbids it meanwhile.
     """
 
     __slots__ = (
+        "demanded",
         "joystick",
         "joystick_commands",
         "negative",
@@ -48,6 +50,7 @@ class CommandedAxis:
         self.joystick = joystick
         self.joystick_commands: dict[bytes, float] = {}
         self.now = 0.0
+        self.demanded = False
         self.positive: Sizes = deque()
         self.negative: Sizes = deque()
         self.sure, self.sure_ns = 0.0, NEVER
@@ -59,6 +62,16 @@ class CommandedAxis:
             self.joystick_commands.clear()
         command = self.joystick_commands[data[self.joystick.span]] = self.joystick.command(data)
         return command
+
+    def take(self, command: float, until_ns: int) -> None:
+        """The next command; the one before held until then."""
+        before = self.now
+        # More than before in the same direction: the one before is no bound any more.
+        if command < before > 0.0:
+            keep(self.positive, before, until_ns)
+        elif command > before < 0.0:
+            keep(self.negative, -before, until_ns)
+        self.now = command
 
     def forbid(self) -> None:
         """Nothing holds that was looked up before."""
@@ -263,21 +276,20 @@ class GuardedJoystick(GuardedInput):
                         axis.forbid()
             if len(self._unread) == MOST_UNREAD:
                 self.read()
-        self.received_ns = now_ns
+        # A stamp that lies back makes no frame before it older: the stop for it begins now.
+        before_ns = self.received_ns
+        self.received_ns = now_ns if now_ns > before_ns else before_ns
 
     def read(self) -> None:
         """Read the commands of the frames that came since this was called last."""
         for span, commands, axis in self._axes:
+            if axis.demanded:
+                continue
             for data, received_ns in self._unread:
-                command, before = commands.get(data[span]), axis.now
+                command = commands.get(data[span])
                 if command is None:
                     command = axis.learn(data)
-                # More than before in the same direction: the one before is no bound any more.
-                if command < before > 0.0:
-                    keep(axis.positive, before, received_ns)
-                elif command > before < 0.0:
-                    keep(axis.negative, -before, received_ns)
-                axis.now = command
+                axis.take(command, received_ns)
         self._unread.clear()
 
     def clear(self) -> None:

@@ -61,6 +61,7 @@ class OutputGuard:
 
     Attributes:
         inputs: joysticks and emergency stop, by bus, id and format; see ``note``.
+        axes: by their names.
         valves: what looks at a frame, by bus, id and format.
         at: number of this deadline, and of this tick, which does not count those missed.
     """
@@ -89,7 +90,8 @@ class OutputGuard:
             else:
                 self.inputs |= dict.fromkeys(one.keys, entry)
         self._own = {name: bus.j1939.address for name, bus in config.buses.items() if bus.j1939}
-        self.valves = _valves(deployment, joysticks, stops)
+        self.axes = _axes(deployment, joysticks, stops)
+        self.valves = _valves(deployment, self.axes)
 
     def note(self, frame: Frame, now_ns: int) -> None:
         """Take a frame that has come in, and is none of ``inputs``."""
@@ -142,22 +144,29 @@ def _switches(
     return messages
 
 
-def _valves(
+def _axes(
     deployment: Deployment,
     joysticks: dict[str, GuardedJoystick],
     stops: Sequence[GuardedSwitch],
-) -> dict[Key, GuardedAxis | GuardedAxes]:
+) -> dict[str, GuardedAxis]:
     axes: dict[str, GuardedAxis] = {}
-    by_message: dict[Key, list[GuardedAxis]] = {}
     for name, bound in deployment.axes.items():
         joystick = joysticks[bound.config.command.joystick]
         axes[name] = GuardedAxis(deployment, bound, joystick, (*stops, *joystick.needed))
-        by_message.setdefault(bound.valve.message.key, []).append(axes[name])
     for motion in (bound.config for bound in deployment.motions.values()):
         if motion.near_far is not None:
             slew, near_far = axes[motion.slew], axes[motion.near_far]
             slew.moves_with(near_far, motion.max_pct / 100.0)
             near_far.moves_with(slew, motion.max_pct / 100.0)
+    return axes
+
+
+def _valves(
+    deployment: Deployment, axes: dict[str, GuardedAxis]
+) -> dict[Key, GuardedAxis | GuardedAxes]:
+    by_message: dict[Key, list[GuardedAxis]] = {}
+    for name, bound in deployment.axes.items():
+        by_message.setdefault(bound.valve.message.key, []).append(axes[name])
     return {
         key: GuardedAxes(several) if len(several) > 1 else several[0]
         for key, several in by_message.items()

@@ -7,8 +7,7 @@ from canshaper.checksums.kinds import package_line
 from canshaper.codec.signals import special_name
 from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config
-from canshaper.config.schedule import Profile
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.errors import ConfigError
 from canshaper.machine.axes import bind_axes
@@ -23,6 +22,7 @@ from canshaper.machine.inputs import BoundValue, Choosing, bind_emergency_stop, 
 from canshaper.machine.joysticks import bind_joystick
 from canshaper.machine.lookup import Lookup, load_messages, protected_sections
 from canshaper.machine.motion import bind_motions
+from canshaper.machine.named_codes import values_of_schedules
 from canshaper.machine.statuses import bind_status
 
 
@@ -54,7 +54,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     )
     profile = _bind_profile(lookup)
     if load_state:
-        _check_values(lookup, load_state, _values_of_schedules(config))
+        _check_values(lookup, load_state, values_of_schedules(config))
     service = bind_status(lookup, ("status",), config.status, SERVICE_STATUS)
     identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
@@ -85,6 +85,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         lookup.on_bus(),
         lookup.fd(),
         source=source,
+        codes=lookup.codes(),
     )
 
 
@@ -109,21 +110,6 @@ def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
     filters |= {profile.filter.kind for axis in axes for profile in axis.profiles.values()}
     lines = (package_line(kind) for kind in sorted(checksums))
     return (*(line for line in lines if line), *filter_lines(filters))
-
-
-def _values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
-    """Values of the load state that the gain schedules name, by their places."""
-    parts: dict[Place, AxisConfig | Profile] = {}
-    for name, axis in config.axes.items():
-        parts["axes", name] = axis
-        parts |= {
-            ("axes", name, "profiles", profile): part for profile, part in axis.profiles.items()
-        }
-    return {
-        (*place, "gain_schedule", i, "breakpoint"): one.breakpoint
-        for place, part in parts.items()
-        for i, one in enumerate(part.gain_schedule)
-    }
 
 
 def _check_values(

@@ -1,8 +1,9 @@
 """What a deployment file says where the DBC has nothing, or something wrong."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass
+from operator import is_
 
 from cantools.database.can import Message, Signal
 
@@ -10,6 +11,7 @@ from canshaper.codec.layout import Chosen, frame_length
 from canshaper.codec.signals import STEP_ROUNDING, raw_limits
 from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig, Scaling
+from canshaper.machine.named_codes import Listing
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,10 @@ def scalings(config: DeploymentConfig, bus: str, message: str) -> dict[str, Corr
 
 
 def corrected(
-    message: Message, config: Protected, signals: Mapping[str, Correction]
+    message: Message,
+    config: Protected,
+    signals: Mapping[str, Correction],
+    listings: Iterable[Listing] = (),
 ) -> Message | str:
     """The message as it is on the bus of this machine, or why it cannot be.
 
@@ -50,16 +55,19 @@ def corrected(
         message: that of the DBC.
         config: the section that names it.
         signals: the signals whose scaling it does not have right.
+        listings: which of its named values are measurements.
     """
     value = config.multiplexor
     length = frame_length(message)
-    own = length == message.length and config.cycle_ms is None
-    if own and value is None and not signals:
-        return message
     if isinstance(of_value := _of_value(message, value), str):
         return of_value
     for name, one in signals.items():
-        of_value = [_scaled(s, one) if s.name == name else s for s in of_value]
+        of_value = [scaled(s, one) if s.name == name else s for s in of_value]
+    for listing in listings:
+        of_value = [listing.without_values(s) if s.name in listing.signals else s for s in of_value]
+    own = length == message.length and config.cycle_ms is None
+    if own and all(map(is_, of_value, message.signals)):
+        return message
     return Message(
         message.frame_id,
         message.name,
@@ -117,7 +125,7 @@ def _of_value(message: Message, value: int | None) -> list[Signal] | str:
     return result
 
 
-def _scaled(signal: Signal, correction: Correction) -> Signal:
+def scaled(signal: Signal, correction: Correction) -> Signal:
     """The signal with the scaling of the deployment file; its zero is 0."""
     scaling = correction.scaling
     result = copy(signal)

@@ -21,6 +21,7 @@ from canshaper.machine.identity import Identity
 from canshaper.machine.inputs import Bound, BoundJoystick, BoundValue, Choosing
 from canshaper.machine.motion import BoundMotion
 from canshaper.machine.routing import Key, Routing, build_routing
+from canshaper.machine.used_message import NamedCode
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Deployment:
     """Messages of CAN FD."""
     source: Source = field(compare=False)
     """The file, for the lines of what is wrong with it on this machine."""
+    codes: tuple[NamedCode, ...] = ()
+    """What the named values of the signals mean that are read."""
     listen_only: bool = False
     """Nothing is sent but status: another controller drives the machine, or no one does."""
 

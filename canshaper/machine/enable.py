@@ -83,6 +83,8 @@ def _bind(lookup: Lookup, switches: dict[str, Switch]) -> BoundSwitches | None:
     for other in others:
         used.integer(("switches", other, "signal"), switches[other].signal, f"switch {other}")
     for name, one in switches.items():
+        agrees, at = {one.code: f"{name} agrees"}, ("switches", name, "signal")
+        used.check_switch(at, one.signal, agrees, f"{name} does not agree")
         signal = find_signal(bound.message, one.signal)
         if signal and one.code > (largest := raw_limits(signal)[1]):
             text = f"expected up to {largest}, of {signal.length} bits of {signal.name}"

@@ -159,6 +159,7 @@ def bind_input(
         used.add_fault("has no GenMsgCycleTime; cycle_ms may say it")
     for at, signal in enable:
         used.integer(at, signal, "enable")
+        used.check_switch(at, signal, {1: "on"}, "not on")
     for key in switches:
         used.integer((*place, key), getattr(config, key), key)
     if value is not None:
@@ -177,6 +178,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[Emergenc
     if (result := bind_input(lookup, ("emergency_stop",), config, ("signal",))) is None:
         return None
     used, bound = result
+    used.check_switch(("emergency_stop", "signal"), config.signal, {0: "free"}, "stop")
     check_source(used, "the emergency stop")
     return bound
 

@@ -20,6 +20,8 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
     if result is None:
         return None
     used, bound = result
+    for key in switches:
+        used.check_switch((*place, key), getattr(config, key), {1: key}, f"no {key}")
     lookup.check_node(place, config.bus, config.node)
     of_axes = {n: a.command for n, a in lookup.config.axes.items() if a.command.joystick == name}
     _check_scaling(used, of_axes)
@@ -43,7 +45,8 @@ def _check_scaling(used: UsedMessage, commands: dict[str, Command]) -> None:
         before = first.setdefault(command.signal, axis)
         text = f"axes.{before}.command, which reads {command.signal} too, got another"
         place = ("axes", axis, "command")
-        used.diagnostics.check_same(place, command, Scaling.model_fields, commands[before], text)
+        keys = (*Scaling.model_fields, "codes")
+        used.diagnostics.check_same(place, command, keys, commands[before], text)
 
 
 def _bind_velocity(
@@ -64,6 +67,7 @@ def _bind_velocity(
         if flag := used.find(at, name):
             used.check_integer(at, flag, signed=False)
             used.check_unused(at, flag, moves)
+            used.check_switch(at, name, {0: f"not {key}", 1: key}, "fault")
             used.uses[name] = f"the {key} flag of {axis}"
     signal = used.find((*place, "signal"), command.signal)
     if signal is None:

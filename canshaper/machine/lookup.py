@@ -1,6 +1,7 @@
 """Messages that a deployment file names: loaded, found, and noted as used on their bus."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from cantools.database.can import Message
@@ -24,7 +25,8 @@ from canshaper.machine.corrections import chosen, corrected, scalings
 from canshaper.machine.database import MOST_BYTES, Messages, load_dbc, too_many
 from canshaper.machine.dbc_parse import MOST_PARSED
 from canshaper.machine.diagnostics import Diagnostics
-from canshaper.machine.used_message import UsedMessage, key_path
+from canshaper.machine.named_codes import Listing, check_codes, listings
+from canshaper.machine.used_message import NamedCode, UsedMessage, key_path
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,10 @@ class Lookup:
     config: DeploymentConfig
     messages: Messages
     used: dict[tuple[str, int, bool], UsedMessage] = field(default_factory=dict)
+
+    @cached_property
+    def _listings(self) -> dict[tuple[str, str], list[Listing]]:
+        return listings(self.config)
 
     def message(
         self, place: Place, config: Protected, *, received: bool, source: int | None = None
@@ -68,7 +74,8 @@ class Lookup:
             add((*place, "message"), result)
             return None
         file, in_dbc = result
-        message = corrected(in_dbc, config, scalings(self.config, bus, name))
+        listed = self._listings.get((bus, name), []) if received else []
+        message = corrected(in_dbc, config, scalings(self.config, bus, name), listed)
         if isinstance(message, str):
             add((*place, "multiplexor"), message)
             message = in_dbc
@@ -89,6 +96,8 @@ class Lookup:
             used.add("message", f"{text} {key_path(self.used[key].place)}")
         self.used[key] = used
         self._check_length(used, in_dbc, config)
+        for listing in listed:
+            check_codes(used, in_dbc.signals, listing)
         if message.is_multiplexed() and config.multiplexor is None:
             verb = "taken from" if received else "sent in"
             text = f"{name} is multiplexed; without multiplexor nothing can be {verb} it"
@@ -107,6 +116,10 @@ class Lookup:
     def fd(self) -> frozenset[tuple[str, int, bool]]:
         """Bus, id and format of the messages of CAN FD that are used."""
         return frozenset(key for key, used in self.used.items() if is_fd(used.message))
+
+    def codes(self) -> tuple[NamedCode, ...]:
+        """What the named values of the signals mean that are read."""
+        return tuple(code for used in self.used.values() for code in used.codes)
 
     def on_bus(self) -> dict[str, list[Message]]:
         """Messages that are used, by bus."""

@@ -183,6 +183,7 @@ def _merit(used: UsedMessage, axis: str, sensor: SwaySensor) -> str | None:
         used.diagnostics.add(place, f"expected a signal of whole numbers, got {signal.name!r}")
     elif used.uses.get(signal.name) != use:
         used.use(place, signal, use)
+        used.check_switch(place, signal.name, {0: "good"}, "no measurement")
     return signal.name
 
 

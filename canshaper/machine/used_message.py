@@ -1,16 +1,28 @@
 """A message that a part of a deployment uses, and its signals while they are bound."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.canopen import STATE_BITS
 from canshaper.codec.layout import Chosen
-from canshaper.codec.signals import find_signal
+from canshaper.codec.signals import find_signal, named_fault
 from canshaper.config.similar import there_are
 from canshaper.config.source import Place
 from canshaper.machine.database import DbcFile
 from canshaper.machine.diagnostics import Diagnostics
+
+
+class NamedCode(NamedTuple):
+    """A value that the DBC names (VAL_) of a signal that is read, and what it means."""
+
+    message: str
+    signal: str
+    code: float
+    name: str
+    means: str
 
 
 @dataclass(frozen=True)
@@ -27,6 +39,7 @@ class UsedMessage:
         chosen: which frames are meant, where the message is multiplexed.
         uses: what its signals are used for, by name: each has one use, or a switch could move an
             axis.
+        codes: what the named values of its signals mean.
     """
 
     diagnostics: Diagnostics
@@ -37,6 +50,7 @@ class UsedMessage:
     any_source: bool
     chosen: Chosen | None = None
     uses: dict[str, str] = field(default_factory=dict)
+    codes: list[NamedCode] = field(default_factory=list)
 
     def add(self, key: str, text: str) -> None:
         """Note a problem at a key of its part of the deployment file."""
@@ -66,6 +80,28 @@ class UsedMessage:
             self.check_integer(place, signal, signed=signed)
             self.use(place, signal, use)
         return signal
+
+    def check_switch(
+        self, place: Place, name: str | None, means: Mapping[int, str], other: str
+    ) -> None:
+        """Note what the codes of a switch mean; one that counts may have no name of an error.
+
+        Args:
+            place: of the key that names it.
+            name: its signal; one that is missing is noted elsewhere.
+            means: what the codes mean that count.
+            other: what all others mean.
+        """
+        signal = None if name is None else find_signal(self.message, name)
+        for raw, choice in ((signal and signal.choices) or {}).items():
+            assert signal is not None
+            code = NamedCode(
+                self.message.name, signal.name, raw, str(choice), means.get(raw, other)
+            )
+            self.codes.append(code)
+            if raw in means and named_fault(code.name):
+                text = f"expected a signal whose {raw} is {code.means}, got {signal.name!r}"
+                self.diagnostics.add(place, f'{text}, whose {raw} is "{code.name}" in the DBC')
 
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
         """A raw value must be a whole number."""

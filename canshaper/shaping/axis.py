@@ -15,9 +15,9 @@ gets neutral in the same tick, and the transition keeps the error.
 """
 
 import math
-import traceback
 from collections.abc import Callable
 
+from canshaper.errors import raised
 from canshaper.shaping.added import AddedTime
 from canshaper.shaping.limits import OutputLimits, within
 from canshaper.shaping.output import OutputStage
@@ -31,8 +31,6 @@ from canshaper.shaping.transfer import BumplessTransfer
 # Missed ticks that the filter and the model go through at most: after so many of them nothing moves
 # any more, and the first neutral frame must not wait.
 MOST_HELD = 2000
-# Longest text of an error, so that its event stays a line.
-MOST_TEXT = 200
 
 
 class Axis:
@@ -177,7 +175,7 @@ class Axis:
                 stage.rest()
                 self._transfer.rest()
         except Exception as error:  # a filter of another package may raise anything
-            return self._output_invalid(old, error)
+            return self.invalidate(old, error)
         return None if state is old else Transition(old, state, states.reason)
 
     def advance(self) -> None:
@@ -207,7 +205,7 @@ class Axis:
                 self._transfer.hold(demand)
                 self.advance()
         except Exception as error:  # as in ``act``
-            return self._output_invalid(self._states.state, error)
+            return self.invalidate(self._states.state, error)
         return None
 
     def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
@@ -272,8 +270,10 @@ class Axis:
         maximum = self._stage.limits.maximum
         return within(self.command, -maximum, maximum, 0.0)
 
-    def _output_invalid(self, old: State, error: Exception) -> Transition | None:
-        """Trip for an error of the filter. The model starts again: its state may be spoilt too.
+    def invalidate(self, old: State, error: Exception) -> Transition | None:
+        """Trip for an error of the filter, or an output that no frame carries.
+
+        The model starts again: its state may be spoilt too.
 
         In TRIPPED the first reason stays, and the first error is reported, not one in each tick.
         """
@@ -290,15 +290,5 @@ class Axis:
             self.sensed.restart()
         if self.error:
             return None
-        self.error = _described(error)
+        self.error = raised(error)
         return Transition(old, TRIPPED, self._states.reason, self.error)
-
-
-def _described(error: Exception) -> str:
-    """Put an error into one line: ``ZeroDivisionError: division by zero (moving_average.py:7)``.
-
-    The place is the innermost line of Python that raised it.
-    """
-    text = " ".join("".join(traceback.format_exception_only(error)).split())[:MOST_TEXT]
-    *_, (frame, line) = traceback.walk_tb(error.__traceback__)
-    return f"{text} ({frame.f_code.co_filename}:{line})"

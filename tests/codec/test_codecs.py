@@ -13,7 +13,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.sent import SentMessage
-from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.signals import VelocitySignal, named_fault
 from canshaper.codec.valve import ValveCodec
 from canshaper.shaping.states import Reason
 from tests.rigs.sent import command_frame
@@ -170,10 +170,12 @@ def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
         "Fast",
     ],
 )
-def test_ordinary_words_are_no_errors(name: str) -> None:
+def test_ordinary_words_say_no_error_but_their_values_are_no_velocities(name: str) -> None:
     text = DBC.replace('50 "SNA"', f'50 "{name}"')
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Joystick")
-    assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == 0.5
+    assert named_fault(name) is None
+    velocity = VelocitySignal.of(signal(message, "Plain"))
+    assert velocity.read({"Plain": 50}) == Reason.JOYSTICK_ERROR
 
 
 @pytest.mark.parametrize(

@@ -146,10 +146,17 @@ def test_a_set_point_of_cia_408() -> None:
 
 
 def test_the_name_of_a_value() -> None:
-    one = signal(0.0, 100.0, 0.5, -10.0, choices={254: "Error", 255: "NotAvailable", 3: "Fast"})
+    one = signal(
+        0.0,
+        100.0,
+        0.5,
+        -10.0,
+        choices={254: "Error", 255: "NotAvailable", 3: "Fast", 20: "Neutral"},
+    )
     assert special_name(one, 254 * 0.5 - 10.0) == "Error"
     assert special_name(one, 255 * 0.5 - 10.0) == "NotAvailable"
-    assert special_name(one, 3 * 0.5 - 10.0) is None  # a name, but of a measurement
+    assert special_name(one, 3 * 0.5 - 10.0) == "Fast"
+    assert special_name(one, 0.0) is None  # neutral
     assert special_name(one, 254.0) is None
     assert special_name(signal(0.0, 100.0), 50.0) is None
 

@@ -27,8 +27,8 @@ def test_keys_allowed_do_not_depend_on_the_name_of_the_axis(
         f"machine.yaml:{line}: axes.{name}.stik: expected one of the keys {AXIS}, got an unknown"
         " one",
         f"machine.yaml:{line + 1}: axes.{name}.command.joistick: expected one of the keys"
-        " full, zero, invert, joystick, signal, flags, negative, neutral_pct, got an unknown one;"
-        " did you mean joystick?",
+        " full, zero, invert, codes, joystick, signal, flags, negative, neutral_pct, got an unknown"
+        " one; did you mean joystick?",
         f"machine.yaml:{line + 1}: axes.{name}.command.joystick: missing: name of a joystick",
     ]
 

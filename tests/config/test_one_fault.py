@@ -32,8 +32,8 @@ SWAY = (
         (
             "{ joystick: left,",
             "{ joystick: left, deadzone: 1,",
-            "axes.slew.command.deadzone: expected one of the keys full, zero, invert, joystick,"
-            " signal, flags, negative, neutral_pct",
+            "axes.slew.command.deadzone: expected one of the keys full, zero, invert, codes,"
+            " joystick, signal, flags, negative, neutral_pct",
         ),
         (
             "kind: gff,",

@@ -99,5 +99,6 @@ def test_each_signal_of_a_rocker_has_one_use(
     machine: Machine, signal: str, negative: str, key: str, says: str
 ) -> None:
     line = rocker(machine, signal=signal, negative=negative)
+    machine.in_dbc('VAL_ 272 Reset 0 "Off" 1 "On" 2 "Error" 3 "NotAvailable" ;', "")
     expected = f"axes.slew.command.{key}: expected a free signal, got {says}"
     assert machine.problems() == [f"machine.yaml:{line}: {expected}"]

@@ -30,7 +30,13 @@ def calibrate(
         None, "--speed", metavar="MESSAGE.SIGNAL", help="Feedback of its speed in the DBC files."
     ),
     rate_pct_s: float = typer.Option(10.0, "--rate", min=0.5, max=20.0, help="Ramp, % per s."),
-    top_pct: float = typer.Option(40.0, "--top", min=10.0, max=100.0, help="Largest command, %."),
+    top: float | None = typer.Option(
+        None,
+        "--top",
+        min=1.0,
+        max=100.0,
+        help="Largest command, %, up to the axis' max_pct; by default 40, or max_pct.",
+    ),
     live: bool = typer.Option(False, "--live", help="On the machine, not on the simulated crane."),
     yes: bool = typer.Option(False, "--yes", help="With --live: do not ask."),
     write: bool = typer.Option(False, "--write", help="Write the curve into the file."),
@@ -64,7 +70,7 @@ def calibrate(
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.commissioning.calibration.ramp import Ramp
+    from canshaper.commissioning.calibration.ramp import Ramp, usual_top
     from canshaper.commissioning.calibration.run import run_live
     from canshaper.commissioning.calibration.write import curve_lines, speed_signal, write_curve
     from canshaper.report.console import progress_bar
@@ -73,8 +79,11 @@ def calibrate(
     if write:
         refuse_shipped(file)
     results = Results(f"Valve of {axis}, calibrated", deployment, report, picture)
-    ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)
-    drive = CalibrationDrive(deployment, axis, speed_signal(deployment, axis, speed), ramp)
+    of_speed = speed_signal(deployment, axis, speed)
+    usual = usual_top(deployment.axes[axis].config.limits)
+    ramp = Ramp(rate_pct_s / 100.0, usual if top is None else top / 100.0)
+    top_pct = 100.0 * ramp.top
+    drive = CalibrationDrive(deployment, axis, of_speed, ramp)
     if live and not yes:
         typer.confirm(
             f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"

@@ -10,9 +10,12 @@ from canshaper.cli.common import EXIT_WRONG, FILE, echo, loader, print_warnings
 from canshaper.errors import ConfigError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from canshaper.config.bus import Bus
     from canshaper.config.motion import Motion
     from canshaper.machine.deployment import Deployment
+    from canshaper.machine.used_message import NamedCode
 
 # What joysticks do while the daemon is away.
 FALLBACKS = {
@@ -29,7 +32,8 @@ def check(
     """Load a deployment against its DBC files and report every problem at once.
 
     Shows how far each axis still travels after release, reversal, lost joystick and lost enable,
-    and how far its limits allow.
+    and how far its limits allow; and what each value means that the DBC names (VAL_) in a signal
+    that is read.
 
     Exit code 0 when it is good, 2 when it is not. What is wrong in the DBC files with messages that
     the deployment does not use is a warning, and so is a table of values (VAL_) without its
@@ -89,6 +93,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
             }
             for name, bus in config.buses.items()
         },
+        "codes": [code._asdict() for code in deployment.codes],
         "axes": {
             one.name: {
                 "filter": config.axes[one.name].filter.kind,
@@ -136,6 +141,7 @@ def _print(deployment: "Deployment") -> None:
         if section.slewing and section.sway and name not in moved:
             echo(f"  {name} is in no motion: together with another axis it leaves more swing;")
             echo("    a motion takes one axis that moves the tip in and out, which joints are not")
+    _print_codes(deployment.codes)
     identity = deployment.identity
     echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
     for line in identity.lines()[1:]:
@@ -143,6 +149,20 @@ def _print(deployment: "Deployment") -> None:
     print_stopping(deployment, SafeConsole())
     for warning in doubts(deployment):
         echo(f"WARNING: {warning}")
+
+
+def _print_codes(codes: "Sequence[NamedCode]") -> None:
+    """What named values mean; signals whose names mean the same in one line."""
+    meanings: dict[str, dict[str, list[str]]] = {}
+    for code in codes:
+        of_signal = meanings.setdefault(f"{code.message}.{code.signal}", {})
+        of_signal.setdefault(code.means, []).append(f'{code.code:g} "{code.name}"')
+    signals: dict[str, list[str]] = {}
+    for signal, names in meanings.items():
+        text = "; ".join(f"{', '.join(named)}: {means}" for means, named in names.items())
+        signals.setdefault(text, []).append(signal)
+    for text, alike in signals.items():
+        echo(f"  {', '.join(alike)}: {text}")
 
 
 def _match(bus: "Bus") -> str:

@@ -1,11 +1,13 @@
 """Drives one axis through a ramp with the daemon's own controller, and listens to its speed.
 
 Everything that may stop the daemon stops this too: enable, timeouts, emergency stop, a second
-sender. The joystick has to stay in neutral; moving it ends the measurement.
+sender, the output guard, for which the ramp is the demand. The joystick has to stay in neutral;
+moving it ends the measurement.
 """
 
 import statistics
 from collections.abc import Iterator
+from dataclasses import replace
 
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.at_end import EndWatch
@@ -13,7 +15,8 @@ from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.speed import SpeedFeedback
 from canshaper.controller.controller import Controller
-from canshaper.errors import CalibrationError
+from canshaper.controller.guarded import Guarded
+from canshaper.errors import CalibrationError, ConfigError
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
@@ -23,8 +26,6 @@ from canshaper.shaping.states import MOVING, CommandInput, Reason, State
 
 # A command below this is neutral: the ramp begins there.
 NEUTRAL_BAND = 1e-4
-# Fall of the command when the measurement ends early, full commands per second.
-FALL_PER_S = 5.0
 
 
 class _RampJoystick:
@@ -75,19 +76,27 @@ class CalibrationDrive:
         progress: how much of the ramp is done, 0 to 1.
 
     Raises:
-        ConfigError: no such message or signal.
+        ConfigError: no such message or signal; the ramp is faster than the file's ``max_pct``.
     """
 
     def __init__(
         self, deployment: Deployment, axis: str, speed: tuple[str, str], ramp: Ramp
     ) -> None:
+        _check_top(deployment, axis, ramp)
+        # What may be set while the daemon runs bounds no measurement: the numbers of the file do.
+        config = deployment.config.model_copy(update={"control": None})
+        deployment = replace(deployment, config=config)
         self._speed = SpeedFeedback(deployment, axis, *speed)
         self._controller = Controller(deployment)
+        self._guarded = Guarded(self._controller)
         self._runner = runner = self._controller.axes[axis]
         period_s = deployment.config.tick_ms / 1000.0 * runner.bound.period_ticks
+        limits = runner.bound.config.limits
         measured = Axis(
             period_s,
-            OutputLimits(maximum=1.0, rise_per_s=FALL_PER_S, fall_per_s=FALL_PER_S, tail_s=0.0),
+            OutputLimits(
+                limits.max_pct / 100.0, 0.0, limits.rise_per_s, limits.fall_per_s, tail_s=0.0
+            ),
             sway=None,
             shaper=Off(),
             neutral_band=NEUTRAL_BAND,
@@ -128,12 +137,12 @@ class CalibrationDrive:
     @property
     def moves(self) -> bool:
         """Whether the frame that was handed out last is one of a valve, and any moves."""
-        return self._controller.moves
+        return self._guarded.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
         self._speed.receive(frame, arrived_ns)
-        return self._controller.receive(frame, arrived_ns)
+        return self._guarded.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send."""
@@ -161,20 +170,21 @@ class CalibrationDrive:
                 self.ended = f"stopped: {text}: its end? {room}"
             if self.ended:
                 self._joystick.deflection = 0.0
-        yield from self._controller.tick(now_ns, missed)
+        self._guarded.demand(self.axis, self._joystick.deflection, now_ns)
+        yield from self._guarded.tick(now_ns, missed)
         self._controller.events.clear()
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus; the axes of a valve frame trip."""
-        self._controller.send_failed(frame)
+        self._guarded.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
         """A valve frame comes too late: whether it must not leave."""
-        return self._controller.withhold(frame)
+        return self._guarded.withhold(frame)
 
     def stalled(self) -> None:
         """The loop stood still: what moves goes to neutral."""
-        self._controller.stalled()
+        self._guarded.stalled()
 
     def _sample(self, time_s: float) -> None:
         sent = self._runner.axis.raw / self._runner.bound.valve.steps
@@ -187,7 +197,7 @@ class CalibrationDrive:
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve."""
-        return self._controller.neutral_frames()
+        return self._guarded.neutral_frames()
 
     def result(self) -> Calibration:
         """What was measured.
@@ -217,3 +227,19 @@ class CalibrationDrive:
         if ways[0][0] != ways[1][0]:
             raise CalibrationError("both directions moved the same way; is the feedback signed?")
         return Calibration(ways[0][1], ways[1][1])
+
+
+def _check_top(deployment: Deployment, axis: str, ramp: Ramp) -> None:
+    """A ramp is no faster than the file allows.
+
+    Raises:
+        ConfigError: it is.
+    """
+    limits = deployment.config.axes[axis].limits
+    curve = limits.curve()
+    speeds = [abs(curve.velocity(way * ramp.top)) for way in (1.0, -1.0)] if curve else []
+    fastest_pct = 100.0 * max([ramp.top, *speeds])
+    if fastest_pct > limits.max_pct + 1e-6:
+        text = f"expected a ramp (--top) up to {limits.max_pct:g} % of full speed"
+        place = ("axes", axis, "limits", "max_pct")
+        raise ConfigError([deployment.source.problem(place, f"{text}, got {fastest_pct:.4g} %")])

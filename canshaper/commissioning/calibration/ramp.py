@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from canshaper.config.limits import Limits
+
 # Slow enough for a lag of 0.3 s, quick enough for a joint that has room for 2 s of full speed.
 RATE_PER_S, TOP = 0.1, 0.4
 
@@ -66,3 +68,8 @@ class Ramp:
         if into_s < self.hold_s:
             return f"held{direction}" if into_s > 0.5 * self.hold_s else f"hold{direction}"
         return f"down{direction}"
+
+
+def usual_top(limits: Limits) -> float:
+    """Top of the ramp of an axis, part of full command: as fast as the file allows at most."""
+    return min(TOP, limits.max_pct / 100.0)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
@@ -47,6 +48,6 @@ def _give_room(plant: PlantNode, deployment: Deployment, drive: CalibrationDrive
     actuator = plant.crane.boom.axes[drive.axis]
     back = Script("back", (Stroke(drive.axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)
-    lock_step = LockStep(deployment, Controller(deployment), plant, [hand])
+    lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand])
     while actuator.room_s < drive.ramp.travel_s and lock_step.time_ms < 1000 * LONGEST_BACK_S:
         lock_step.step()

@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
+from canshaper.codec.valve import ValveCodec
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
@@ -273,3 +274,43 @@ def test_a_frame_not_sent_and_a_loop_that_stood_still_end_it(
             drive.receive(frame, tick * TICK_NS)
         assert [f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200] == [0]
     assert drive.ended == f"stopped: {reason}"
+
+
+def with_limits(tmp_path: Path, limits: str) -> Path:
+    """The machine with these limits of slew; ``canshaper set`` may change its speed."""
+    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    text = text.replace("limits: { deadband_pct: 5,", f"limits: {{ {limits},", 1)
+    text += "control: { adjustable: { axes.slew.limits.max_pct: [20, 100] } }\n"
+    (file := tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
+    return file
+
+
+def test_the_speed_of_the_file_bounds_the_ramp(tmp_path: Path) -> None:
+    file = with_limits(tmp_path, "max_pct: 30, deadband_pct: 5")
+    line = file.read_text(encoding="utf-8").split("max_pct: 30")[0].count("\n") + 1
+    shown = CliRunner().invoke(app, ["calibrate", str(file), "--axis", "slew", "--top", "80"])
+    expected = "axes.slew.limits.max_pct: expected a ramp (--top) up to 30 % of full speed"
+    assert shown.exit_code == 2
+    assert f"{file}:{line}: {expected}, got 80 %" in shown.output.replace("\n", "")
+    usual = CliRunner().invoke(app, ["calibrate", str(file), "--axis", "slew"])
+    assert (usual.exit_code, "above 30 % of the command" in usual.output) == (0, True), usual.output
+
+
+def test_a_curve_in_the_file_says_how_fast_a_ramp_is(tmp_path: Path) -> None:
+    commands, speeds = "[-100, -40, -5, 5, 40, 100]", "[-100, -60, 0, 0, 50, 100]"
+    curve = f"curve_command_pct: {commands}, curve_speed_pct: {speeds}"
+    file = with_limits(tmp_path, f"max_pct: 55, {curve}")
+    with pytest.raises(ConfigError, match=r"up to 55 % of full speed, got 60 %"):
+        CalibrationDrive(load_deployment(file), "slew", SPEED, Ramp(0.1, 0.4))
+    assert measured(load_deployment(file), ramp=Ramp(0.1, 0.35)).positive.opens < 0.1
+
+
+def test_the_guard_stops_a_command_that_is_beyond_the_ramp(
+    deployment: Deployment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put = ValveCodec.put
+    monkeypatch.setattr(ValveCodec, "put", lambda valve, steps: put(valve, 2 * steps))
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    sent = run(drive, hands(deployment), 6.0)
+    assert drive.ended == "stopped: OUTPUT_REFUSED"
+    assert max(frame.data[0] for frame in sent) < 0.1 * 125

@@ -5,7 +5,7 @@ from functools import partial
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.commissioning.calibration.plot import figure
-from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, Ramp
+from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, usual_top
 from canshaper.commissioning.calibration.write import (
     SIMULATED,
     curve_lines,
@@ -26,18 +26,19 @@ def run(context: Context) -> Outcome:
     deployment, bench = context.deployment, context.bench
     outcome = Outcome()
     results: dict[str, Calibration] = {}
+    ramps: dict[str, Ramp] = {}
     left = []
     for name in swinging(deployment):
         speed = _speed(bench, deployment, name)
         if speed == NONE:
             left.append(name)
             continue
-        ramp = Ramp(RATE_PER_S, TOP)
+        ramp = ramps[name] = Ramp(RATE_PER_S, usual_top(deployment.config.axes[name].limits))
         drive = CalibrationDrive(deployment, name, speed_signal(deployment, name, speed), ramp)
         words = (
-            f"{name} moves BY ITSELF for {ramp.duration_s:.0f} s, up to {100 * TOP:.0f} % of its"
-            f" command: in positive direction, at most as far as in {ramp.travel_s:.1f} s at full"
-            " deflection, and as far back. Bring it first to where it has that room. No other"
+            f"{name} moves BY ITSELF for {ramp.duration_s:.0f} s, up to {100 * ramp.top:.0f} % of"
+            f" its command: in positive direction, at most as far as in {ramp.travel_s:.1f} s at"
+            " full deflection, and as far back. Bring it first to where it has that room. No other"
             " controller sends to its valve. Everybody away; hold the enable switch all the time,"
             " joystick in neutral: letting go ends it."
         )
@@ -47,7 +48,8 @@ def run(context: Context) -> Outcome:
         except CalibrationError as error:
             outcome.poor.append(f"{name}: {error}; do it again")
     for name, result in results.items():
-        outcome.sheet.print("\n".join(curve_lines(deployment, name, result, 100.0 * TOP)))
+        top_pct = 100.0 * ramps[name].top
+        outcome.sheet.print("\n".join(curve_lines(deployment, name, result, top_pct)))
         outcome.numbers[name] = {
             "opens_pct": [
                 round(100.0 * one.opens, 1) for one in (result.negative, result.positive)
@@ -55,7 +57,7 @@ def run(context: Context) -> Outcome:
             "delay_pct": round(100.0 * result.positive.delay, 2),
         }
         limits = deployment.axes[name].config.limits.output_limits()
-        outcome.figures[name] = partial(figure, name, limits, result, 100.0 * TOP)
+        outcome.figures[name] = partial(figure, name, limits, result, top_pct)
     if left:
         text = f"{', '.join(left)}: nothing on a bus shows the speed, so the valve is not measured"
         outcome.sheet.print(f"NOTE: {text}; put deadband_pct of its data sheet into the file")

@@ -1,0 +1,169 @@
+"""Values that a DBC names (VAL_): a fault, or a value because the deployment file says so."""
+
+import json
+from collections import OrderedDict
+from collections.abc import Iterable, Mapping
+from copy import copy
+from dataclasses import dataclass
+
+from cantools.database.can import Signal
+
+from canshaper.codec.signals import find_signal, full_scale, in_range, is_neutral, named_fault
+from canshaper.config.codes import Meaning
+from canshaper.config.schedule import Profile
+from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.similar import there_are
+from canshaper.config.source import Place
+from canshaper.machine.used_message import NamedCode, UsedMessage, key_path
+
+
+@dataclass(frozen=True)
+class Listing:
+    """The signals of one section, and which of their named values are measurements.
+
+    Attributes:
+        place: of the key with the names.
+        signals: names of the signals.
+        codes: meaning by name.
+        values: values that other keys of the file list.
+        moves: the axis that they move; None where they move none.
+        choice: whether every value but an error is one, as it chooses nothing unless it is listed.
+    """
+
+    place: Place
+    signals: tuple[str, ...]
+    codes: Mapping[str, Meaning]
+    values: frozenset[float] = frozenset()
+    moves: str | None = None
+    choice: bool = False
+
+    def is_value(self, name: str, value: float) -> bool:
+        """Whether the file lists it as a measurement."""
+        if meaning := self.codes.get(name):
+            return meaning == "value"
+        return not named_fault(name) and (self.choice or value in self.values)
+
+    def without_values(self, signal: Signal) -> Signal:
+        """The signal with names for what is no measurement only."""
+        choices = signal.choices or OrderedDict()
+        values = [r for r, n in choices.items() if self.is_value(str(n), _value(signal, r))]
+        if not values:
+            return signal
+        result = copy(signal)
+        result.choices = OrderedDict((r, n) for r, n in choices.items() if r not in values)
+        return result
+
+
+def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
+    """Every signal that is read as a number, by bus and message."""
+    result: dict[tuple[str, str], list[Listing]] = {}
+
+    def add(bus: str, message: str, listing: Listing) -> None:
+        result.setdefault((bus, message), []).append(listing)
+
+    for name, axis in config.axes.items():
+        command, joystick = axis.command, config.joysticks.get(axis.command.joystick)
+        signals = (command.signal, *([command.negative] if command.negative else ()))
+        place: Place = ("axes", name, "command", "codes")
+        if joystick:
+            listing = Listing(place, signals, command.codes, moves=name)
+            add(joystick.bus, joystick.message, listing)
+        for key, section in (("feedback", axis.feedback), ("sway_sensor", axis.sway_sensor)):
+            if section:
+                listing = Listing(("axes", name, key, "codes"), (section.signal,), section.codes)
+                add(section.bus, section.message, listing)
+    for name, motion in config.motion.items():
+        if one := motion.radius:
+            listing = Listing(("motion", name, "radius", "codes"), (one.signal,), one.codes)
+            add(one.bus, one.message, listing)
+    if load := config.load_state:
+        values = frozenset(values_of_schedules(config).values())
+        listing = Listing(("load_state", "codes"), (load.signal,), load.codes, values)
+        add(load.bus, load.message, listing)
+    if profile := config.profile:
+        listing = Listing(("profile", "codes"), (profile.signal,), {}, choice=True)
+        add(profile.bus, profile.message, listing)
+    return result
+
+
+def values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
+    """Values of the load state that the gain schedules name, by their places."""
+    parts: dict[Place, AxisConfig | Profile] = {}
+    for name, axis in config.axes.items():
+        parts["axes", name] = axis
+        parts |= {
+            ("axes", name, "profiles", profile): part for profile, part in axis.profiles.items()
+        }
+    return {
+        (*place, "gain_schedule", i, "breakpoint"): one.breakpoint
+        for place, part in parts.items()
+        for i, one in enumerate(part.gain_schedule)
+    }
+
+
+def check_codes(used: UsedMessage, in_dbc: Iterable[Signal], listing: Listing) -> None:
+    """Note what the named values of a section's signals mean; one that is a guess is a problem.
+
+    Args:
+        used: the message, as it is bound.
+        in_dbc: its signals with all their names.
+        listing: the section.
+    """
+    named = [s for s in in_dbc if s.name in listing.signals and s.choices]
+    names = list(dict.fromkeys(str(n) for s in named for n in (s.choices or {}).values()))
+    for name in listing.codes:
+        if name not in names:
+            text = f"expected a value of {' and '.join(listing.signals)} that the DBC names"
+            text += f", got {name!r}{there_are(name, names)}"
+            used.diagnostics.add((*listing.place, name), text)
+    for one in named:
+        if (signal := find_signal(used.message, one.name)) is None:
+            continue
+        for raw, choice in (one.choices or {}).items():
+            means = _meaning(used, listing, signal, raw, str(choice))
+            used.codes.append(NamedCode(used.message.name, one.name, raw, str(choice), means))
+
+
+def is_guess(signal: Signal, raw: float, name: str) -> bool:
+    """Whether a named value may be a measurement or not, as far as the DBC says it."""
+    if named_fault(name) or is_neutral(signal, raw, name):
+        return False
+    return in_range(signal, _value(signal, raw))
+
+
+def _meaning(used: UsedMessage, listing: Listing, signal: Signal, raw: float, name: str) -> str:
+    """What a value means, for people; a problem is noted where the file has to say it."""
+    value, neutral, listed = _value(signal, raw), is_neutral(signal, raw, name), listing.codes
+    needed = "value" if neutral else "fault" if not in_range(signal, value) else None
+    if needed and listed.get(name, needed) != needed:
+        why = "neutral" if neutral else "out of the range"
+        text = f"expected {needed} for {value:g} of {signal.name}, which is {why}"
+        used.diagnostics.add((*listing.place, name), f"{text}, got {listed[name]}")
+    if neutral or listing.is_value(name, value):
+        return _effect(listing, signal, value)
+    if is_guess(signal, raw, name) and name not in listed:
+        would = _effect(listing, signal, value)
+        used.add_fault(
+            f"{signal.name}: expected {key_path(listing.place)} to say whether {raw}"
+            f' "{name}" is a value ({would}) or a fault, got neither;'
+            f" write codes: {{ {json.dumps(name, ensure_ascii=False)}: fault }}"
+        )
+    reason = named_fault(name)
+    return f"fault ({reason.name})" if reason and listing.moves else "fault"
+
+
+def _effect(listing: Listing, signal: Signal, value: float) -> str:
+    """What a value does."""
+    if listing.moves is None:
+        return f"{value:g} {signal.unit or ''}".strip()
+    if not value:
+        return "neutral"
+    full = full_scale(signal)
+    part = max(min(value / full, 1.0), -1.0) if full else 0.0
+    sign = -1 if signal.name in listing.signals[1:] else 1
+    return f"moves {listing.moves} at {100.0 * sign * part:.0f} %"
+
+
+def _value(signal: Signal, raw: float) -> float:
+    """Its value in the unit of the DBC."""
+    return float(raw * signal.scale + signal.offset)
