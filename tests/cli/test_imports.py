@@ -60,6 +60,7 @@ def without(gone: tuple[str, ...], folder: Path, *arguments: str) -> "subprocess
 TOOLS = f"{sys.executable} -m pip install canopen casadi matplotlib numpy scipy"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("missing", "arguments"),
     [

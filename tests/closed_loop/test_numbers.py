@@ -62,6 +62,7 @@ def test_one_axis_after_the_other_reaches_its_numbers() -> None:
     assert slew.residual_reduction_pct >= 90.0
 
 
+@pytest.mark.slow
 def test_recommended_deployment_leaves_next_to_nothing_in_both_planes() -> None:
     deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
     script = SCRIPTS["one-by-one"]

@@ -115,7 +115,7 @@ def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
     assert not [frame for frame in bench.sent if frame[:3] == status.message.key]
 
 
-class Left(Exception):
+class Left(BaseException):
     """In place of the end of the process."""
 
 

@@ -113,6 +113,7 @@ def test_a_good_file_is_a_short_reload(daemon: Daemon) -> None:
     assert daemon.end() == 0
 
 
+@pytest.mark.slow
 def test_a_wrong_file_is_refused_and_no_reload(daemon: Daemon) -> None:
     daemon.file.write_text(daemon.text + "nonsense: 1\nmore: 1\n", encoding="utf-8")
     line = daemon.text.count("\n") + 1
@@ -127,6 +128,7 @@ def test_a_wrong_file_is_refused_and_no_reload(daemon: Daemon) -> None:
     assert len(daemon.received("reload applied")) == 2
 
 
+@pytest.mark.slow
 def test_a_bus_that_cannot_be_opened_ends_the_reload_as_before(daemon: Daemon) -> None:
     changed = daemon.text.replace("virtual, channel: x", "socketcan, channel: nowhere0")
     daemon.file.write_text(changed, encoding="utf-8")

@@ -21,8 +21,8 @@ COUNTERS |= {"InvalidSignals": 255, "SendFailures": 255}
 OVERRUN_OF, OVERRUN_LATE = 200, 8
 
 
-class Violation(AssertionError):
-    """The controller did what was not allowed."""
+class Violation(BaseException):
+    """The controller did what was not allowed; nothing of the program catches it."""
 
 
 class Judge:

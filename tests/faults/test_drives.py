@@ -19,7 +19,7 @@ from tests.faults.variants import NAMES, machine
 
 DRIVES = 10_000
 CHUNK = 250
-# So many in ``make test``, in chunks of 20, and with the tests marked slow; the others are a study.
+# So many in ``make test``, in chunks of 15, and with the tests marked slow; the others are a study.
 QUICK, OFTEN = 240, 2_500
 # Seen after many drives.
 RARE = {SecondSenderUnseen, SendFailureUnseen, StopUnseen}
@@ -38,9 +38,9 @@ def driven(first: int, count: int) -> Counter[str]:
     return stats
 
 
-@pytest.mark.parametrize("first", range(0, QUICK, 20))
+@pytest.mark.parametrize("first", range(0, QUICK, 15))
 def test_no_fault_makes_a_wrong_move(first: int) -> None:
-    assert driven(first, 20)["moves"]
+    assert driven(first, 15)["moves"]
 
 
 @pytest.mark.slow

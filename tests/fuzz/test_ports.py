@@ -2,6 +2,7 @@
 
 import struct
 
+import pytest
 from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
@@ -52,6 +53,7 @@ GONE = put(FAIL, 0) + put(RECEIVE, 0)
 CUT_SHORT = put(ANY + 15, SENT_BACK, bytes(MARK_AT) + b"\1" + bytes(9))
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(name=machines, script=st.lists(steps, max_size=60))
 @example(name=b"\0", script=[])

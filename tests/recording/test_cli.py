@@ -70,6 +70,7 @@ def test_the_same_file_twice_has_two_names(tmp_path: Path) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
+@pytest.mark.slow
 def test_part_of_a_drive(tmp_path: Path) -> None:
     called(DRIVE, "--config", "forwarder.yaml", "--from", "1", "--to", "2", "--out", tmp_path)
     data = json.loads((tmp_path / "replay.json").read_text())["forwarder"]

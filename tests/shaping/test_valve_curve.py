@@ -148,10 +148,10 @@ def test_an_axis_sends_the_command_of_its_curve_and_knows_the_speed(
 
 
 def test_an_added_velocity_goes_through_the_curve_too() -> None:
-    axis = driven(0.5)
+    axis = driven(0.0)
     axis.allow_added(0.25, 1.0)
-    for _ in range(5):
-        axis.tick(CommandInput(0.3), 0.05)
+    for command, added in [(0.5, 0.0)] * 5 + [(0.3, 0.05)] * 5:
+        axis.tick(CommandInput(command), added)
     assert axis.raw == pytest.approx(400, abs=1)
     assert axis.sent == pytest.approx(0.35, abs=2e-3)
 

@@ -39,6 +39,7 @@ def test_an_axis_with_several_filters_has_no_curve() -> None:
     assert residuals(loader("j1939-profiles.yaml")(), {}).keys() <= {"lift"}
 
 
+@pytest.mark.slow
 def test_the_page_gets_those_of_the_sliders(shared: Studio) -> None:
     def slew() -> dict[str, Any]:
         with urlopen(f"http://{shared.host}/residuals.json", timeout=WAIT_S) as answer:

@@ -50,6 +50,7 @@ def settled(page: Page) -> None:
     page.until(lambda s: all((c["swing"] or 0.0) < 0.5 for c in s["cranes"].values()), "rest")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", range(0, len(NONSENSE), MOST_NONSENSE - 5))
 def test_nonsense_is_refused_with_a_word_and_nothing_moves(shared: Studio, start: int) -> None:
     with shared.page() as page:
@@ -66,12 +67,14 @@ def test_nonsense_is_refused_with_a_word_and_nothing_moves(shared: Studio, start
         assert pose(page.shown) == before
 
 
+@pytest.mark.slow
 def test_bytes_are_nonsense(shared: Studio) -> None:
     with shared.page() as page:
         page.connection.send(b"\x00\xff" * 40)
         page.until(lambda _: "expected JSON, got bytes" in page.refused)
 
 
+@pytest.mark.slow
 def test_nonsense_of_the_driver_brings_its_joysticks_to_neutral(shared: Studio) -> None:
     with shared.page() as page:
         page.drive()
@@ -85,6 +88,7 @@ def test_nonsense_of_the_driver_brings_its_joysticks_to_neutral(shared: Studio) 
         assert valves(page.shown, "shaped")[2] == 0.0
 
 
+@pytest.mark.slow
 def test_too_much_nonsense_closes_the_page_and_the_others_go_on(shared: Studio) -> None:
     with shared.page() as page, shared.page() as other:
         for _ in range(MOST_NONSENSE):
@@ -96,6 +100,7 @@ def test_too_much_nonsense_closes_the_page_and_the_others_go_on(shared: Studio) 
         other.until(lambda _: any("is closed" in text for text in other.texts()))
 
 
+@pytest.mark.slow
 def test_a_page_that_sends_too_fast_is_closed_and_its_joysticks_go_to_neutral(
     shared: Studio,
 ) -> None:
@@ -123,6 +128,7 @@ def test_a_page_that_sends_too_fast_is_closed_and_its_joysticks_go_to_neutral(
         assert all(crane["daemon"] for crane in other.shown["cranes"].values())
 
 
+@pytest.mark.slow
 def test_a_huge_message_closes_the_page(shared: Studio) -> None:
     with shared.page() as page:
         page.connection.send("x" * (MOST_BYTES + 1))
@@ -131,6 +137,7 @@ def test_a_huge_message_closes_the_page(shared: Studio) -> None:
         assert closed.value.rcvd and closed.value.rcvd.code == 1009
 
 
+@pytest.mark.slow
 def test_a_silent_page_loses_the_joysticks_then_enable(shared: Studio) -> None:
     with shared.page() as page:
         page.drive()
@@ -146,6 +153,7 @@ def test_a_silent_page_loses_the_joysticks_then_enable(shared: Studio) -> None:
         assert any("is silent; joysticks in neutral" in text for text in page.texts())
 
 
+@pytest.mark.slow
 def test_a_second_driver_stops_the_first(shared: Studio) -> None:
     with shared.page() as page, shared.page() as other:
         page.drive()
@@ -159,6 +167,7 @@ def test_a_second_driver_stops_the_first(shared: Studio) -> None:
         assert any("takes the joysticks from" in text for text in page.texts())
 
 
+@pytest.mark.slow
 def test_a_page_that_is_closed_leaves_the_joysticks_in_neutral(shared: Studio) -> None:
     with shared.page() as other:
         with shared.page() as page:
@@ -172,6 +181,7 @@ def test_a_page_that_is_closed_leaves_the_joysticks_in_neutral(shared: Studio) -
         other.until(lambda s: not s["enable"], "enable released")
 
 
+@pytest.mark.slow
 def test_pages_beyond_the_most_are_refused_with_the_reason(shared: Studio) -> None:
     with ExitStack() as stack:
         for _ in range(MOST_PAGES):

@@ -16,6 +16,8 @@ from studies.paper.reductions import CLAIMS
 from studies.paper.runs import METRICS, Metric, Plane
 from studies.paper.study import Study
 
+pytestmark = pytest.mark.slow  # the whole study is computed
+
 ROOT = Path(__file__).resolve().parents[3]
 # Another program (Runge-Kutta at 1 ms, commands held at 50 Hz) gave these for the paper's slew
 # poles on the linear valve: peak and residual in degrees; those of the near-far poles are in the

@@ -309,7 +309,7 @@ def test_the_guard_stops_a_command_that_is_beyond_the_ramp(
     deployment: Deployment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put = ValveCodec.put
-    monkeypatch.setattr(ValveCodec, "put", lambda valve, steps: put(valve, 2 * steps))
+    monkeypatch.setattr(ValveCodec, "put", lambda valve, raw, steps: put(valve, raw, 2 * steps))
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
     sent = run(drive, hands(deployment), 6.0)
     assert drive.ended == "stopped: OUTPUT_REFUSED"

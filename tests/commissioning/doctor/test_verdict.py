@@ -31,7 +31,7 @@ def test_a_good_pc(run: Make) -> None:
     note = by_subject.pop("wait for the tick")
     assert {f.level for f in by_subject.values()} == {Level.OK}
     assert (note.level, note.remedy) == (Level.NOTE, "tick: { follow: left }")
-    assert note.found == "up to 20 ms, half of that on average; it could be 1.2 ms"
+    assert note.found == "up to 20 ms, half of that on average; it could be 0.9 ms"
 
     subjects = ["lateness", "deadlines", "whole tick", "joystick to valve", "axes"]
     assert list(by_subject) == ["scheduling", "memory"] + [

@@ -121,6 +121,7 @@ def test_a_filter_that_takes_no_swing_away_is_too_poor(machine: Path) -> None:
     assert "% of the swing is left" in proposal.poor[0]
 
 
+@pytest.mark.slow
 def test_what_nothing_measures_is_judged_by_eye(machine: Path) -> None:
     driver = Driver("less")
     one, proposal = drive(machine, driver, {})

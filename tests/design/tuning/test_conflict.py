@@ -51,6 +51,7 @@ def test_bounds_on_single_poles() -> None:
         tune(Task(SwayMode(2.86, 0.001), require=Requirements(pole_distance="printed")))
 
 
+@pytest.mark.slow
 def test_third_pole_and_run_on() -> None:
     require = Requirements(third_pole=True, max_rate_per_s=5.0, max_run_on_s=1.2)
     program = Program(Task(MODE, 0.04, require=require))

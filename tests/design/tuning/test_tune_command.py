@@ -140,6 +140,7 @@ def test_the_longer_tail_leaves_less_swing_at_the_same_stop(file: Path) -> None:
     assert measured[True] == pytest.approx((0.012, 1.86), abs=0.001)
 
 
+@pytest.mark.slow
 def test_a_tail_that_the_stopping_distance_forbids_stays_and_check_warns(file: Path) -> None:
     result = run(file, "--axis", "near_far", "--write", "--json")
     (minus, plus, warning) = json.loads(result.stdout)["changed"]
