@@ -1,0 +1,41 @@
+"""The gate: the one ring through which alone a valve frame leaves.
+
+If this is right, no other line of the program can break promises 1 to 5 of docs/safety.md: no
+motion without an operator; neutral stops; never faster than asked, nor against the joystick; every
+frame is one of its tick; one wrong command reaches no valve. Promise 6, that each fault has a name
+and a way back, is the controller's.
+
+It knows nothing of how a frame was made. It reads the frames of joysticks, switches and emergency
+stop for itself, remembers what it needs of them, and looks at every byte of every frame that wants
+to leave, in every tick: no answer is kept. What it refuses becomes neutral with a reason in the
+log, or nothing where that is refused too.
+
+    build.py     makes the record, once: numbers of the file, signals as cantools has loaded them
+    record.py    the record: identifiers, bits, limits
+    fields.py    bits to numbers and velocities
+    checks.py    checksums, AUTOSAR E2E
+    received.py  messages, switches, joysticks: whole, in sequence, fresh?
+    axis.py      an axis: is it armed, what was asked of it, what left for its valve
+    rules.py     the ten rules, each a function of what was received, what left before, and now
+    gate.py      frames come in, a tick begins, a frame wants to leave; a reload
+
+An axis is *armed* when its joystick was seen in neutral, valid and enabled, since the last reason
+to stop. A soft reason (rule 2) leaves it ``stop_s`` in which it may fall; a hard one (rule 1)
+leaves nothing, and latches where the axis moved: then neutral counts only after reset or enable was
+pressed again. Bad news counts in every frame, however short; good news when the axis has its turn.
+
+    1  stop at once    enable or another switch off, emergency stop, second sender, failed send,
+                       loop that stood still, decoders that disagree, a frame refused before
+    2  stop shaped     silence, counter that stands or jumps, error code, contradiction, frozen
+    3  neutral first   nothing moves that is not armed, but for its shaped stop
+    4  direction, size no faster than asked within the tail, than ``max_pct``, than may be added
+    5  rise, 6 fall    by the rates of the file; a fall to neutral passes, and ends armed
+    7  distance        no farther than was asked and not yet run; path and time of what is added
+    8  bytes           length, every bit that is not ours, signals that agree, checksum
+    9  turn            one frame in the tick in which it is due, with the next alive counter
+    10 identifiers     nothing that the file does not send
+
+The gate allows what the controller may do, and its memory holds more than the controller's, never
+less: where it forgets sooner it refuses a sound frame. What it cannot know: nodes of CANopen, how
+late the loop is, checksums of other packages, and whether slower than asked is right.
+"""

@@ -1,0 +1,215 @@
+"""What the gate remembers of one axis: what was asked of it, and what left for its valve."""
+
+from collections import deque
+
+from canshaper.gate.fields import EPSILON, Word
+from canshaper.gate.received import NEVER, JoystickState, Pending
+from canshaper.gate.record import Axis
+
+FOREIGN_NS = 1_000_000_000
+"""So long a second sender has to be silent."""
+
+
+class Asked:
+    """What was asked in one direction within the tail.
+
+    Attributes:
+        most: the largest of it.
+        owed: distance that was asked and has not been run, full speed times seconds.
+    """
+
+    __slots__ = ("_sizes", "most", "owed")
+
+    def __init__(self) -> None:
+        # Each with the period when it was asked last, the largest first, each later one smaller.
+        self._sizes: deque[tuple[int, float]] = deque()
+        self.most = self.owed = 0.0
+
+    def note(self, size: float, distance: float, period: int, of: Axis) -> None:
+        """So much is asked in this period: a velocity, and a distance since the last one."""
+        sizes, oldest = self._sizes, period - of.tail
+        if not (size or sizes or self.owed):
+            return
+        while sizes and sizes[0][0] < oldest:
+            sizes.popleft()
+        if size:
+            while sizes and sizes[-1][1] <= size:
+                sizes.pop()
+            sizes.append((period, size))
+        if not sizes:
+            self.most = self.owed = 0.0
+            return
+        self.most = sizes[0][1]
+        # Never more than the tail holds: an output that stays slower is owed nothing for it.
+        owed, most = self.owed + distance, self.most * of.tail * of.period_s
+        self.owed = owed if owed < most else most
+
+    def forget(self) -> None:
+        """Nothing was asked."""
+        self._sizes.clear()
+        self.most = self.owed = 0.0
+
+
+class AxisState(Pending):
+    """One axis. It may move while it is armed, and for ``stop_left`` periods of a shaped stop.
+
+    Attributes:
+        demand: of the last joystick frame that counts, and ``changed_ns`` since when.
+        ramp: of a measurement, the demand in the place of the joystick's, which stays neutral.
+        foreign_ns: when a second sender was received last.
+        armed: the joystick was seen in neutral, valid and enabled, since the last reason to stop.
+        latched: neutral does not arm before reset or enable is pressed again.
+        cause: ticks that were made before the last reason that latched.
+        why: why it is not armed.
+        now: demand in this period, where it is armed.
+        forth, back: what was asked in each direction.
+        least, most: what may leave in this tick.
+        asks, asked: something is asked of it or its partner: in this period, in it or the last one.
+        unseen: it may be in a shaped stop of whose reason the gate does not know.
+        due: it has its turn in this tick, and has sent nothing yet.
+        ticks: periods since its last frame.
+        last: velocity of that frame; ``top`` what it may have been before it was rounded.
+        zero_at: ticks that were made before it came to rest, or lost the right to move.
+        way, alone: distance and periods in motion since something was asked of it.
+    """
+
+    def __init__(self, axis: Axis, joystick: JoystickState) -> None:
+        super().__init__()
+        self.of, self.joystick = axis, joystick
+        self.partner: AxisState | None = None
+        self.demand: float | None = None
+        self.ramp: float | None = None
+        self.changed_ns = 0
+        self.foreign_ns = NEVER
+        self.armed = self.latched = False
+        self.stop_left = 0
+        self.cause = NEVER
+        self.why = "start"
+        self.now = 0.0
+        self.forth, self.back = Asked(), Asked()
+        self.least = self.most = 0.0
+        self.asks = self.asked = self.unseen = self.due = False
+        self.ticks = 0
+        self.last, self.top = 0.0, axis.step
+        self.zero_at = NEVER
+        self.way, self.alone = 0.0, 0
+
+    def take(self, word: Word, now_ns: int) -> None:
+        """A frame of its joystick that counts."""
+        demand = self.of.stick.demand(word)
+        if demand != self.demand:
+            self.demand, self.changed_ns = demand, now_ns
+
+    def halt(self, why: str, made: int, *, latch: bool) -> None:
+        """Stop at once."""
+        if self.armed or self.last:
+            self.zero_at = made
+        self.armed, self.stop_left, self.why = False, 0, why
+        if latch:
+            self.latched, self.cause = True, made
+        self.forth.forget()
+        self.back.forget()
+        self.least = self.most = 0.0
+
+    def look(
+        self,
+        why: str,
+        demand: float | None,
+        made: int,
+        number: int,
+        passed: int,
+        *,
+        latches: bool,
+    ) -> None:
+        """Whether it may move in this period, and what is asked of it.
+
+        Args:
+            why: the reason to stop at once; ``latches`` whether it latches at rest too.
+            demand: of the joystick; None is a reason to stop shaped.
+            made: ticks that were made.
+            number: of this deadline.
+            passed: periods since the last one; more than 1 where deadlines were missed.
+        """
+        of, before = self.of, self.now
+        self.now = 0.0
+        self.ticks += 1
+        left = self.stop_left - passed if self.stop_left > passed else 0
+        if why:
+            self.halt(why, made, latch=latches or self.last != 0.0)
+        elif demand is None:
+            self.stop_left = of.stop if self.armed else left
+            self.armed, self.why = False, "joystick"
+        elif abs(demand) > of.stick.band or (self.armed and self.ramp):
+            self.stop_left = left
+            self.now = demand if self.armed else 0.0
+        else:
+            moving = self.last or self.forth.most or self.back.most
+            self.stop_left = left if moving else 0
+            if not self.latched or self.joystick.press >= self.cause - of.period:
+                self.latched, self.armed = False, True
+        self.hard, self.latches, self.lost = "", False, False
+        self._ask(before, number // of.period, passed)
+
+    def _ask(self, before: float, period: int, passed: int) -> None:
+        """Remember what is asked; over deadlines that were missed the demand before was held."""
+        of, now = self.of, self.now
+        distance = (now + before * (passed - 1)) * of.period_s
+        forth = distance if distance > 0.0 else 0.0
+        self.forth.note(now if now > 0.0 else 0.0, forth, period, of)
+        self.back.note(-now if now < 0.0 else 0.0, forth - distance, period, of)
+
+    def free(self, number: int) -> bool:
+        """Whether no distance is owed: the file allows more, or a bypass is not long ago.
+
+        After a bypass the filter still runs what was asked in it.
+        """
+        of = self.of
+        return of.faster or of.reverse or number - self.joystick.bypass <= (of.tail + 2) * of.period
+
+    def dropped(self, made: int) -> float:
+        """How much of the velocity may end in one frame: what a partner added, when that stops.
+
+        Of one that is at rest the gate does not know when it has stopped.
+        """
+        partner = self.partner
+        if partner is None:
+            return 0.0
+        if made - partner.zero_at <= 2 * self.of.period:
+            return 1.0
+        return 0.0 if partner.last else self.of.added
+
+    def left(self, velocity: float, made: int, number: int) -> None:
+        """A frame has left."""
+        of, size = self.of, abs(velocity)
+        passed, self.ticks = self.ticks, 0
+        asked = self.forth if velocity > 0.0 else self.back
+        reach = self.most if velocity > 0.0 else -self.least
+        fallen = self.top - of.fall * passed if velocity * self.last >= 0.0 else 0.0
+        if not velocity:
+            if self.last:
+                self.zero_at = made
+            fall = of.fall * max(passed, 1) + 1.5 * of.step
+            if abs(self.last) > fall + self.dropped(made):
+                # Nothing falls so fast but a stop: from here on it is neutral first.
+                self.halt("fell to neutral at once", made, latch=False)
+        if not self.asked or self.forth.most or self.back.most:
+            self.way, self.alone = 0.0, 0
+        else:
+            self.way += velocity * of.period_s
+            self.alone = self.alone + 1 if velocity else 0
+        if size > fallen + EPSILON and not self.free(number):
+            asked.owed -= size * of.period_s * passed
+        self.top = size + of.step
+        if size > reach + EPSILON:
+            if self.armed and size > fallen + EPSILON:
+                self.armed, self.stop_left, self.why = False, of.stop, "ran on against its stick"
+            else:
+                self.top = min(self.top, max(reach, fallen))
+        self.last = velocity
+
+    def carry_over(self, before: "AxisState") -> None:
+        """What is latched stays latched over a reload, and what no tick has seen yet counts."""
+        self.latched = self.latched or before.latched
+        self.cause = max(self.cause, before.cause)
+        self.hard, self.latches = self.hard or before.hard, self.latches or before.latches
+        self.foreign_ns = max(self.foreign_ns, before.foreign_ns)

@@ -1,0 +1,449 @@
+"""Makes the record of a machine, once: from the numbers of its file and cantools' signals.
+
+The one module of the gate that reads anything else of the program, and it reads data only. That the
+file and its DBC files go together is checked before; no codec is used.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any, Literal
+
+from canshaper.gate.checks import AUTOSAR8, COUNTS, HEADERS, Check, Checksum, Crc, E2e
+from canshaper.gate.fields import EPSILON, Command, Field, Opening, Part, Resolution, Stick
+from canshaper.gate.record import Axis, Joystick, Key, Message, Record, Switch, Valve
+
+MS = 1_000_000
+REALS = {16: "<e", 32: "<f", 64: "<d"}
+NEUTRAL = ("neutral", "neutralposition", "center", "centre", "zero", "released")
+"""Names of a code that is a measurement where its value is 0."""
+CRCS = {
+    "crc8_sae_j1850": Crc(8, 0x1D, 0xFF, 0xFF),
+    "crc8_autosar": AUTOSAR8,
+    "crc16_ccitt_false": Crc(16, 0x1021, 0xFFFF, 0),
+    "crc16_arc": Crc(16, 0x8005, 0, 0, reflected=True),
+}
+# J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
+REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
+SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
+# CiA 301 and CiA 408: heartbeat, NMT start; init, disabled, hold, active, reset of a fault.
+HEARTBEAT, NMT, START = 0x700, 0x000, 1
+WORDS = frozenset((0x8, 0x9, 0xB, 0xF, 0x3))
+
+
+def record_of(deployment: Any) -> Record:
+    """The record of a deployment."""
+    config = deployment.config
+    messages = {name: _message(name, one, config) for name, one in deployment.joysticks.items()}
+    switches: dict[str, Switch] = {}
+    for number, bound in enumerate(deployment.switches):
+        name = f"switches {number}"
+        messages[name] = _message(name, bound, config)
+        for switch, (signal, on) in bound.switches.items():
+            switches[switch] = Switch(name, field_of(bound.message, signal), on)
+    stop = None
+    if bound := deployment.emergency_stop:
+        messages["emergency stop"] = _message("emergency stop", bound, config)
+        stop = Switch("emergency stop", field_of(bound.message, bound.config.signal), 0)
+    axes = {name: _axis(bound, deployment) for name, bound in deployment.axes.items()}
+    for motion in config.motion.values():
+        _add_motion(axes, motion, deployment)
+    keys: dict[Key, list[str]] = {}
+    for name, axis in axes.items():
+        keys.setdefault(axis.valve, []).append(name)
+    valves = {key: _valve(tuple(names), deployment) for key, names in keys.items()}
+    return Record(
+        messages,
+        {name: _joystick(name, deployment, switches) for name in deployment.joysticks},
+        axes,
+        valves,
+        stop,
+        {key: one for key, one in _others(deployment) if key not in valves},
+        {name: (bus.interface, bus.channel) for name, bus in config.buses.items()},
+        deployment.listen_only,
+    )
+
+
+# --- signals -------------------------------------------------------------------------------------
+
+
+def _signal(message: Any, name: str) -> Any:
+    return next(signal for signal in message.signals if signal.name == name)
+
+
+def field_of(message: Any, name: str) -> Field:
+    """Where a signal lies in its message."""
+    signal = _signal(message, name)
+    big = signal.byte_order == "big_endian"
+    # Of Intel ``start`` is the lowest bit; of Motorola the highest, counted within its byte.
+    first = signal.start // 8 * 8 + 7 - signal.start % 8
+    return Field(
+        8 * message.length - first - signal.length if big else signal.start,
+        (1 << signal.length) - 1,
+        1 << signal.length - 1 if signal.is_signed and not signal.is_float else 0,
+        int(big),
+        REALS[signal.length] if signal.is_float else "",
+    )
+
+
+def _bits(field: Field, length: int, raw: int = -1) -> int:
+    """Where a field lies in a frame of so many bytes, byte 0 the lowest; or a value of it."""
+    order: Literal["little", "big"] = "big" if field.order else "little"
+    data = ((raw & field.mask) << field.shift).to_bytes(length, order)
+    return int.from_bytes(data, "little")
+
+
+def _ends(signal: Any) -> tuple[int, int]:
+    """Smallest and largest raw value that the bits of an integer signal hold."""
+    half = 1 << signal.length - 1
+    return (-half, half - 1) if signal.is_signed else (0, 2 * half - 1)
+
+
+class Scale:
+    """Scale, offset and range of a velocity: those of the DBC, as the file corrects them."""
+
+    def __init__(self, signal: Any, section: Any, *, magnitude: bool) -> None:
+        scale, offset = signal.scale, signal.offset - (section.zero or 0.0)
+        low, high = signal.minimum, signal.maximum
+        if section.full is not None:
+            low, high = 0.0 if magnitude else -section.full, section.full
+            if not signal.is_float and not magnitude:
+                # Two's complement reaches one step farther on one side.
+                ends = sorted(raw * scale + offset for raw in _ends(signal))
+                step = abs(scale) * (1.0 + EPSILON)
+                low = ends[0] if 0.0 < low - ends[0] <= step else low
+                high = ends[1] if 0.0 < ends[1] - high <= step else high
+        elif section.zero:
+            low, high = low - section.zero, high - section.zero
+        if section.invert:
+            scale, offset, low, high = -scale, -offset, -high, -low
+        self.scale, self.offset, self.low, self.high = scale, offset, low, high
+        self.full = min(-low, high) if low < 0.0 else high
+
+
+class Uncorrected:
+    """Of a signal that the file does not correct."""
+
+    full, zero, invert = None, None, False
+
+
+def part_of(field: Field, signal: Any, section: Any) -> Part:
+    """A signal of a joystick, as the DBC has it; a code with a name is no measurement.
+
+    Whatever the name; but for those that the file lists as a value, and neutral at exactly 0.
+    """
+    of = Scale(signal, section, magnitude=bool(section.flags or section.negative))
+    listed, named = getattr(section, "codes", {}), set()
+    for code, name in (signal.choices or {}).items():
+        letters = "".join(filter(str.isalpha, str(name))).lower()
+        neutral = letters in NEUTRAL and abs(code * of.scale + of.offset) < EPSILON
+        if listed.get(str(name)) != "value" and not neutral:
+            named.add(code)
+    low, high = min(of.low / of.full, -1.0) - EPSILON, of.high / of.full + EPSILON
+    return Part(field, of.scale, of.offset, of.full, low, high, frozenset(named))
+
+
+def stick_of(message: Any, command: Any, in_dbc: Any) -> Stick:
+    """The demand of an axis in the message of its joystick; ``in_dbc`` has it uncorrected."""
+    part, *back = (
+        part_of(field_of(message, name), _signal(in_dbc, name), command)
+        for name in filter(None, (command.signal, command.negative))
+    )
+    flags: tuple[Field, ...] = ()
+    if one := command.flags:
+        flags = tuple(field_of(message, name) for name in (one.neutral, one.negative, one.positive))
+    return Stick(part, back[0] if back else None, flags, command.neutral_pct / 100.0)
+
+
+def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
+    """The command of an axis in its valve's message; ``joystick`` where that is one of its own."""
+    names: tuple[str, ...] = ()
+    signs: dict[tuple[float, ...], int] = {}
+    if one := valve.direction:
+        names, signs = (one.signal,), {(one.neutral,): 0, (one.positive,): 1, (one.negative,): -1}
+    elif joystick and (flags := joystick.flags):
+        names = flags.neutral, flags.negative, flags.positive
+        signs = {(1, 0, 0): 0, (0, 0, 1): 1, (0, 1, 0): -1}
+    back = joystick.negative if joystick else None
+
+    def resolution(name: str, section: Any) -> Resolution:
+        of = Scale(_signal(in_dbc, name), section, magnitude=bool(names or back))
+        full = math.floor(of.full / abs(of.scale) + EPSILON)
+        zero = round(-of.offset / of.scale)
+        return Resolution(field_of(message, name), zero, 1 if of.scale > 0 else -1, full)
+
+    return Command(
+        resolution(valve.signal, joystick or valve),
+        tuple(field_of(message, name) for name in names),
+        signs,
+        resolution(back, joystick) if back else None,
+        tuple(resolution(name, Uncorrected) for name in valve.also),
+    )
+
+
+def openings_of(limits: Any, full: int) -> tuple[Opening, Opening]:
+    """Of the positive and of the negative direction."""
+    commands, speeds = limits.curve_command_pct, limits.curve_speed_pct
+    if commands is None or speeds is None:
+        one = Opening((limits.deadband_pct / 100.0 * full, float(full)), (0.0, 1.0))
+        return one, one
+    points = [(c / 100.0 * full, v / 100.0) for c, v in zip(commands, speeds, strict=True)]
+    edge = next(i for i, (_, speed) in enumerate(points) if speed == 0.0)
+    forth, back = points[edge + 1 :], [(-c, -v) for c, v in points[edge::-1]]
+    return (
+        Opening(tuple(c for c, _ in forth), tuple(v for _, v in forth)),
+        Opening(tuple(c for c, _ in back), tuple(v for _, v in back)),
+    )
+
+
+# --- what is received ----------------------------------------------------------------------------
+
+
+def _message(name: str, bound: Any, config: Any) -> Message:
+    section, message = bound.config, bound.message
+    can_id = message.frame_id if section.source is None else message.frame_id & ~0xFF
+    can_id |= section.source or 0
+    ids, group = frozenset((can_id,)), None
+    if message.protocol == "j1939":
+        mask = _group(can_id)
+        if can_id & 0xFF == FREE:
+            ids, group = frozenset(), (mask, can_id & mask)
+        else:
+            ids = frozenset(priority << 26 | can_id & 0x03FFFFFF for priority in range(8))
+    check, checked, counter, counts = protection_of(section, message, can_id)
+    page, alone = None, False
+    if section.multiplexor is not None:
+        chosen = bound.codec.chosen
+        page, alone = (field_of(message, chosen.signal), section.multiplexor), chosen.alone
+    node, most = config.buses[section.bus].j1939, min(3, counts // 2)
+    return Message(
+        *(name, section.bus, ids, message.is_extended_frame, message.length),
+        timeout_ns=section.timeout_ms * MS,
+        check=check,
+        checked=checked,
+        counter=counter,
+        counts=counts,
+        most_step=section.alive_max_step or most,
+        qualify=section.qualify,
+        page=page,
+        alone=alone,
+        group=group,
+        own=node.address if node else -1,
+    )
+
+
+def _group(can_id: int) -> int:
+    """Bits of an identifier of J1939 that say what it is; below PF 240 a destination follows."""
+    return 0x03FF0000 if (can_id >> 16) & 0xFF < 240 else 0x03FFFF00
+
+
+def protection_of(
+    section: Any, message: Any, can_id: int
+) -> tuple[Check | None, bool, Field | None, int]:
+    """Check, whether it is known here, counter and its values, by a section of the file."""
+    if one := section.e2e:
+        counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
+        check = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
+        return check, True, None, counts
+    counter = field_of(message, section.alive_counter) if section.alive_counter else None
+    counts = counter.mask + 1 if counter else 0
+    if section.checksum is None:
+        return None, True, counter, counts
+    checksum = _checksum(section.checksum, message, can_id)
+    return checksum, checksum is not None, counter, counts
+
+
+def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
+    """A checksum; None for one of another package."""
+    signal, kind = _signal(message, section.signal), section.kind
+    bits = signal.length
+    place = _bits(field_of(message, section.signal), message.length)
+    lowest = (place & -place).bit_length() - 1
+    order = "big" if signal.byte_order == "big_endian" and bits > 8 else "little"
+    where: Any = {"byte": lowest // 8, "shift": lowest % 8, "bits": bits, "order": order}
+    if kind is None:
+        crc = Crc(bits, section.polynomial, section.start, section.end, section.reflected)
+        return Checksum(crc, **where)
+    plus = {"sum": 0, "sum_id": sum(can_id.to_bytes(4, "little")), "sum_length": message.length}
+    if kind in plus:
+        return Checksum("sum", **where, plus=plus[kind])
+    how: Any = {"xor": "xor", "sum4": "halves", **CRCS}.get(kind)
+    return Checksum(how, **where) if how else None
+
+
+def _joystick(name: str, deployment: Any, switches: dict[str, Switch]) -> Joystick:
+    bound = deployment.joysticks[name]
+    enabling = []
+    for number, (of, signal) in enumerate(bound.conditions):
+        if of is None:
+            enabling.append(switches[signal])
+            continue
+        field = field_of(deployment.joysticks[of].message, signal)
+        enabling.append(Switch(of, field, 1, only_zero=number == 0 and of == name))
+    pressed, *others = enabling
+    config, message = bound.config, bound.message
+    reset = field_of(message, config.reset) if config.reset else None
+    bypass = field_of(message, config.anti_sway_off) if config.anti_sway_off else None
+    own, stuck_ns = pressed.message == name, round(config.stuck_s * 1e9)
+    return Joystick(name, pressed, own, tuple(others), reset, bypass, stuck_ns)
+
+
+# --- axes and their valves -----------------------------------------------------------------------
+
+
+def _axis(bound: Any, deployment: Any) -> Axis:
+    config, limits, find = bound.config, bound.config.limits, deployment.messages.find
+    period_s = deployment.config.tick_ms * 1e-3 * bound.period_ticks
+    joystick, valve = deployment.joysticks[config.command.joystick], config.valve
+    forwarded = _forwarded(config, deployment)
+    rewritten, in_dbc = config.command if forwarded else None, find(valve.message)[1]
+    command = command_of(bound.valve_message, valve, rewritten, in_dbc)
+    control, start = deployment.config.control, f"axes.{bound.name}."
+    ranges = (control.adjustable if control else {}).items()
+    return Axis(
+        name=bound.name,
+        joystick=config.command.joystick,
+        signal=config.command.signal,
+        stick=stick_of(joystick.message, config.command, find(joystick.config.message)[1]),
+        valve=_valve_key(bound, deployment),
+        command=command,
+        openings=openings_of(limits, command.size.full),
+        period=bound.period_ticks,
+        period_s=period_s,
+        maximum=limits.max_pct / 100.0,
+        rise=limits.rise_per_s * period_s,
+        fall=limits.fall_per_s * period_s,
+        tail=round(limits.tail_s / period_s),
+        stop=max(1, round(limits.stop_s / period_s)),
+        faster=limits.allow_faster,
+        reverse=limits.allow_reverse,
+        brake_shaped=limits.reversal == "brake_shaped",
+        forwarded=forwarded,
+        node=joystick.config.node is not None,
+        full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
+        ranges={k.removeprefix(start): tuple(ends) for k, ends in ranges if k.startswith(start)},
+    )
+
+
+def _forwarded(axis: Any, deployment: Any) -> bool:
+    """Whether the command of an axis leaves in the frames of its own joystick."""
+    gateway = deployment.config.gateway
+    joystick = deployment.config.joysticks[axis.command.joystick]
+    other = gateway.other(axis.valve.bus) if gateway else None
+    return bool(other) and (joystick.bus, joystick.message) == (other, axis.valve.message)
+
+
+def _valve_key(bound: Any, deployment: Any) -> Key:
+    bus, message = bound.config.valve.bus, bound.valve_message
+    can_id = message.frame_id
+    if message.protocol == "j1939":
+        node, source = deployment.config.buses[bus].j1939, None
+        if _forwarded(bound.config, deployment):
+            source = deployment.joysticks[bound.config.command.joystick].config.source
+        elif node:
+            source = node.address
+        can_id = can_id if source is None else can_id & ~0xFF | source
+    return bus, can_id, message.is_extended_frame
+
+
+def _add_motion(axes: dict[str, Axis], motion: Any, deployment: Any) -> None:
+    slew, near_far = axes[motion.slew], axes[motion.near_far] if motion.near_far else None
+    for axis in filter(None, (slew, near_far)):
+        axis.added = motion.max_pct / 100.0
+        axis.most_periods = round(motion.max_s / axis.period_s)
+    if near_far is not None:
+        slew.partner, near_far.partner = near_far.name, slew.name
+        sensor = deployment.axes[near_far.name].config.sway_sensor
+        damps = sensor is not None and sensor.use == "damp"
+        near_far.path_m = motion.max_path_m * (2.0 if damps else 1.0)
+        near_far.path = near_far.path_m / near_far.full_m_s
+
+
+def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
+    bound = [deployment.axes[name] for name in names]
+    first, message = bound[0], bound[0].valve_message
+    valve, forwarded = first.config.valve, _forwarded(first.config, deployment)
+    j1939 = message.protocol == "j1939"
+    check, _, counter, counts = protection_of(valve, message, _valve_key(first, deployment)[1])
+    moving = {valve.alive_counter, valve.checksum.signal if valve.checksum else None}
+    words = []
+    for one in bound:
+        of, command = one.config.valve, one.config.command
+        moving |= {of.signal, *of.also, of.direction.signal if of.direction else None}
+        if of.cia408:
+            moving.add(of.cia408.control)
+            words.append((field_of(message, of.cia408.control), WORDS))
+        if forwarded:
+            flags = command.flags.model_dump().values() if command.flags else ()
+            moving |= {command.negative, *flags}
+    header = 8 * HEADERS.get(valve.e2e.profile, 2) if valve.e2e else 0
+    ours, known, value = (1 << header) - 1, 0, 0
+    own: list[tuple[Field, frozenset[float]]] = []
+    enable = deployment.joysticks[first.config.command.joystick].conditions[0].name
+    for signal in message.signals:
+        field = field_of(message, signal.name)
+        known |= (bits := _bits(field, message.length))
+        if signal.name in moving:
+            ours |= bits
+            continue
+        start = _start(signal, j1939=j1939)
+        value |= _bits(field, message.length, int(start))
+        if not bits & ours:
+            rest = {1} if signal.name == enable else _rest(signal)
+            own.append((field, frozenset({start, *rest})))
+    fixed = 0 if forwarded else (1 << 8 * message.length) - 1 & ~ours
+    return Valve(
+        *(message.length, names, fixed, (value | ~known if j1939 else value) & fixed, ours),
+        words=tuple(words),
+        own=tuple(own) if forwarded else (),
+        enable=field_of(message, enable) if forwarded else None,
+        check=check,
+        counter=counter,
+        counts=counts,
+        group=_group(message.frame_id) if j1939 and not forwarded else 0,
+    )
+
+
+def _start(signal: Any, *, j1939: bool) -> float:
+    """What a signal carries that no one sets: GenSigStartValue; in J1939 all ones, in others 0."""
+    if signal.is_float:
+        return float(signal.raw_initial or 0.0)
+    low, high = _ends(signal)
+    if j1939 and signal.raw_initial is None:
+        return -1 if signal.is_signed else high
+    return min(max(int(signal.raw_initial or 0), low), high)
+
+
+def _rest(signal: Any) -> set[float]:
+    """Raw value 0 of a velocity, which asks for nothing either."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or not low < 0 < high:
+        return set()
+    rest = -signal.offset / signal.scale
+    return {rest if signal.is_float else round(rest)}
+
+
+def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
+    """What leaves besides: status, and what our nodes say about themselves."""
+    anything: frozenset[bytes] = frozenset()
+    config = deployment.config
+    for status in (config.status, config.identity, *(one.status for one in config.axes.values())):
+        if status is None:
+            continue
+        message, node = deployment.messages.find(status.message)[1], config.buses[status.bus].j1939
+        can_id = message.frame_id
+        if message.protocol == "j1939" and node:
+            can_id = can_id & ~0xFF | node.address
+        key = status.bus, can_id, message.is_extended_frame
+        yield key, (frozenset(range(message.length, 65)), anything)
+    for name, bus in config.buses.items():
+        if bus.j1939:
+            address = bus.j1939.address
+            for can_id in (CLAIMED | address, CLAIMED | FREE, *(one | address for one in SENT)):
+                yield (name, can_id, True), (frozenset((8,)), anything)
+            yield (name, REQUEST | FREE, True), (frozenset((3,)), anything)
+        if bus.canopen:
+            alive = frozenset((b"\0", b"\5"))
+            yield (name, HEARTBEAT + bus.canopen.node, False), (frozenset((1,)), alive)
+            if bus.canopen.master:
+                starts = frozenset(bytes((START, one.id)) for one in bus.canopen.nodes.values())
+                yield (name, NMT, False), (frozenset((2,)), starts)

@@ -1,0 +1,181 @@
+"""Checksums of frames, and profiles of AUTOSAR E2E: the gate's own, from their definitions."""
+
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import xor
+from typing import Literal, Protocol
+
+Order = Literal["little", "big"]
+
+
+class Check(Protocol):
+    """What protects the content of a frame."""
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame of the right length carries what it should."""
+
+
+@dataclass(slots=True)
+class Crc:
+    """A CRC by its numbers, as catalogues give them; a byte at a time, by a table.
+
+    Attributes:
+        bits: width of the register, 8 to 64.
+        polynomial: without its highest bit.
+        start: register before the first byte.
+        end: what is added (exclusive or) to the register after the last byte.
+        reflected: the lowest bit of each byte comes first.
+    """
+
+    bits: int
+    polynomial: int
+    start: int
+    end: int
+    reflected: bool = False
+    table: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.table = tuple(map(self._after, range(256)))
+        if self.reflected:
+            self.start = _turned(self.start, self.bits)
+
+    def _after(self, byte: int) -> int:
+        """Register after one byte, where it was 0 before."""
+        bits, ones = self.bits, (1 << self.bits) - 1
+        value = (_turned(byte, 8) if self.reflected else byte) << (bits - 8)
+        for _ in range(8):
+            value = (value << 1 ^ (self.polynomial if value >> (bits - 1) else 0)) & ones
+        return _turned(value, bits) if self.reflected else value
+
+    def of(self, data: bytes) -> int:
+        """CRC of these bytes."""
+        value, table = self.start, self.table
+        if self.reflected:
+            for byte in data:
+                value = value >> 8 ^ table[(value ^ byte) & 0xFF]
+        else:
+            top, ones = self.bits - 8, (1 << self.bits) - 1
+            for byte in data:
+                value = value << 8 & ones ^ table[value >> top ^ byte]
+        return value ^ self.end
+
+
+def _turned(value: int, bits: int) -> int:
+    """The same bits in the other order."""
+    return int(f"{value:0{bits}b}"[::-1], 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Checksum:
+    """A checksum over all other bits of a frame.
+
+    Attributes:
+        how: a CRC, or ``xor``, ``sum`` (of the bytes), ``halves`` (sum of the half bytes).
+        byte, shift, bits, order: where it lies.
+        plus: what is added to a sum: the bytes of the identifier, or the length.
+    """
+
+    how: Crc | Literal["xor", "sum", "halves"]
+    byte: int
+    shift: int = 0
+    bits: int = 8
+    order: Order = "little"
+    plus: int = 0
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame carries the checksum of the rest of it."""
+        at, ones = self.byte, (1 << self.bits) - 1
+        end = at + (self.bits + 7) // 8
+        sent = int.from_bytes(data[at:end], self.order)
+        others = data[:at] + data[end:]
+        if isinstance(self.how, Crc):
+            value = self.how.of(others)
+        elif self.how == "xor":
+            value = reduce(xor, others, 0)
+        elif self.how == "sum":
+            value = sum(others) + self.plus
+        else:
+            rest = sent & ~(ones << self.shift)
+            value = sum(byte + (byte >> 4) for byte in (*others, rest))
+        return value & ones == sent >> self.shift & ones
+
+
+J1850 = Crc(8, 0x1D, 0, 0)
+"""Of profiles 1 and 11, which neither start with ones nor invert the result."""
+AUTOSAR8 = Crc(8, 0x2F, 0xFF, 0xFF)
+CCITT = Crc(16, 0x1021, 0xFFFF, 0)
+CRC32P4 = Crc(32, 0xF4ACFB13, 0xFFFF_FFFF, 0xFFFF_FFFF, reflected=True)
+CRC64 = Crc(64, 0x42F0_E1EB_A9EA_3693, (1 << 64) - 1, (1 << 64) - 1, reflected=True)
+
+
+@dataclass(frozen=True, slots=True)
+class E2e:
+    """CRC and counter in the first bytes of a frame (AUTOSAR PRS_E2EProtocol).
+
+    Attributes:
+        profile: p01, p02, p04, p05, p06, p07, p11 or p22.
+        counts: values of the counter.
+        data_id: of the message.
+        mode: bytes of the data ID that enter the CRC, profiles 1 and 11.
+        ids: data IDs by the counter, profiles 2 and 22.
+    """
+
+    profile: str
+    counts: int
+    data_id: int = 0
+    mode: str = ""
+    ids: bytes = b""
+
+    def count(self, data: bytes) -> int:
+        """The counter of a frame."""
+        first, last = COUNTERS[self.profile]
+        count = int.from_bytes(data[first:last], "big")
+        return count & 0x0F if last == 2 else count
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame has the header that it should."""
+        profile, count = self.profile, self.count(data)
+        if count >= self.counts:
+            return False
+        if profile in ("p01", "p11"):
+            return self._first(data, count)
+        if profile in ("p02", "p22"):
+            return data[0] == AUTOSAR8.of(data[1:] + self.ids[count : count + 1])
+        # The others lay length, counter and data ID over the frame, high bytes first but in 5.
+        if profile == "p05":
+            crc = CCITT.of(data[2:] + self.data_id.to_bytes(2, "little"))
+            head = crc.to_bytes(2, "little")
+        elif profile == "p06":
+            crc = CCITT.of(data[2:] + self.data_id.to_bytes(2, "big"))
+            head = crc.to_bytes(2, "big") + len(data).to_bytes(2, "big")
+        elif profile == "p04":
+            head = len(data).to_bytes(2, "big") + data[2:4] + self.data_id.to_bytes(4, "big")
+            head += CRC32P4.of(data[:8] + data[12:]).to_bytes(4, "big")
+        else:
+            head = CRC64.of(data[8:]).to_bytes(8, "big") + len(data).to_bytes(4, "big")
+            head += data[12:16] + self.data_id.to_bytes(4, "big")
+        return data.startswith(head)
+
+    def _first(self, data: bytes, count: int) -> bool:
+        """Profiles 1 and 11: the data ID by its mode comes before the bytes from 1."""
+        low, high = self.data_id & 0xFF, self.data_id >> 8
+        if self.mode == "nibble" and data[1] >> 4 != high & 0x0F:
+            return False
+        first = {
+            "both": (low, high),
+            "low": (low,),
+            "nibble": (low, 0),
+            "alternating": (high if count & 1 else low,),
+        }[self.mode]
+        return data[0] == J1850.of(bytes(first) + data[1:])
+
+
+COUNTERS = {
+    "p01": (1, 2), "p11": (1, 2), "p02": (1, 2), "p22": (1, 2), "p04": (2, 4), "p05": (2, 3),
+    "p06": (4, 5), "p07": (12, 16),
+}  # fmt: skip
+"""First byte of the counter and the one behind it; in byte 1 it fills the lower half only."""
+COUNTS = {"p01": 15, "p11": 15, "p02": 16, "p22": 16, "p04": 1 << 16, "p07": 1 << 32}
+"""Values of the counter; of the others 256."""
+HEADERS = {"p04": 12, "p05": 3, "p06": 5, "p07": 20}
+"""Bytes of the header; of the others 2."""

@@ -1,0 +1,195 @@
+"""The ten rules: each a function of what was received, what left before, and now.
+
+1 and 2 say why an axis has to stop, 3 to 7 why a velocity may not leave, 8 and 9 why a frame may
+not, 10 why an identifier may not. Empty text, or None for no fault, is that it may.
+"""
+
+from canshaper.gate.axis import FOREIGN_NS, AxisState
+from canshaper.gate.fields import EPSILON, Word
+from canshaper.gate.received import SwitchState
+from canshaper.gate.record import Key, Record, Valve
+
+SLACK = 0.4
+"""Distance that a sound filter may run ahead of what was asked, full speed times seconds."""
+LATE = 100
+"""Ticks after a missed deadline in which the loop may count as overrun."""
+
+
+def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool]:
+    """Rule 1: enable, emergency stop, a second sender; limit: none, seen once is enough.
+
+    And whether that latches at rest too; in motion it always does.
+    """
+    why, latches = axis.hard, axis.latches
+    if stop is not None and stop.off(now_ns):
+        why, latches = stop.why, latches or stop.released
+    if now_ns - axis.foreign_ns <= FOREIGN_NS:
+        why, latches = "second sender", True
+    return why or axis.joystick.gone, latches
+
+
+def demand_of(axis: AxisState, now_ns: int) -> float | None:
+    """Rule 2: the demand; None for silence, error codes, a frozen stick; limit: the timeout."""
+    demand, joystick = axis.demand, axis.joystick
+    if demand is None or axis.lost or not joystick.valid:
+        return None
+    if now_ns - axis.changed_ns > joystick.of.stuck_ns and abs(demand) > axis.of.stick.band:
+        return None
+    if axis.ramp is not None:  # whoever touches the joystick ends it; it begins armed
+        if abs(demand) > axis.of.stick.band:
+            return None
+        return axis.ramp if axis.armed else demand
+    return demand
+
+
+def neutral_first(axis: AxisState) -> str:
+    """Rule 3: armed, or in its shaped stop; limit: ``stop_s``."""
+    if axis.hard or not (axis.armed or axis.stop_left):
+        return f"limit=stopped why={axis.hard or axis.why}"
+    return ""
+
+
+def bounds(axis: AxisState) -> tuple[float, float]:
+    """Rule 4: what may leave in each direction; limit: the demand within the tail, ``max_pct``.
+
+    Never against a stick that is held, but in a shaped stop. Beyond the demand what a partner adds.
+    """
+    of, low, high, now = axis.of, -axis.back.most, axis.forth.most, axis.now
+    least, most = low, high
+    if of.faster:
+        least, most = (-1.0 if low else 0.0), (1.0 if high else 0.0)
+    if of.reverse:
+        least, most = min(least, -most), max(most, -least)
+    elif not of.brake_shaped and not axis.stop_left:
+        if now > 0.0:
+            least = 0.0
+        elif now < 0.0:
+            most = 0.0
+    if of.added and axis.armed and axis.asked:
+        if now <= 0.0:
+            least = min(least, low, 0.0 if now else -of.added)
+        if now >= 0.0:
+            most = max(most, high, 0.0 if now else of.added)
+    maximum = of.maximum
+    return (-maximum if least < -maximum else least), (maximum if most > maximum else most)
+
+
+def unseen(axis: AxisState, number: int, late: int) -> bool:
+    """Whether it may be in a shaped stop of whose reason nothing on the bus tells the gate."""
+    return axis.of.node or number - late < LATE
+
+
+def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
+    """Rule 4: within ``bounds``, or on its way back there, lower with each frame."""
+    size = abs(velocity)
+    reach = axis.most if velocity > 0.0 else 0.0 - axis.least
+    if size > reach + EPSILON and axis.unseen:
+        asked = axis.forth if velocity > 0.0 else axis.back
+        reach = max(reach, min(asked.most, axis.of.maximum))
+    if size > reach + EPSILON and size > fallen + EPSILON:
+        return f"limit=asked allowed={max(reach, fallen):.3f}"
+    return ""
+
+
+def rise(axis: AxisState, velocity: float, ticks: int) -> str:
+    """Rule 5: limit: ``rise_per_s``, and half a step of rounding; one period a frame."""
+    of, last = axis.of, abs(axis.last)
+    step, most = of.step, of.rise * ticks
+    if velocity * axis.last >= 0.0:
+        highest = axis.top + most + 0.5 * step
+    else:  # a part of the time goes by on the way to zero
+        highest = max(1.0 - max(last - step, 0.0) / (of.fall * ticks), 0.0) * most + 1.5 * step
+    return "" if abs(velocity) <= highest + EPSILON else f"limit=rise allowed={highest:.3f}"
+
+
+def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
+    """Rule 6: limit: ``fall_per_s``, and a step and a half; neutral ends the motion instead."""
+    of, size = axis.of, abs(velocity) if velocity * axis.last >= 0.0 else 0.0
+    least = abs(axis.last) - of.fall * max(ticks, 1) - 1.5 * of.step - EPSILON
+    if least > 0.0 and size < least - axis.dropped(made):
+        return f"limit=fall allowed={least:.3f}"
+    return ""
+
+
+def distance(axis: AxisState, velocity: float, number: int) -> str:
+    """Rule 7: no farther than was asked and not yet run; limit: ``SLACK``.
+
+    Where nothing was asked within the tail a partner moves it: limits are its path and its time.
+    """
+    of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
+    if asked.most:
+        ahead = asked.owed + SLACK + of.path
+        if abs(velocity) * of.period_s > ahead and not axis.free(number):
+            return f"limit=distance allowed={ahead:.3f}"
+    elif of.added and not (axis.forth.most or axis.back.most):
+        if axis.alone > of.most_periods + 1:
+            return "limit=time of added velocity"
+        way = axis.way + velocity * of.period_s
+        path = of.path
+        if path and abs(way) > 1.1 * path + 0.01 and way * velocity > 0.0:
+            return "limit=path of added velocity"
+    return ""
+
+
+def velocity_refused(axis: AxisState, velocity: float, made: int, number: int) -> str:
+    """Why a velocity that is not 0 may not leave: rules 3 to 7."""
+    ticks = axis.ticks if axis.of.forwarded else 1
+    fallen = axis.top - axis.of.fall * ticks if velocity * axis.last >= 0.0 else 0.0
+    why = (
+        neutral_first(axis)
+        or direction_and_size(axis, velocity, fallen)
+        or rise(axis, velocity, ticks)
+        or fall(axis, velocity, ticks, made)
+    )
+    # What falls is on its way back, however far that is.
+    if not why and abs(velocity) > fallen + EPSILON:
+        why = distance(axis, velocity, number)
+    return f"axis={axis.of.name} {why} speed={velocity:.3f}" if why else ""
+
+
+def bytes_refused(valve: Valve, data: bytes, word: Word, of: bytes | None, *, held: bool) -> str:
+    """Rule 8: length, bits that are not ours, values of a word, checksum; limit: none.
+
+    Args:
+        valve: the message.
+        data, word: the frame.
+        of: in a gateway the joystick's frame that it was made from.
+        held: whether that joystick's enable is held.
+    """
+    if len(data) != valve.length:
+        return f"limit=length length={len(data)} expected={valve.length}"
+    if of is not None:
+        wrong = word[0] ^ int.from_bytes(of, "little") if len(of) == len(data) else -1
+        wrong &= ~valve.ours
+    else:
+        wrong = word[0] & valve.fixed ^ valve.fixed_value
+    if wrong:
+        return f"limit=bits wrong={wrong:x}"
+    if any(field.raw(word) not in values for field, values in valve.words):
+        return "limit=word"
+    if of is None and valve.enable is not None:
+        enabled = valve.enable.raw(word) == 1
+        if enabled > held or any(field.raw(word) not in values for field, values in valve.own):
+            return "limit=bits of an own frame"
+    right = valve.check is None or valve.check.right(data)
+    return "" if right else "limit=checksum"
+
+
+def turn_refused(valve: Valve, count: int, last: int | None, *, due: bool) -> str:
+    """Rule 9: one frame in the tick in which it is due, with the next alive counter."""
+    if not due:
+        return "limit=one frame a tick"
+    if valve.counts and last is not None and count != (last + 1) % valve.counts:
+        return f"limit=counter value={count}"
+    return ""
+
+
+def other_refused(record: Record, key: Key, data: bytes) -> str:
+    """Rule 10: nothing leaves that is not in the file, or not as the file has it."""
+    allowed = record.others.get(key)
+    if allowed is None:
+        return "limit=identifier"
+    lengths, contents = allowed
+    if len(data) not in lengths or (contents and data not in contents):
+        return "limit=content"
+    return ""

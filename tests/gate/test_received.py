@@ -1,0 +1,238 @@
+"""What the gate believes of a message: sequence, senders, and what a reload carries over."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.codec.frame import Frame
+from canshaper.gate.build import record_of
+from canshaper.gate.gate import Gate
+from canshaper.gate.received import Received
+from canshaper.inputs.input import EmergencyStopInput
+from canshaper.machine.deployment import Deployment
+from tests.faults import variants
+from tests.gate.bench import Bench, bench, load
+from tests.rigs.j1939 import OWN, bjm
+
+MS = 1_000_000
+
+
+class Alike:
+    """The gate's and the controller's opinion of one message, frame by frame."""
+
+    def __init__(self, deployment: Deployment, name: str) -> None:
+        bound = deployment.joysticks[name]
+        self.message = Received(record_of(deployment).messages[name])
+        self.input = EmergencyStopInput(bound, bound.enable or "")  # any input has this part
+        self.sender, self.bound = bound.protection, bound
+
+    def take(self, data: bytes, now_ms: int) -> bool:
+        """Whether it counts; both have to agree."""
+        word = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+        _, counts = self.message.take(data, word, now_ms * MS)
+        self.input.receive(data, now_ms * MS)
+        assert self.message.good_ns == self.input.received_ns
+        return counts
+
+
+def counted(count: int) -> bytes:
+    return bytes([0, 0, 0, 0, 1, 0, 0, count & 0xFF])
+
+
+def test_a_sequence_is_judged_as_the_controller_judges_it() -> None:
+    one = Alike(load("forwarder"), "left")
+    steps = [(0, True), (1, True), (1, False), (2, True), (5, True), (9, False), (10, True)]
+    for number, (count, counts) in enumerate(steps):
+        assert one.take(counted(count), 20 * number) is counts, count
+    assert not one.take(counted(30), 140)
+    assert one.take(counted(77), 140 + 101)  # after silence any counter but the last
+    assert not one.take(counted(77), 500)
+    assert not one.take(counted(78)[:7], 510)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_with_checksum_and_qualification_too(seed: int) -> None:
+    import random
+
+    deployment = variants.machine("protected")[1]
+    rng = random.Random(seed)
+    bound = deployment.joysticks["left"]
+    config = bound.config.model_copy(update={"qualify": 1 + seed % 3})
+    joysticks = {**deployment.joysticks, "left": replace(bound, config=config)}
+    one = Alike(replace(deployment, joysticks=joysticks), "left")
+    field = record_of(deployment).messages["left"].counter
+    assert field is not None
+    assert bound.protection.check is not None
+    count = now_ms = 0
+    counting = []
+    for _ in range(400):
+        count += rng.choice((0, 1, 1, 1, 1, 2, 4))
+        now_ms += rng.choice((20, 20, 20, 20, 101))
+        word = (count & field.mask) << field.shift
+        data = word.to_bytes(one.message.of.length, "big" if field.order else "little")
+        data = bound.protection.check.protect(data, 0)
+        if rng.random() < 0.1:
+            data = bytes([data[0] ^ 1]) + data[1:]
+        counting.append(one.take(data, now_ms))
+    assert {*counting} == {True, False}
+
+
+def test_frames_with_another_multiplexor_say_nothing() -> None:
+    message = record_of(load("forwarder")).messages["left"]
+    field = replace(message.counter, shift=40, mask=0xF)  # type: ignore[type-var]
+    for alone in (False, True):
+        one = Received(replace(message, page=(field, 3), alone=alone))
+
+        def take(kind: int, count: int, one: Received = one) -> tuple[bool, bool]:
+            data = bytes([0, 0, 0, 0, 1, kind, 0, count])
+            word = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+            return one.take(data, word, count * MS)
+
+        assert take(3, 1) == (True, True)
+        assert take(5, 2) == (False, False)
+        assert (one.heard_ns == 2 * MS) is not alone
+        assert take(3, 3) == (True, True)
+
+
+class TestSources:
+    """J1939: the first joystick that comes counts, until it is silent."""
+
+    def test_another_one_counts_after_its_silence(self) -> None:
+        gate = Gate(record_of(load("j1939-forwarder")))
+        axis = gate.axes["slew"]
+        timeout_ns = axis.joystick.received.of.timeout_ns
+        first, other = bjm(X=50.0), bjm("BJM1", 0x34, X=-70.0)
+        gate.receive(first[:3], first[3], 0)
+        assert gate.receive(other[:3], other[3], timeout_ns) is None
+        assert axis.demand == 0.5
+        gate.receive(other[:3], other[3], timeout_ns + 1)
+        assert axis.demand == -0.7
+        assert axis.lost  # neutral comes first
+        gate.receive(first[:3], first[3], timeout_ns + 2)
+        assert axis.demand == -0.7
+
+    def test_neither_our_own_nor_another_message_counts(self) -> None:
+        gate = Gate(record_of(load("j1939-forwarder")))
+        for frame in (
+            bjm("BJM1", OWN, X=50.0),
+            Frame("crane", 0x18FF0033, True, bytes(8)),
+            bjm(X=50.0)._replace(extended=False),
+        ):
+            gate.receive(frame[:3], frame[3], 0)
+        assert gate.axes["slew"].demand is None
+
+    def test_another_address_commands_our_valve(self) -> None:
+        gate = Gate(record_of(load("j1939-forwarder")))
+        bus, can_id, extended = gate.axes["slew"].of.valve
+        elsewhere = bus, can_id & ~0xFF | 0x21, extended
+        gate.receive(("other", *elsewhere[1:]), bytes(8), 5)
+        assert gate.axes["slew"].foreign_ns < 0
+        gate.receive(elsewhere, bytes(8), 5)
+        assert gate.axes["slew"].foreign_ns == 5
+
+    def test_who_only_listens_is_no_ones_rival(self) -> None:
+        gate = Gate(record_of(load("forwarder").listening()))
+        gate.receive(gate.axes["slew"].of.valve, bytes(2), 5)
+        assert gate.axes["slew"].foreign_ns < 0
+
+
+class TestReload:
+    """What is latched stays latched; what was good has to come again."""
+
+    def reloaded(self, one: Bench, *reopened: str, **changed: Any) -> Bench:
+        after = Bench(replace(one.deployment, **changed), "near_far")
+        after.number, after.hand = one.number, one.hand
+        after.valve = one.valve
+        after.gate.carry_over(one.gate, frozenset(reopened))
+        return after
+
+    def test_a_trip_and_a_second_sender(self) -> None:
+        one = bench()
+        one.ramp(60, near_far=1.0)
+        assert one.sends(-60, near_far=1.0)
+        one.gate.receive(one.gate.axes["lift"].of.valve, bytes(2), one.now_ns)
+        after = self.reloaded(one)
+        assert after.gate.axes["lift"].foreign_ns == one.now_ns
+        after.rests(10)
+        assert not after.restarts(10, near_far=0.5)
+        after.rests(3, enable=False)
+        after.rests()
+        assert not after.sends(10, near_far=0.5)
+
+    def test_a_trip_that_no_tick_has_seen(self) -> None:
+        one = bench()
+        one.ramp(60, near_far=1.0)
+        one.receive(one.joysticks(enable=False))
+        after = self.reloaded(one)
+        assert after.axis.hard == "enable"
+        assert after.axis.joystick.pressed.released
+
+    def test_counters_go_on(self) -> None:
+        one = bench()
+        one.rests(5)
+        count = one.gate.counts[one.key]
+        after = self.reloaded(one)
+        assert after.gate.counts[one.key] == count
+        assert after.axis.joystick.received.count == one.axis.joystick.received.count
+        assert after.axis.joystick.received.good_ns is None
+        assert after.axis.joystick.received.heard_ns is not None
+        after = self.reloaded(one, "crane")
+        assert after.axis.joystick.received.heard_ns is None
+
+    def test_of_another_machine_nothing_is_carried_over(self, tmp_path: Path) -> None:
+        one = bench()
+        one.ramp(60, near_far=1.0)
+        assert one.sends(-60, near_far=1.0)
+        buses = {"crane": one.deployment.config.buses["crane"].model_copy(update={"channel": "x"})}
+        config = one.deployment.config.model_copy(update={"buses": buses})
+        after = self.reloaded(one, config=config)
+        assert after.gate.counts == {}
+        assert after.axis.joystick.received.count is None
+        assert after.axis.latched  # an axis is known by its name too
+
+    def test_another_protection_begins_anew(self) -> None:
+        one = bench()
+        one.rests(5)
+        message = one.gate.messages["left"]
+        message.of = replace(message.of, counts=16)
+        valve, axes = one.gate.valves[one.key]
+        one.gate.valves[one.key] = replace(valve, counts=16), axes
+        after = self.reloaded(one)
+        assert after.gate.messages["left"].count is None
+        assert one.key not in after.gate.counts
+
+
+def test_numbers_are_set_within_the_range_of_the_file() -> None:
+    one = bench()
+    of = one.axis.of
+    of.ranges = {"limits.max_pct": (50.0, 80.0)}
+    for value, maximum in ((60.0, 0.6), (90.0, 0.8), (10.0, 0.5)):
+        one.gate.set("axes.near_far.limits.max_pct", value)
+        assert of.maximum == maximum
+    one.gate.set("axes.near_far.limits.rise_per_s", 2.0)
+    one.gate.set("axes.near_far.limits.fall_per_s", 4.0)
+    one.gate.set("axes.near_far.filter.a1", 0.7)
+    assert (of.rise, of.fall) == (pytest.approx(0.04), pytest.approx(0.08))
+    of.path_m = 0.6
+    one.gate.set("axes.near_far.sway.full_speed_m_s", 1.5)
+    assert of.path == pytest.approx(0.4)
+
+
+def test_a_measurement_is_the_demand_while_the_stick_rests() -> None:
+    one = bench(max_pct=40.0, tail_s=0.1)
+    one.gate.measure("near_far", 0.0)
+    one.rests()
+    for part in (0.01, 0.2, 0.4):
+        one.gate.measure("near_far", part)
+        assert not one.sends(round(part * 125))
+    one.gate.measure("near_far", 0.8)
+    assert "limit=asked allowed=0.400" in one.sends(51)
+    one = bench()
+    one.gate.measure("near_far", -0.3)
+    one.rests()
+    assert not one.sends(-37)
+    one.receive(one.joysticks(near_far=0.3))
+    one.gate.tick(one.now_ns, 0)
+    assert not one.axis.armed
