@@ -69,7 +69,7 @@ class Traced(RawPort):
 
 
 def count(*, guarded: bool = False) -> Counted:
-    """Drive the axis; count the last tick, without the output guard or with it."""
+    """Drive the axis; count the last tick, without the gate or with it."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
     with tempfile.TemporaryDirectory() as name:
         deployment = load_deployment(slew_only(Path(name), "vcan0", 1))
@@ -112,7 +112,7 @@ def main() -> None:
     print(f"one tick, {platform.python_implementation()} {platform.python_version()}")
     print_table(["calls", "bytecodes", "%"], rows)
     with_guard = count(guarded=True)
-    print(f"without the output guard: {_size(counted)}")
+    print(f"without the gate: {_size(counted)}")
     print(f"with it:                  {_size(with_guard)}")
 
 

@@ -3,7 +3,7 @@
 Both take the same two joystick frames from a bus and send four valve frames to it; the bus is
 python-can's ``virtual`` one, so that no kernel time is counted. The gateway only copies: receive,
 decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status; it
-is timed with the output guard in front of the bus, and without. What the black box adds is timed
+is timed with the gate in front of the bus, and without. What the black box adds is timed
 without a bus: in the tick, behind it, and for the state that it keeps every ten seconds. So is what
 the two-axis motion adds to forwarder-robust.yaml, with both joysticks moved all the time.
 Each is timed tick by tick, in turn, in one run, by processor time.
@@ -41,7 +41,7 @@ from canshaper_sim.strokes import Script, Stroke
 
 FIGURES = (
     Figure("a tick, 4 axes, us", "bare loop of python-can + cantools"),
-    Figure("a tick with the output guard, us", "without"),
+    Figure("a tick with the gate, us", "without"),
     Figure("a tick with the black box, no bus, us", "without"),
 )
 FOURTH_VALVE = """
@@ -198,14 +198,14 @@ def print_rows(ticks: int, spent: dict[str, list[int]]) -> None:
     print(f"{'':34}{'median':>9}{'p99':>9}{'max':>9}")
     rows = (
         ("daemon body (bus, checks, status)", spent["ours"]),
-        ("the same without the output guard", spent["open"]),
+        ("the same without the gate", spent["open"]),
         ("bare python-can + cantools loop", spent["bare"]),
     )
     for title, row in rows:
         p99 = statistics.quantiles(row, n=100)[98]
         print(f"{title:34}{statistics.median(row) / 1e3:9.1f}{p99 / 1e3:9.1f}{max(row) / 1e3:9.1f}")
     more = statistics.median(a - b for a, b in zip(spent["ours"], spent["open"], strict=True))
-    print(f"output guard: {more / 1e3:.1f} us more in the same tick")
+    print(f"gate: {more / 1e3:.1f} us more in the same tick")
 
 
 def main() -> None:

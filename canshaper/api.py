@@ -50,7 +50,7 @@ class AxisState(NamedTuple):
 
 
 class Controller:
-    """The controller of a machine with its output guard: what the daemon runs, without buses.
+    """The controller of a machine with its gate: what the daemon runs, without buses.
 
     It has no clock: times are the caller's, in ns, of one that never goes back. It belongs to one
     thread. ``tick`` has to be called every ``machine.config.tick_ms``; where a valve gets no frame

@@ -27,7 +27,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SURVIVORS = ROOT / "tests/mutation/survivors.txt"
-DAEMON = [f"tests/{room}" for room in ("inputs", "guard", "protocols", "controller", "daemon")]
+DAEMON = [f"tests/{room}" for room in ("inputs", "gate", "protocols", "controller", "daemon")]
 # The groups: rooms, each with the tests that reach it.
 TESTS = {
     "checksums": ["tests/codec"],
@@ -35,7 +35,7 @@ TESTS = {
     "machine": ["tests/machine", "tests/codec"],
     "shaping": ["tests/shaping"],
     "inputs": DAEMON,
-    "guard": DAEMON,
+    "gate": DAEMON,
     "protocols": [*DAEMON, "tests/machine/test_gateway_binding.py"],
     "controller": DAEMON,
     "daemon": DAEMON,

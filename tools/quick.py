@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-DAEMON = ("config", "codec", "machine", "shaping", "inputs", "guard", "bus", "protocols")
+DAEMON = ("config", "codec", "machine", "shaping", "inputs", "gate", "bus", "protocols")
 DAEMON += ("controller", "daemon")
 # Tests of files that are in no room.
 TESTS = {

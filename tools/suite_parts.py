@@ -19,7 +19,7 @@ BIN = Path(sys.executable).parent
 JOBS = os.environ.get("JOBS") or str(len(os.sched_getaffinity(0)))
 SPREAD = ("-n", JOBS, "--dist", "loadfile")
 # Rooms of what decides whether a valve moves.
-GATE = "codec machine shaping inputs guard bus protocols controller daemon"
+GATE = "codec machine shaping inputs gate bus protocols controller daemon"
 COUNTED = re.compile(r"(\d+) (passed|failed|skipped|error)")
 SKIPPED = re.compile(r"^SKIPPED \[(\d+)\] [^ ]+ (.+)$")
 FAILED = re.compile(r"^(FAILED|ERROR) ")

@@ -17,7 +17,7 @@ Call = tuple[int, Frame | None, int, int]
 
 
 class Recorder:
-    """A controller behind its output guard, every call of which is recorded.
+    """A controller behind its gate, every call of which is recorded.
 
     While the valves wait a call is only noted; ``flush`` packs the notes, behind the tick.
 
@@ -90,6 +90,7 @@ class Recorder:
 
     def set(self, values: Mapping[str, object]) -> None:
         """Numbers have been changed by hand."""
+        self._guarded.set(values)
         self.flush()
         text = json.dumps(values).encode()
         for at in range(0, len(text), CHUNK):

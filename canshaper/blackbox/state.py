@@ -77,7 +77,7 @@ class States:
     """Keeps the state of a controller, and makes controllers from it.
 
     Args:
-        guarded: a controller behind its output guard, as it is made.
+        guarded: a controller behind its gate, as it is made.
         controller: that controller.
 
     Raises:

@@ -27,7 +27,7 @@ def measured_drive(
 ) -> Row:
     """Draw a drive, drive it and measure it; see ``draw_drive``.
 
-    A broken promise is a valve frame that the output guard had to refuse: it knows nothing of how
+    A broken promise is a valve frame that the gate had to refuse: it knows nothing of how
     the controller makes a frame, only what was asked and what the limits are.
     """
     setting = draw_drive(deployment, seed, ranges, nominal)

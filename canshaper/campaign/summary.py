@@ -17,7 +17,7 @@ FIRST = "residual_deg"
 
 @dataclass(frozen=True)
 class Promises:
-    """Drives in which the output guard had to refuse a valve frame.
+    """Drives in which the gate had to refuse a valve frame.
 
     Attributes:
         drives: all, those with faults too.

@@ -43,8 +43,9 @@ FAULT_TEXTS: Mapping[FrameFault, str] = {
     FrameFault.BUS_WRONG_DEVICE: (
         "the interface is not the device of `match`; compared every 0.2 s"
     ),
-    FrameFault.OUTPUT_REFUSED: (
-        "the output guard refused a valve frame; neutral went out in its place"
+    FrameFault.OUTPUT_REFUSED: "the gate refused a valve frame; neutral went out in its place",
+    FrameFault.DECODERS_DISAGREE: (
+        "gate and codecs read different things in a frame of a joystick: our own mistake"
     ),
 }
 """What each fault of the status message means."""

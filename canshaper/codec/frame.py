@@ -45,6 +45,7 @@ class FrameFault(IntEnum):
     NODE_EMERGENCY = 22
     BUS_WRONG_DEVICE = 23
     OUTPUT_REFUSED = 24
+    DECODERS_DISAGREE = 25
 
 
 class BusState(Enum):

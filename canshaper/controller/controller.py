@@ -298,7 +298,7 @@ class Controller:
         return self._outputs.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
-        """The output guard has refused a valve frame: its axes trip; see ``ValveOutputs``."""
+        """The gate has refused a valve frame: its axes trip; see ``ValveOutputs``."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
         return self._outputs.refused(frame)
 

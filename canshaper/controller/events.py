@@ -115,8 +115,22 @@ class SwingLengthEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class DisagreementEvent:
+    """The gate and the codecs have read different things in a frame of a joystick."""
+
+    frame: Frame
+    axis: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        bus, can_id, _, data = self.frame
+        return f"decoders=disagree axis={self.axis} bus={bus} id={can_id:#x} data={data.hex()}"
+
+
+@dataclass(frozen=True, slots=True)
 class RefusalEvent:
-    """The output guard has refused a valve frame."""
+    """The gate has refused a frame."""
 
     frame: Frame
     why: str

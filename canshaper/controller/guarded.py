@@ -1,18 +1,22 @@
-"""A controller behind the output guard: what every loop drives, with sockets or without."""
+"""A controller behind the gate: what every loop drives, with sockets or without."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.controller.events import RefusalEvent
-from canshaper.guard.output import OutputGuard
+from canshaper.controller.events import DisagreementEvent, RefusalEvent
+from canshaper.gate.build import record_of
+from canshaper.gate.fields import EPSILON
+from canshaper.gate.gate import Gate
+from canshaper.gate.received import Received
+from canshaper.protocols.interface import MessageKey
 
-# A valve whose frames are refused one after the other is logged once in this time.
+# What is refused, or read in two ways, again and again is logged once in this time.
 QUIET_NS = 1_000_000_000
 
 
 class Guarded:
-    """Hands frames in to controller and guard, and out what both let pass.
+    """Hands frames in to controller and gate, and out what both let pass.
 
     Args:
         controller: what computes the frames.
@@ -20,26 +24,30 @@ class Guarded:
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
-        self._guard = OutputGuard(controller.deployment)
-        self._inputs, self._valves = self._guard.inputs, self._guard.valves
-        self._quiet_until_ns: dict[tuple[str, int, bool], int] = {}
+        self._gate = Gate(record_of(controller.deployment))
+        self._quiet_until_ns: dict[MessageKey, int] = {}
+
+    def carry_over(self, before: "Guarded") -> None:
+        """Go on where the one before a reload has ended; see ``Gate.carry_over``."""
+        buses = self._controller.deployment.config.buses
+        open_before = before._controller.deployment.config.buses.values()
+        reopened = frozenset(name for name, bus in buses.items() if bus not in open_before)
+        self._gate.carry_over(before._gate, reopened)
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; see ``Controller``. What it says binds the next frame out."""
-        entry = self._inputs.get(frame[:3])
-        if entry is not None:
-            entry.note(frame[3], now_ns)
-        else:
-            self._guard.note(frame, now_ns)
+        message = self._gate.receive(frame[:3], frame[3], now_ns)
         passed = self._controller.receive(frame, now_ns)
+        if message is not None and message.of.checked:
+            self._compare(message, frame, now_ns)
         if passed is None:
             return None
-        why = self._refusal(passed, now_ns)
-        return self._instead(passed, why, now_ns) if why else passed
+        why = self._gate.leaving(passed[:3], passed[3], frame[3])
+        return self._instead(passed, why, now_ns, frame[3]) if why else passed
 
-    def demand(self, axis: str, part: float, now_ns: int) -> None:
-        """Take a demand of a measurement in the place of a joystick; see ``GuardedAxis``."""
-        self._guard.axes[axis].demand(part, now_ns)
+    def demand(self, axis: str, part: float) -> None:
+        """A measurement has a demand in the place of the joystick's; see ``Gate.measure``."""
+        self._gate.measure(axis, part)
 
     @property
     def moves(self) -> bool:
@@ -48,52 +56,90 @@ class Guarded:
 
     def stalled(self) -> None:
         """The loop stood still for too long: what comes before the next tick has waited."""
-        self._guard.stalled()
+        self._gate.stalled()
         self._controller.stalled()
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send now; see ``Controller``."""
-        valve_of, at = self._valves.get, self._guard.begin(missed)
+        self._gate.tick(now_ns, missed)
+        leaving = self._gate.leaving
         for frame in self._controller.tick(now_ns, missed):
-            valve = valve_of(frame[:3])
-            if valve is None:
+            why = leaving(frame[:3], frame[3])
+            if not why:
                 yield frame
-                continue
-            data = frame[3]
-            part = data[valve.span]
-            if part == valve.part and now_ns < valve.valid_until_ns:
-                valve.at = at  # the same command as before, and nothing forbids it since
-                yield frame
-            elif not (why := valve.refusal(data, part, now_ns, at)):
-                yield frame
-            elif (neutral := self._instead(frame, why, now_ns)) is not None:
+            elif (neutral := self._instead(frame, why, now_ns, None)) is not None:
                 yield neutral
+
+    def passes(self, frame: Frame, now_ns: int) -> bool:
+        """Whether a frame that is not one of a tick may leave."""
+        why = self._gate.leaving(frame[:3], frame[3])
+        if why and self._loud(frame, now_ns):
+            self._controller.events.append(RefusalEvent(frame, why))
+        return not why
+
+    def set(self, values: Mapping[str, object]) -> None:
+        """Numbers were changed while the machine runs; each stays in the range of the file."""
+        for key, value in values.items():
+            self._gate.set(key, float(value))  # type: ignore[arg-type]
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus."""
+        self._gate.send_failed(frame[:3])
         self._controller.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
         """A valve frame comes too late: whether it moves one, and so must not leave."""
-        return self._controller.withhold(frame)
+        withheld = self._controller.withhold(frame)
+        if withheld:
+            self._gate.withheld(frame[:3])
+        return withheld
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve: the last thing sent."""
         frames = self._controller.neutral_frames()
-        return [frame for frame in frames if not self._moves(frame)]
+        return [frame for frame in frames if not self._gate.last(frame[:3], frame[3])]
 
-    def _moves(self, frame: Frame) -> bool:
-        valve = self._valves.get(frame[:3])
-        return valve is not None and valve.moves(frame.data)
+    def _compare(self, message: Received, frame: Frame, now_ns: int) -> None:
+        """Two decoders have read a joystick's frame; where they disagree its axes stop."""
+        name = message.of.name
+        joystick, axes = self._controller.joysticks[name], self._gate.moved[name]
+        wrong = axes if message.good_ns != joystick.received_ns else []
+        if not wrong and message.good_ns == now_ns:
+            for axis in axes:
+                command = joystick.commands[axis.of.signal]
+                if command != axis.demand and not _same(axis.demand, command):
+                    wrong = [*wrong, axis]
+        if wrong:
+            self._gate.disagrees(wrong)
+            self._controller.counters.add(FrameFault.DECODERS_DISAGREE)
+            if self._loud(frame, now_ns):
+                event = DisagreementEvent(frame, wrong[0].of.name)
+                self._controller.events.append(event)
 
-    def _refusal(self, frame: Frame, now_ns: int) -> str:
-        valve, data = self._valves[frame[:3]], frame.data
-        return valve.refusal(data, data[valve.span], now_ns, self._guard.at)
+    def _loud(self, frame: Frame, now_ns: int) -> bool:
+        """Whether something of this message has not just been logged."""
+        key = frame[:3]
+        loud = now_ns >= self._quiet_until_ns.get(key, 0)
+        if loud:
+            self._quiet_until_ns[key] = now_ns + QUIET_NS
+        return loud
 
-    def _instead(self, frame: Frame, why: str, now_ns: int) -> Frame | None:
-        """Neutral in the place of a frame that is refused; silence where even that moves."""
-        if now_ns >= self._quiet_until_ns.get(frame[:3], 0):
-            self._quiet_until_ns[frame[:3]] = now_ns + QUIET_NS
+    def _instead(self, frame: Frame, why: str, now_ns: int, of: bytes | None) -> Frame | None:
+        """Neutral in the place of a frame that is refused; silence where even that is."""
+        if self._loud(frame, now_ns):
             self._controller.events.append(RefusalEvent(frame, why))
+        key = frame[:3]
+        if key not in self._gate.valves:
+            return None
+        self._gate.refused(key)
+        if of is not None:
+            frame = frame._replace(data=of)
         neutral = self._controller.refused(frame)
-        return None if self._refusal(neutral, now_ns) else neutral
+        return None if self._gate.leaving(key, neutral[3], of) else neutral
+
+
+def _same(demand: float | None, command: object) -> bool:
+    """Whether two decoders say the same, be it that there is no demand."""
+    if not isinstance(command, float) or demand is None:
+        return not isinstance(command, float) and demand is None
+    return abs(demand - command) <= EPSILON

@@ -61,7 +61,7 @@ class ValveOutputs:
         return True
 
     def refused(self, frame: Frame) -> Frame:
-        """The output guard has refused a frame: its axes trip.
+        """The gate has refused a frame: its axes trip.
 
         Returns:
             The same frame with neutral commands, to be sent in its place.

@@ -192,9 +192,12 @@ class Daemon:
 
     def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
         self._controller = Controller(deployment)
+        gated = Guarded(self._controller)
         if before:
             self._controller.carry_over(before)
-        self._guarded = self._black_box.around(Guarded(self._controller), self._controller)
+            gated.carry_over(self._gated)
+        self._gated: Guarded = gated
+        self._guarded = self._black_box.around(gated, self._controller)
         self._adjuster = Adjuster(self._controller)
         self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
@@ -268,10 +271,10 @@ class Daemon:
 
     def _read(self, waited: Iterable[Frame]) -> None:
         """Frames of a bus that is opened again: old by now, but bad news among them counts."""
-        self._controller.stalled()
+        self._gated.stalled()
         now_ns = boottime_ns()
         for frame in waited:
-            self._controller.receive(frame, now_ns)
+            self._gated.receive(frame, now_ns)
 
     # -- ends ----------------------------------------------------------------------------------
 
@@ -284,7 +287,8 @@ class Daemon:
         status = self._controller.deployment.identity_status
         if status and status.message.key[0] not in self._controller.silent_buses:
             frame = self._controller.status.identity(status)
-            if not self._ports[frame.bus].send(frame):
+            passes = self._gated.passes(frame, boottime_ns())
+            if passes and not self._ports[frame.bus].send(frame):
                 self._guarded.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:

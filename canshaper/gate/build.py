@@ -1,27 +1,19 @@
 """Makes the record of a machine, once: from the numbers of its file and cantools' signals.
 
-The one module of the gate that reads anything else of the program, and it reads data only. That the
-file and its DBC files go together is checked before; no codec is used.
+The one module of the gate that reads anything else of the program, and it reads data only.
 """
 
 import math
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any
 
-from canshaper.gate.checks import AUTOSAR8, COUNTS, HEADERS, Check, Checksum, Crc, E2e
-from canshaper.gate.fields import EPSILON, Command, Field, Opening, Part, Resolution, Stick
+from canshaper.gate.checks import COUNTS, CRCS, HEADERS, Check, Checksum, Crc, E2e
+from canshaper.gate.fields import EPSILON, Command, Field, Part, Resolution, Stick, openings_of
 from canshaper.gate.record import Axis, Joystick, Key, Message, Record, Switch, Valve
 
-MS = 1_000_000
 REALS = {16: "<e", 32: "<f", 64: "<d"}
 NEUTRAL = ("neutral", "neutralposition", "center", "centre", "zero", "released")
 """Names of a code that is a measurement where its value is 0."""
-CRCS = {
-    "crc8_sae_j1850": Crc(8, 0x1D, 0xFF, 0xFF),
-    "crc8_autosar": AUTOSAR8,
-    "crc16_ccitt_false": Crc(16, 0x1021, 0xFFFF, 0),
-    "crc16_arc": Crc(16, 0x8005, 0, 0, reflected=True),
-}
 # J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
@@ -47,10 +39,9 @@ def record_of(deployment: Any) -> Record:
     axes = {name: _axis(bound, deployment) for name, bound in deployment.axes.items()}
     for motion in config.motion.values():
         _add_motion(axes, motion, deployment)
-    keys: dict[Key, list[str]] = {}
-    for name, axis in axes.items():
-        keys.setdefault(axis.valve, []).append(name)
-    valves = {key: _valve(tuple(names), deployment) for key, names in keys.items()}
+    keys = dict.fromkeys(axis.valve for axis in axes.values())
+    names = {key: tuple(n for n, axis in axes.items() if axis.valve == key) for key in keys}
+    valves = {key: _valve(names[key], deployment) for key in keys}
     return Record(
         messages,
         {name: _joystick(name, deployment, switches) for name in deployment.joysticks},
@@ -63,9 +54,6 @@ def record_of(deployment: Any) -> Record:
     )
 
 
-# --- signals -------------------------------------------------------------------------------------
-
-
 def _signal(message: Any, name: str) -> Any:
     return next(signal for signal in message.signals if signal.name == name)
 
@@ -76,54 +64,47 @@ def field_of(message: Any, name: str) -> Field:
     big = signal.byte_order == "big_endian"
     # Of Intel ``start`` is the lowest bit; of Motorola the highest, counted within its byte.
     first = signal.start // 8 * 8 + 7 - signal.start % 8
-    return Field(
-        8 * message.length - first - signal.length if big else signal.start,
-        (1 << signal.length) - 1,
-        1 << signal.length - 1 if signal.is_signed and not signal.is_float else 0,
-        int(big),
-        REALS[signal.length] if signal.is_float else "",
-    )
+    shift = 8 * message.length - first - signal.length if big else signal.start
+    sign = 1 << signal.length - 1 if signal.is_signed and not signal.is_float else 0
+    real = REALS[signal.length] if signal.is_float else ""
+    return Field(shift, (1 << signal.length) - 1, sign, int(big), real)
 
 
 def _bits(field: Field, length: int, raw: int = -1) -> int:
     """Where a field lies in a frame of so many bytes, byte 0 the lowest; or a value of it."""
-    order: Literal["little", "big"] = "big" if field.order else "little"
-    data = ((raw & field.mask) << field.shift).to_bytes(length, order)
-    return int.from_bytes(data, "little")
+    placed = (raw & field.mask) << field.shift
+    return int.from_bytes(placed.to_bytes(length, "big" if field.order else "little"), "little")
 
 
 def _ends(signal: Any) -> tuple[int, int]:
     """Smallest and largest raw value that the bits of an integer signal hold."""
-    half = 1 << signal.length - 1
-    return (-half, half - 1) if signal.is_signed else (0, 2 * half - 1)
+    low = -(1 << signal.length - 1) if signal.is_signed else 0
+    return low, low + (1 << signal.length) - 1
 
 
 class Scale:
-    """Scale, offset and range of a velocity: those of the DBC, as the file corrects them."""
+    """Scale, offset, range and full scale of a velocity: of the DBC, as the file corrects them."""
 
     def __init__(self, signal: Any, section: Any, *, magnitude: bool) -> None:
-        scale, offset = signal.scale, signal.offset - (section.zero or 0.0)
+        full, zero, invert = (
+            (section.full, section.zero or 0.0, section.invert) if section else (None, 0.0, False)
+        )
+        scale, offset = signal.scale, signal.offset - zero
         low, high = signal.minimum, signal.maximum
-        if section.full is not None:
-            low, high = 0.0 if magnitude else -section.full, section.full
+        if full is not None:
+            low, high = 0.0 if magnitude else -full, full
             if not signal.is_float and not magnitude:
                 # Two's complement reaches one step farther on one side.
                 ends = sorted(raw * scale + offset for raw in _ends(signal))
                 step = abs(scale) * (1.0 + EPSILON)
                 low = ends[0] if 0.0 < low - ends[0] <= step else low
                 high = ends[1] if 0.0 < ends[1] - high <= step else high
-        elif section.zero:
-            low, high = low - section.zero, high - section.zero
-        if section.invert:
+        elif zero:
+            low, high = low - zero, high - zero
+        if invert:
             scale, offset, low, high = -scale, -offset, -high, -low
         self.scale, self.offset, self.low, self.high = scale, offset, low, high
         self.full = min(-low, high) if low < 0.0 else high
-
-
-class Uncorrected:
-    """Of a signal that the file does not correct."""
-
-    full, zero, invert = None, None, False
 
 
 def part_of(field: Field, signal: Any, section: Any) -> Part:
@@ -176,32 +157,13 @@ def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
         tuple(field_of(message, name) for name in names),
         signs,
         resolution(back, joystick) if back else None,
-        tuple(resolution(name, Uncorrected) for name in valve.also),
+        tuple(resolution(name, None) for name in valve.also),
     )
-
-
-def openings_of(limits: Any, full: int) -> tuple[Opening, Opening]:
-    """Of the positive and of the negative direction."""
-    commands, speeds = limits.curve_command_pct, limits.curve_speed_pct
-    if commands is None or speeds is None:
-        one = Opening((limits.deadband_pct / 100.0 * full, float(full)), (0.0, 1.0))
-        return one, one
-    points = [(c / 100.0 * full, v / 100.0) for c, v in zip(commands, speeds, strict=True)]
-    edge = next(i for i, (_, speed) in enumerate(points) if speed == 0.0)
-    forth, back = points[edge + 1 :], [(-c, -v) for c, v in points[edge::-1]]
-    return (
-        Opening(tuple(c for c, _ in forth), tuple(v for _, v in forth)),
-        Opening(tuple(c for c, _ in back), tuple(v for _, v in back)),
-    )
-
-
-# --- what is received ----------------------------------------------------------------------------
 
 
 def _message(name: str, bound: Any, config: Any) -> Message:
     section, message = bound.config, bound.message
-    can_id = message.frame_id if section.source is None else message.frame_id & ~0xFF
-    can_id |= section.source or 0
+    can_id = _from(message.frame_id, section.source)
     ids, group = frozenset((can_id,)), None
     if message.protocol == "j1939":
         mask = _group(can_id)
@@ -211,13 +173,16 @@ def _message(name: str, bound: Any, config: Any) -> Message:
             ids = frozenset(priority << 26 | can_id & 0x03FFFFFF for priority in range(8))
     check, checked, counter, counts = protection_of(section, message, can_id)
     page, alone = None, False
-    if section.multiplexor is not None:
-        chosen = bound.codec.chosen
-        page, alone = (field_of(message, chosen.signal), section.multiplexor), chosen.alone
+    if (chosen := bound.codec.chosen) is not None:
+        page, alone = (field_of(message, chosen.signal), chosen.value), chosen.alone
     node, most = config.buses[section.bus].j1939, min(3, counts // 2)
     return Message(
-        *(name, section.bus, ids, message.is_extended_frame, message.length),
-        timeout_ns=section.timeout_ms * MS,
+        name=name,
+        bus=section.bus,
+        ids=ids,
+        extended=message.is_extended_frame,
+        length=message.length,
+        timeout_ns=section.timeout_ms * 1_000_000,
         check=check,
         checked=checked,
         counter=counter,
@@ -229,6 +194,11 @@ def _message(name: str, bound: Any, config: Any) -> Message:
         group=group,
         own=node.address if node else -1,
     )
+
+
+def _from(can_id: int, source: int | None) -> int:
+    """A message of J1939 from another address."""
+    return can_id if source is None else can_id & ~0xFF | source
 
 
 def _group(can_id: int) -> int:
@@ -255,8 +225,7 @@ def protection_of(
 def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
     """A checksum; None for one of another package."""
     signal, kind = _signal(message, section.signal), section.kind
-    bits = signal.length
-    place = _bits(field_of(message, section.signal), message.length)
+    place, bits = _bits(field_of(message, section.signal), message.length), signal.length
     lowest = (place & -place).bit_length() - 1
     order = "big" if signal.byte_order == "big_endian" and bits > 8 else "little"
     where: Any = {"byte": lowest // 8, "shift": lowest % 8, "bits": bits, "order": order}
@@ -287,9 +256,6 @@ def _joystick(name: str, deployment: Any, switches: dict[str, Switch]) -> Joysti
     return Joystick(name, pressed, own, tuple(others), reset, bypass, stuck_ns)
 
 
-# --- axes and their valves -----------------------------------------------------------------------
-
-
 def _axis(bound: Any, deployment: Any) -> Axis:
     config, limits, find = bound.config, bound.config.limits, deployment.messages.find
     period_s = deployment.config.tick_ms * 1e-3 * bound.period_ticks
@@ -298,27 +264,22 @@ def _axis(bound: Any, deployment: Any) -> Axis:
     rewritten, in_dbc = config.command if forwarded else None, find(valve.message)[1]
     command = command_of(bound.valve_message, valve, rewritten, in_dbc)
     control, start = deployment.config.control, f"axes.{bound.name}."
+    curve = limits.curve_command_pct, limits.curve_speed_pct
     ranges = (control.adjustable if control else {}).items()
     return Axis(
-        name=bound.name,
-        joystick=config.command.joystick,
-        signal=config.command.signal,
-        stick=stick_of(joystick.message, config.command, find(joystick.config.message)[1]),
-        valve=_valve_key(bound, deployment),
-        command=command,
-        openings=openings_of(limits, command.size.full),
-        period=bound.period_ticks,
-        period_s=period_s,
-        maximum=limits.max_pct / 100.0,
-        rise=limits.rise_per_s * period_s,
-        fall=limits.fall_per_s * period_s,
-        tail=round(limits.tail_s / period_s),
-        stop=max(1, round(limits.stop_s / period_s)),
-        faster=limits.allow_faster,
-        reverse=limits.allow_reverse,
-        brake_shaped=limits.reversal == "brake_shaped",
-        forwarded=forwarded,
-        node=joystick.config.node is not None,
+        *(bound.name, config.command.joystick, config.command.signal),
+        stick_of(joystick.message, config.command, find(joystick.config.message)[1]),
+        *(
+            _valve_key(bound, deployment),
+            command,
+            openings_of(limits.deadband_pct, curve, command.size.full),
+        ),
+        *(bound.period_ticks, period_s, limits.max_pct / 100.0),
+        *(limits.rise_per_s * period_s, limits.fall_per_s * period_s),
+        *(round(limits.tail_s / period_s), max(1, round(limits.stop_s / period_s))),
+        *(limits.allow_faster, limits.allow_reverse, limits.reversal == "brake_shaped"),
+        forwarded,
+        joystick.config.node is not None,
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
         ranges={k.removeprefix(start): tuple(ends) for k, ends in ranges if k.startswith(start)},
     )
@@ -334,14 +295,12 @@ def _forwarded(axis: Any, deployment: Any) -> bool:
 
 def _valve_key(bound: Any, deployment: Any) -> Key:
     bus, message = bound.config.valve.bus, bound.valve_message
-    can_id = message.frame_id
+    can_id, node = message.frame_id, deployment.config.buses[bus].j1939
     if message.protocol == "j1939":
-        node, source = deployment.config.buses[bus].j1939, None
+        source = node.address if node else None
         if _forwarded(bound.config, deployment):
             source = deployment.joysticks[bound.config.command.joystick].config.source
-        elif node:
-            source = node.address
-        can_id = can_id if source is None else can_id & ~0xFF | source
+        can_id = _from(can_id, source)
     return bus, can_id, message.is_extended_frame
 
 
@@ -355,7 +314,7 @@ def _add_motion(axes: dict[str, Axis], motion: Any, deployment: Any) -> None:
         sensor = deployment.axes[near_far.name].config.sway_sensor
         damps = sensor is not None and sensor.use == "damp"
         near_far.path_m = motion.max_path_m * (2.0 if damps else 1.0)
-        near_far.path = near_far.path_m / near_far.full_m_s
+        near_far.set("sway.full_speed_m_s", near_far.full_m_s)
 
 
 def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
@@ -391,16 +350,12 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
             rest = {1} if signal.name == enable else _rest(signal)
             own.append((field, frozenset({start, *rest})))
     fixed = 0 if forwarded else (1 << 8 * message.length) - 1 & ~ours
-    return Valve(
-        *(message.length, names, fixed, (value | ~known if j1939 else value) & fixed, ours),
-        words=tuple(words),
-        own=tuple(own) if forwarded else (),
-        enable=field_of(message, enable) if forwarded else None,
-        check=check,
-        counter=counter,
-        counts=counts,
-        group=_group(message.frame_id) if j1939 and not forwarded else 0,
-    )
+    value = (value | ~known if j1939 else value) & fixed
+    group = _group(message.frame_id) if j1939 and not forwarded else 0
+    frame = message.length, names, fixed, value, ours, tuple(words)
+    if not forwarded:
+        return Valve(*frame, (), None, check, counter, counts, group)
+    return Valve(*frame, tuple(own), field_of(message, enable), check, counter, counts)
 
 
 def _start(signal: Any, *, j1939: bool) -> float:
@@ -424,16 +379,12 @@ def _rest(signal: Any) -> set[float]:
 
 def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
     """What leaves besides: status, and what our nodes say about themselves."""
-    anything: frozenset[bytes] = frozenset()
-    config = deployment.config
-    for status in (config.status, config.identity, *(one.status for one in config.axes.values())):
-        if status is None:
-            continue
+    anything, config = frozenset[bytes](), deployment.config
+    of_axes = (one.status for one in config.axes.values())
+    for status in filter(None, (config.status, config.identity, *of_axes)):
         message, node = deployment.messages.find(status.message)[1], config.buses[status.bus].j1939
-        can_id = message.frame_id
-        if message.protocol == "j1939" and node:
-            can_id = can_id & ~0xFF | node.address
-        key = status.bus, can_id, message.is_extended_frame
+        source = node.address if message.protocol == "j1939" and node else None
+        key = status.bus, _from(message.frame_id, source), message.is_extended_frame
         yield key, (frozenset(range(message.length, 65)), anything)
     for name, bus in config.buses.items():
         if bus.j1939:

@@ -107,6 +107,14 @@ CCITT = Crc(16, 0x1021, 0xFFFF, 0)
 CRC32P4 = Crc(32, 0xF4ACFB13, 0xFFFF_FFFF, 0xFFFF_FFFF, reflected=True)
 CRC64 = Crc(64, 0x42F0_E1EB_A9EA_3693, (1 << 64) - 1, (1 << 64) - 1, reflected=True)
 
+CRCS = {
+    "crc8_sae_j1850": Crc(8, 0x1D, 0xFF, 0xFF),
+    "crc8_autosar": AUTOSAR8,
+    "crc16_ccitt_false": Crc(16, 0x1021, 0xFFFF, 0),
+    "crc16_arc": Crc(16, 0x8005, 0, 0, reflected=True),
+}
+"""Those that the file knows by a name."""
+
 
 @dataclass(frozen=True, slots=True)
 class E2e:

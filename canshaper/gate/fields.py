@@ -2,7 +2,7 @@
 
 import struct
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -144,6 +144,27 @@ class Opening:
         i = bisect_right(self.steps, steps, 1, len(self.slopes)) - 1
         velocity = self.velocities[i] + (steps - self.steps[i]) * self.slopes[i]
         return velocity if velocity > 2 * EPSILON else 2 * EPSILON
+
+
+def openings_of(
+    deadband_pct: float, curve: tuple[Sequence[float] | None, Sequence[float] | None], full: int
+) -> tuple[Opening, Opening]:
+    """Of the positive and of the negative direction.
+
+    Args:
+        deadband_pct: % of full command.
+        curve: instead of it, of the measured valve, commands and speeds in %.
+        full: steps to full command.
+    """
+    commands, speeds = curve
+    if commands is None or speeds is None:
+        one = Opening((deadband_pct / 100.0 * full, float(full)), (0.0, 1.0))
+        return one, one
+    points = [(c / 100.0 * full, v / 100.0) for c, v in zip(commands, speeds, strict=True)]
+    edge = next(i for i, (_, speed) in enumerate(points) if speed == 0.0)
+    sides = points[edge + 1 :], [(-c, -v) for c, v in points[edge::-1]]
+    forth, back = (Opening(tuple(c for c, _ in one), tuple(v for _, v in one)) for one in sides)
+    return forth, back
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,10 +28,12 @@ class Gate:
         self.late = NEVER  # number of the last deadline that was missed
         self.stood = False  # the loop stood still, and no tick was made since
         self.messages = {name: Received(one) for name, one in record.messages.items()}
-        self.joysticks = {
-            name: JoystickState(one, self.messages[one.message])
-            for name, one in record.joysticks.items()
-        }
+        self.joysticks: dict[str, JoystickState] = {}
+        for name, one in record.joysticks.items():
+            switches = [self._switch(switch) for switch in (one.pressed, *one.others)]
+            joystick = JoystickState(one, self.messages[one.message], switches)
+            self.joysticks[name] = joystick
+            joystick.received.joysticks.append(joystick)
         self.axes = {
             name: AxisState(one, self.joysticks[one.joystick]) for name, one in record.axes.items()
         }
@@ -41,14 +43,12 @@ class Gate:
             axis.joystick.received.axes.append(axis)
             self.moved[axis.joystick.of.message].append(axis)
         for joystick in self.joysticks.values():
-            moved = self.moved[joystick.of.message]
-            joystick.pressed = self._switch(joystick.of.pressed, moved)
-            joystick.others = [self._switch(one, moved) for one in joystick.of.others]
-            joystick.received.joysticks.append(joystick)
+            for switch in (joystick.pressed, *joystick.others):
+                switch.axes = self.moved[joystick.of.message]
         self.stop: SwitchState | None = None
         if record.stop:
-            everything = list(self.axes.values())
-            self.stop = self._switch(record.stop, everything, "emergency stop", latches=True)
+            self.stop = self._switch(record.stop, "emergency stop", latches=True)
+            self.stop.axes = list(self.axes.values())
         self.ids: dict[Key, Received] = {}
         self.groups: list[Received] = []
         for message in self.messages.values():
@@ -63,13 +63,10 @@ class Gate:
         self.counts: dict[Key, int] = {}  # of the last frame that left, and of the one before
         self.before: dict[Key, int | None] = {}
 
-    def _switch(
-        self, switch: Switch, axes: list[AxisState], why: str = "enable", *, latches: bool = False
-    ) -> SwitchState:
-        state = SwitchState(switch, self.messages[switch.message], why, latches=latches)
-        state.axes = axes
-        state.received.switches.append(state)
-        return state
+    def _switch(self, of: Switch, why: str = "enable", *, latches: bool = False) -> SwitchState:
+        switch = SwitchState(of, self.messages[of.message], why, latches=latches)
+        switch.received.switches.append(switch)
+        return switch
 
     # --- what comes in ---------------------------------------------------------------------------
 

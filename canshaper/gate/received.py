@@ -164,7 +164,7 @@ class SwitchState:
 
 
 class JoystickState:
-    """One joystick.
+    """One joystick, and the switches that enable it; the first one is the one that is pressed.
 
     Attributes:
         press: ticks that were made before enable or reset was pressed last.
@@ -174,10 +174,11 @@ class JoystickState:
         valid: it may be used in this tick.
     """
 
-    def __init__(self, joystick: Joystick, received: Received) -> None:
+    def __init__(
+        self, joystick: Joystick, received: Received, switches: Sequence[SwitchState]
+    ) -> None:
         self.of, self.received = joystick, received
-        self.pressed: SwitchState
-        self.others: list[SwitchState] = []
+        self.pressed, *self.others = switches
         self.was_reset = True
         self.press = self.bypass = NEVER
         self.enabled = self.bypassed = self.valid = False

@@ -165,8 +165,9 @@ def bytes_refused(valve: Valve, data: bytes, word: Word, of: bytes | None, *, he
         wrong = word[0] & valve.fixed ^ valve.fixed_value
     if wrong:
         return f"limit=bits wrong={wrong:x}"
-    if any(field.raw(word) not in values for field, values in valve.words):
-        return "limit=word"
+    for field, values in valve.words:
+        if field.raw(word) not in values:
+            return "limit=word"
     if of is None and valve.enable is not None:
         enabled = valve.enable.raw(word) == 1
         if enabled > held or any(field.raw(word) not in values for field, values in valve.own):

@@ -178,6 +178,7 @@ class _Played:
             if record.number == record.length:  # that was the last part
                 values, self._text = json.loads(self._text), b""
                 self._adjuster.change(values)
+                guarded.set(values)
         else:
             raise ValueError(f"expected a known kind of record, got {kind}")
 

@@ -229,9 +229,9 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         fmi=12,
     ),
     Reason.OUTPUT_REFUSED: ReasonText(
-        "the output guard refused a command",
-        "the output guard refused a frame of this valve: beyond a limit, or not "
-        "commanded; the log says which",
+        "the gate refused a command",
+        "the gate refused a frame of this valve: beyond a limit, or not commanded; the log says "
+        "which",
         "report it with the log; reset",
         fmi=12,
     ),

@@ -1,7 +1,7 @@
 """A simulated crane with its controller in this process: where processes share no bus.
 
 As on systems other than Linux, and for deployments with several buses. The frames are those of a
-bus; the controller is the daemon's, behind its output guard and in its I/O cycle.
+bus; the controller is the daemon's, behind its gate and in its I/O cycle.
 """
 
 from collections.abc import Mapping, Sequence

@@ -141,10 +141,10 @@ def test_a_lost_joystick_still_stops_shaped(switched: Machine) -> None:
 
 
 @pytest.mark.parametrize("loss", LOSSES.values(), ids=LOSSES)
-def test_the_guard_does_not_need_the_controller_for_it(
+def test_the_gate_does_not_need_the_controller_for_it(
     switched: Machine, loss: Callable[[Frame], Frame], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A controller that has forgotten its switches: the guard lets nothing pass."""
+    """A controller that has forgotten its switches: the gate lets nothing pass."""
     cab = Cab(switched)
     for runner in cab.controller.axes.values():
         runner._interlocks.clear()
@@ -154,7 +154,7 @@ def test_the_guard_does_not_need_the_controller_for_it(
     cab.change = loss
     monkeypatch.setattr(Cab, "drive", _drive_without_look)
     cab.drive(420, 0.8)
-    assert any("axis=slew limit=enable" in text for text in cab.events)
+    assert any("axis=slew limit=stopped why=enable" in text for text in cab.events)
     assert not cab.moves
     assert cab.slew == (State.TRIPPED, Reason.OUTPUT_REFUSED)
 

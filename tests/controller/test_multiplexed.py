@@ -4,7 +4,8 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.guard.output import OutputGuard
+from canshaper.gate.build import record_of
+from canshaper.gate.gate import Gate
 from canshaper.shaping.states import Reason
 from canshaper_sim.hand import Hand, Held
 from tests.rigs.files import Machine
@@ -30,9 +31,8 @@ def frame(kind: int, slew: int, enable: int, count: int) -> bytes:
 
 def test_frames_with_another_value_are_nobodys(multiplexed: Machine) -> None:
     deployment = multiplexed.load()
-    controller, guard = Controller(deployment), OutputGuard(deployment)
-    joystick = controller.joysticks["left"]
-    noted = guard.inputs["crane", 272, False]
+    controller, gate = Controller(deployment), Gate(record_of(deployment))
+    joystick, key = controller.joysticks["left"], ("crane", 272, False)
     for count, (kind, slew, enable) in enumerate(
         [
             (3, 500, 1),
@@ -46,10 +46,11 @@ def test_frames_with_another_value_are_nobodys(multiplexed: Machine) -> None:
     ):
         now_ns = (count + 1) * 20_000_000
         data = frame(kind, slew, enable, count)
-        controller.receive(Frame("crane", 272, False, data), now_ns)
-        noted.note(data, now_ns)
+        controller.receive(Frame(*key, data), now_ns)
+        gate.receive(key, data, now_ns)
         assert joystick.commands == {"Slew": 0.5, "NearFar": 0.0}
-        assert (joystick.releases, noted.released) == (0, False)
+        assert gate.axes["slew"].demand == 0.5
+        assert (joystick.releases, gate.joysticks["left"].pressed.released) == (0, False)
     # They count in the sequence, whose counter they have: none of these was a jump.
     assert controller.counters.last_fault is FrameFault.NONE
     # What is meant has not come: it is lost, however often the others come.

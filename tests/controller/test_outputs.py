@@ -1,4 +1,4 @@
-"""What leaves in the place of a valve frame that the output guard has refused."""
+"""What leaves in the place of a valve frame that the gate has refused."""
 
 from collections.abc import Callable
 

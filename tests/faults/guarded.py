@@ -1,4 +1,4 @@
-"""The controller behind the output guard, which must let pass whatever a sound one computes."""
+"""The controller behind the gate, which must let pass whatever a sound one computes."""
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
@@ -8,7 +8,7 @@ from tests.faults.judge import Violation
 
 
 class Unrefused(Controller):
-    """The controller; a refusal of the output guard is a violation."""
+    """The controller; a refusal of the gate is a violation."""
 
     def refused(self, frame: Frame) -> Frame:
         raise Violation(f"{self.events[-1].text}, of a sound controller")

@@ -46,9 +46,11 @@ class Bench:
     def now_ns(self) -> int:
         return self.number * self.tick_ms * 1_000_000
 
-    def joysticks(self, *, enable: bool = True, reset: bool = False, **at: float) -> list[Frame]:
+    def joysticks(
+        self, *, enable: bool = True, reset: bool = False, anti_sway: bool = True, **at: float
+    ) -> list[Frame]:
         """Their frames of this tick."""
-        held = Held(at, enable=enable, reset=reset)
+        held = Held(at, enable=enable, reset=reset, anti_sway=anti_sway)
         return self.hand.frames(self.number * self.tick_ms, held)
 
     def receive(self, frames: list[Frame]) -> None:

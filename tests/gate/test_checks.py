@@ -1,6 +1,7 @@
 """Checksums and E2E of the gate: by catalogues, and the same as what the program sends."""
 
 import random
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from canshaper.checksums.kinds import CHECKSUMS, Checksum, crc_kind
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
 from canshaper.config.protection import Protected
-from canshaper.gate.build import protection_of
+from canshaper.gate.build import protection_of, record_of
 from canshaper.gate.checks import AUTOSAR8, CCITT, CRC32P4, CRC64, J1850, Crc
+from tests.gate.bench import load
 from tests.gate.test_decoder import message
 
 DIGITS = b"123456789"
@@ -18,16 +20,9 @@ IDS = [*range(7, 23)]
 
 @pytest.mark.parametrize(
     ("crc", "value"),
-    [
-        (Crc(8, 0x1D, 0xFF, 0xFF), 0x4B),
-        (AUTOSAR8, 0xDF),
-        (J1850, 0x37),
-        (CCITT, 0x29B1),
-        (Crc(16, 0x8005, 0, 0, reflected=True), 0xBB3D),
-        (CRC32P4, 0x1697D06A),
-        (CRC64, 0x995DC9BBDF1939FA),
-    ],
-)
+    [(Crc(8, 0x1D, 0xFF, 0xFF), 0x4B), (AUTOSAR8, 0xDF), (J1850, 0x37), (CCITT, 0x29B1), (Crc(16,
+     0x8005, 0, 0, reflected=True), 0xBB3D), (CRC32P4, 0x1697D06A), (CRC64, 0x995DC9BBDF1939FA)],
+)  # fmt: skip
 def test_a_crc_has_the_value_of_the_catalogue(crc: Crc, value: int) -> None:
     assert crc.of(DIGITS) == value
 
@@ -68,6 +63,10 @@ def test_of_another_package_it_is_not_known() -> None:
     theirs = section.checksum.model_copy(update={"kind": "of another package"})
     section = section.model_copy(update={"checksum": theirs})
     assert protection_of(section, one, 0)[:2] == (None, False)
+    record = record_of(load("forwarder"))
+    assert record.unchecked == []
+    messages = record.messages | {"left": replace(record.messages["left"], checked=False)}
+    assert replace(record, messages=messages).unchecked == ["left"]
 
 
 PROFILES: dict[str, tuple[E2e, dict[str, Any]]] = {
@@ -98,6 +97,6 @@ def test_every_profile_is_what_is_sent(name: str) -> None:
         assert check is not None
         assert check.right(data)
         assert check.count(data) == count  # type: ignore[attr-defined]
-        for at in range(sent.bits // 8, 24):
-            assert not check.right(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        for at in range(24):
+            assert not check.right(data[:at] + bytes([data[at] ^ 0x10]) + data[at + 1 :])
     assert name[:3] not in ("p01", "p11") or not check.right(sent.protect(data, 15))  # type: ignore[union-attr]

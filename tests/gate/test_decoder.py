@@ -12,8 +12,8 @@ from canshaper.codec.signals import FieldSet
 from canshaper.config.limits import Limits
 from canshaper.config.schema import Command as Stick
 from canshaper.config.schema import Valve
-from canshaper.gate.build import command_of, field_of, openings_of, part_of, record_of, stick_of
-from canshaper.gate.fields import word_of
+from canshaper.gate.build import command_of, field_of, part_of, record_of, stick_of
+from canshaper.gate.fields import openings_of, word_of
 from canshaper.shaping.limits import without_deadband
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
@@ -100,15 +100,9 @@ def test_a_value_is_a_part_of_full_scale(ends: str, raw: int, is_read: float | N
 
 @pytest.mark.parametrize(
     ("keys", "raw", "is_read"),
-    [
-        ({"full": 50}, 25, 0.5),
-        ({"full": 100, "zero": 100}, 150, 0.5),
-        ({"zero": 10}, 10, 0.0),
-        ({"invert": True}, 50, -0.5),
-        ({"full": 127}, -128, -1.0),
-        ({"full": 127}, 127, 1.0),
-    ],
-)
+    [({"full": 50}, 25, 0.5), ({"full": 100, "zero": 100}, 150, 0.5), ({"zero": 10}, 10, 0.0),
+     ({"invert": True}, 50, -0.5), ({"full": 127}, -128, -1.0), ({"full": 127}, 127, 1.0)],
+)  # fmt: skip
 def test_the_file_corrects_what_the_dbc_says(
     keys: dict[str, Any], raw: int, is_read: float
 ) -> None:
@@ -147,26 +141,18 @@ FLAGS = ("Neutral", "Negative", "Positive")
 
 @pytest.mark.parametrize(
     ("flags", "position", "demand"),
-    [
-        ((1, 0, 0), 0, 0.0),
-        ((1, 0, 0), 5, 0.0),
-        ((1, 0, 0), 6, None),
-        ((0, 0, 1), 50, 0.5),
-        ((0, 1, 0), 50, -0.5),
-        ((0, 1, 0), 0, 0.0),
-        ((0, 0, 0), 0, 0.0),
-        ((0, 0, 0), 1, None),
-        ((0, 1, 1), 50, None),
-        ((0, 0, 2), 50, None),
-        ((0, 0, 3), 0, None),
-        ((0, 0, 1), 200, None),
-    ],
-)
-def test_a_joystick_of_flags(flags: tuple[int, ...], position: int, demand: float | None) -> None:
+    [((1, 0, 0), 0, 0.0), ((1, 0, 0), 5, 0.0), ((1, 0, 0), 6, None), ((0, 0, 1), 50, 0.5), ((0, 1,
+     0), 50, -0.5), ((0, 1, 0), 0, 0.0), ((0, 0, 0), 0, 0.0), ((0, 0, 0), 1, None), ((0, 1, 1), 50,
+     None), ((0, 0, 2), 50, None), ((0, 0, 3), 0, None), ((0, 0, 1), 200, None)],
+)  # fmt: skip
+@pytest.mark.parametrize("full", [None, 100.0])
+def test_a_joystick_of_flags(
+    full: float | None, flags: tuple[int, ...], position: int, demand: float | None
+) -> None:
     places = [f"{name} : {8 + 2 * i}|2@1+ (1,0) [0|1]" for i, name in enumerate(FLAGS)]
     one = message("Signal : 0|8@1+ (1,0) [0|100]", *places)
     names = {"neutral": "Neutral", "positive": "Positive", "negative": "Negative"}
-    section = Stick(joystick="left", signal="Signal", flags=names)  # type: ignore[arg-type]
+    section = Stick(joystick="left", signal="Signal", flags=names, full=full)  # type: ignore[arg-type]
     switched = sum(flag << 2 * i for i, flag in enumerate(flags))
     data = bytes([position, switched, *bytes(6)])
     assert stick_of(one, section, one).demand(word_of(data)) == demand
@@ -298,16 +284,16 @@ def test_a_command_by_flags_of_the_joystick(raw: dict[str, int], steps: int | No
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_velocity_is_that_behind_dead_band_or_curve(sign: int) -> None:
-    plain = Limits(deadband_pct=5)
     points = {"curve_command_pct": [-100, -50, -6, 4, 60, 100]}
     curved = Limits(**points, curve_speed_pct=[-90, -40, 0, 0, 50, 100])  # type: ignore[arg-type]
     curve = curved.curve()
     assert curve is not None
     for steps in range(1, 126):
         # A command is one, however small.
-        by_band = openings_of(plain, 125)[sign < 0].velocity(steps)
+        by_band = openings_of(5, (None, None), 125)[sign < 0].velocity(steps)
         expected = max(without_deadband(steps / 125, 0.05), 2e-6)
         assert by_band == pytest.approx(expected, abs=1e-12)
-        by_curve = openings_of(curved, 125)[sign < 0].velocity(steps)
+        points_of = curved.curve_command_pct, curved.curve_speed_pct
+        by_curve = openings_of(0, points_of, 125)[sign < 0].velocity(steps)
         expected = max(abs(curve.velocity(sign * steps / 125)), 2e-6)
         assert by_curve == pytest.approx(expected, abs=1e-12)

@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 
+from canshaper.codec.e2e import Profile5
 from canshaper.codec.frame import Frame
 from canshaper.gate.build import record_of
+from canshaper.gate.checks import E2e
 from canshaper.gate.gate import Gate
 from canshaper.gate.received import Received
 from canshaper.inputs.input import EmergencyStopInput
@@ -94,6 +96,16 @@ def test_frames_with_another_multiplexor_say_nothing() -> None:
         assert take(5, 2) == (False, False)
         assert (one.heard_ns == 2 * MS) is not alone
         assert take(3, 3) == (True, True)
+
+
+def test_the_counter_of_e2e_is_in_its_header() -> None:
+    message = record_of(load("forwarder")).messages["left"]
+    header = replace(message, check=E2e("p05", 256, 7), counter=None, counts=256)
+    one = Received(header)
+    for count, counts in ((1, True), (1, False), (2, True), (9, False)):
+        data = Profile5(7).protect(bytes(8), count)
+        word = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+        assert one.take(data, word, count * MS) == (True, counts)
 
 
 class TestSources:

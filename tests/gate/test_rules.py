@@ -112,6 +112,22 @@ class TestStopsAtOnce:
         one.rests(10)
         assert not one.sends(10, near_far=0.5)
 
+    def test_a_reset_is_a_press_too(self) -> None:
+        one = self.moving()
+        assert one.sends(-FULL, near_far=1.0)
+        one.rests(5)
+        one.rests(5, reset=True)
+        assert not one.sends(10, near_far=0.5)
+
+    def test_a_reset_that_waited_in_a_standstill_is_none(self) -> None:
+        one = self.moving()
+        assert one.sends(-FULL, near_far=1.0)
+        one.rests(5)
+        one.gate.stalled()
+        one.receive(one.joysticks(reset=True))
+        one.rests(5, reset=True)
+        assert not one.restarts(10, near_far=0.5)
+
     def test_at_rest_it_latches_nothing_but_waits_for_neutral(self) -> None:
         one = bench()
         one.rests()
@@ -427,15 +443,11 @@ class TestDistance:
 
     def test_after_a_bypass_the_filter_runs_what_was_run_in_it(self) -> None:
         one = bench(tail_s=2.0)
-        bypassed = one.axis.joystick
         one.rests()
         for _ in range(5):
-            assert not one.sends(FULL, near_far=1.0)
-        left = []
-        for _ in range(80):
-            bypassed.bypass = one.gate.number
-            left.append(one.sends(FULL))
-        assert not any(left)
+            one.receive(one.joysticks(anti_sway=False, near_far=1.0))
+            assert not one.sent(FULL)
+        assert not any(one.sends(FULL) for _ in range(80))
 
 
 class TestAdded:

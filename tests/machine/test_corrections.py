@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import pytest
 
 from canshaper.controller.controller import Controller
-from canshaper.guard.bits import CommandBits, JoystickBits
+from canshaper.gate.build import record_of
+from canshaper.gate.fields import word_of
 from canshaper.shaping.states import Reason
 from tests.rigs.files import Machine
 from tests.rigs.sent import command_frame
@@ -17,16 +18,16 @@ OUT_OF_RANGE = Reason.JOYSTICK_OUT_OF_RANGE
 
 
 def commands(machine: Machine, raws: Sequence[int]) -> list[float | Reason]:
-    """What a joystick with these raw values asks of slew; the guard's own reading is the same."""
+    """What a joystick with these raw values asks of slew; the gate's own reading is the same."""
     deployment = machine.load()
     joystick = deployment.joysticks["left"]
-    guard = JoystickBits(joystick.message, deployment.config.axes["slew"].command)
+    stick = record_of(deployment).axes["slew"].stick
     result = []
     for raw in raws:
         data = (raw & 0xFFFF).to_bytes(2, "little") + bytes(6)
         command = joystick.decode(data)[1]["Slew"]
-        asked = 0.0 if isinstance(command, Reason) or abs(command) <= 0.02 else command
-        assert guard.command(data) == pytest.approx(asked, abs=1e-12)
+        demand = None if isinstance(command, Reason) else pytest.approx(command, abs=1e-12)
+        assert stick.demand(word_of(data)) == demand
         result.append(command)
     return result
 
@@ -97,14 +98,12 @@ def test_a_valve(machine: Machine, dbc: str, yaml: str, steps: int, raws: dict[i
     deployment = machine.load()
     valve = deployment.axes["slew"].valve
     assert valve.steps == steps
-    guard = CommandBits(
-        deployment.axes["slew"].valve_message, deployment.config.axes["slew"].valve, None
-    )
-    assert guard.full == steps
+    command = record_of(deployment).axes["slew"].command
+    assert command.size.full == steps
     for step, raw in raws.items():
         data = command_frame(valve, step).data
         assert data[0] == raw
-        assert guard.steps(data) == step
+        assert command.steps(word_of(data)) == step
 
 
 @pytest.mark.parametrize("low", ["-0.1", "-1"])

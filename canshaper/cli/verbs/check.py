@@ -112,6 +112,7 @@ def _print(deployment: "Deployment") -> None:
     """Everything for people."""
     from canshaper.commissioning.doubts import doubts
     from canshaper.commissioning.stopping import print_stopping
+    from canshaper.gate.build import record_of
     from canshaper.report.console import SafeConsole
 
     config = deployment.config
@@ -147,6 +148,9 @@ def _print(deployment: "Deployment") -> None:
     for line in identity.lines()[1:]:
         echo(f"    {line}")
     print_stopping(deployment, SafeConsole())
+    if unchecked := record_of(deployment).unchecked:
+        names = ", ".join(unchecked)
+        echo(f"  the gate does not know the checksum of {names}: it is of another package")
     for warning in doubts(deployment):
         echo(f"WARNING: {warning}")
 

@@ -170,7 +170,7 @@ class CalibrationDrive:
                 self.ended = f"stopped: {text}: its end? {room}"
             if self.ended:
                 self._joystick.deflection = 0.0
-        self._guarded.demand(self.axis, self._joystick.deflection, now_ns)
+        self._guarded.demand(self.axis, self._joystick.deflection)
         yield from self._guarded.tick(now_ns, missed)
         self._controller.events.clear()
 

@@ -10,8 +10,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason, State
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
-from tests.guard.bench import TICK_NS
 
+TICK_NS = 20_000_000
 HOUR_NS = 3_600_000_000_000
 
 

@@ -2,7 +2,7 @@
 
 import functools
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,8 @@ from canshaper.codec.signals import raw_limits
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.controller.runner import AxisRunner
+from canshaper.gate.build import record_of
+from canshaper.gate.fields import word_of
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import Reason, State
@@ -248,10 +250,94 @@ def test_a_wrong_command_is_caught(name: str, kind: str) -> None:
     assert planted == MOMENTS
 
 
+class Spoiled(Controller):
+    """Whose frames to one valve are spoilt from a moment on, behind all that computes them.
+
+    Attributes:
+        spoil: what leaves in the place of a frame.
+    """
+
+    spoil: Callable[[Frame], list[Frame]] | None = None
+
+    def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
+        for frame in super().tick(now_ns, missed):
+            yield from self.spoil(frame) if self.spoil else [frame]
+
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
+        passed = super().receive(frame, arrived_ns)
+        return self.spoil(passed)[-1] if self.spoil and passed else passed
+
+
+def _free_bit(deployment: Deployment, frame: Frame) -> int:
+    """A bit of a valve frame that no signal of ours has; the lowest one."""
+    valve = record_of(deployment).valves[frame[:3]]
+    free = ~valve.ours & (1 << 8 * valve.length) - 1
+    return free & -free
+
+
+def _spoilt(kind: str, deployment: Deployment, frame: Frame) -> list[Frame]:
+    bus, can_id, extended, data = frame
+    if kind == "shorter":
+        return [frame._replace(data=data[:-1])]
+    if kind == "longer":
+        return [frame._replace(data=data + bytes(1))]
+    if kind == "another bit":
+        word = int.from_bytes(data, "little") ^ _free_bit(deployment, frame)
+        return [frame._replace(data=word.to_bytes(len(data), "little"))]
+    if kind == "another bus":
+        return [Frame(f"{bus}-2", can_id, extended, data)]
+    return [Frame(bus, can_id ^ 0x1000, True, data)]
+
+
+SPOILT = ("shorter", "longer", "another bit", "another bus", "another identifier")
+
+
+@pytest.mark.parametrize("kind", SPOILT)
+@pytest.mark.parametrize("name", shipped.NAMES)
+def test_a_frame_that_is_not_ours_does_not_leave(name: str, kind: str) -> None:
+    made = drive(name)
+    keys = {axis.valve.message.sender.key for axis in made.deployment.axes.values()}
+    free = {key: ~valve.ours for key, valve in record_of(made.deployment).valves.items()}
+    lengths = {key: valve.length for key, valve in record_of(made.deployment).valves.items()}
+    moving = [n for n, steps in enumerate(made.steps) if all(steps.values()) and n > 300]
+    moving = moving or [n for n, steps in enumerate(made.steps) if any(steps.values())][100:]
+    at = random.Random(f"{name} {kind}").choice(moving)
+    for bound in made.deployment.axes.values():
+        bound.valve.put(0)
+    controller = Spoiled(made.deployment)
+    guarded = Guarded(controller)
+    for number in range(at + 4):
+        now_ns = number * made.tick_ns
+        if number == at:
+
+            def spoil(frame: Frame) -> list[Frame]:
+                if frame[:3] not in keys:
+                    return [frame]
+                if (
+                    kind == "another bit"
+                    and not free[frame[:3]] & (1 << 8 * lengths[frame[:3]]) - 1
+                ):
+                    return [frame]  # all of them are ours
+                return _spoilt(kind, made.deployment, frame)
+
+            controller.spoil = spoil
+        left = [f for f in (guarded.receive(f, now_ns) for f in made.frames[number]) if f]
+        left += guarded.tick(now_ns)
+        if number >= at:
+            for frame in left:
+                assert frame[:3] in {*keys, *guarded._gate.record.others}
+                if frame[:3] in keys:
+                    assert len(frame.data) == lengths[frame[:3]]
+                    _, axes = guarded._gate.valves[frame[:3]]
+                    steps = {axis.of.command.steps(word_of(frame.data)) for axis in axes}
+                    assert steps == {0} or kind == "another bit"
+
+
 @pytest.mark.parametrize("name", [*shipped.NAMES, "protected"])
 def test_what_a_sound_controller_sends_passes(name: str) -> None:
     made = drive(name)
-    controller = Controller(made.deployment)
+    deployment = load_deployment(made.deployment.path)  # whose messages keep nothing of before
+    controller = Controller(deployment)
     guarded = Guarded(controller)
     for number, frames in enumerate(made.frames):
         now_ns = number * made.tick_ns

@@ -1,1 +1,0 @@
-"""The output guard: independent of what computes the frames that it looks at."""

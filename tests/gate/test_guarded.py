@@ -1,0 +1,271 @@
+"""The controller behind the gate: what goes through, and what is left where even neutral moves."""
+
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from canshaper import gate
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import QUIET_NS, Guarded
+from canshaper.errors import WrongLengthError
+from canshaper.machine.binding import load_deployment
+from canshaper.shaping.states import Reason
+from canshaper_sim.hand import Hand, Held
+from tests.faults import shipped
+from tests.rigs.files import Machine
+
+TICK_NS = 20_000_000
+
+
+class Stuck(Controller):
+    """Whose neutral moves."""
+
+    def refused(self, frame: Frame) -> Frame:
+        super().refused(frame)
+        return frame
+
+
+class FullSpeed(Controller):
+    """Whose frames through the gateway all command full slew."""
+
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
+        passed = super().receive(frame, arrived_ns)
+        if passed is None or passed.can_id != 272:
+            return passed
+        word = int.from_bytes(passed.data, "little") & ~0xFFFF
+        return passed._replace(data=(word | 1000).to_bytes(8, "little"))
+
+
+class Wrong:
+    """The forwarder at rest, whose slew command is wrong in every tick."""
+
+    def __init__(self, kind: type[Controller] = Controller) -> None:
+        deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+        self.controller = kind(deployment)
+        self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
+        self.valve = deployment.axes["slew"].valve
+        self.runner = self.controller.axes["slew"]
+        self.sound, self.runner._put = self.runner._put, lambda _steps: self.sound(99)
+        self.number = 0
+
+    def tick(self) -> list[Frame]:
+        """The slew frames of a tick."""
+        now_ns = self.number * TICK_NS
+        for frame in self.hand.frames(self.number * 20, Held(enable=True)):
+            self.guarded.receive(frame, now_ns)
+        self.number += 1
+        key = self.valve.message.sender.key
+        return [frame for frame in self.guarded.tick(now_ns) if frame[:3] == key]
+
+
+def test_where_even_neutral_moves_nothing_leaves() -> None:
+    wrong = Wrong(Stuck)
+    assert not any(wrong.tick() for _ in range(5))
+    assert wrong.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
+
+
+def test_one_that_goes_on_is_logged_once_a_second() -> None:
+    wrong = Wrong(Stuck)
+    for _ in range(QUIET_NS // TICK_NS):
+        wrong.tick()
+    refused = [e for e in wrong.controller.events if "output=refused" in e.text]
+    assert len(refused) == 1
+    wrong.tick()
+    assert sum("output=refused" in e.text for e in wrong.controller.events) == 2
+
+
+def test_in_the_place_of_a_wrong_one_neutral_leaves() -> None:
+    wrong = Wrong()
+    frames = [frame for _ in range(3) for frame in wrong.tick()]
+    assert len(frames) == 3
+    for frame in frames:
+        assert wrong.valve.read(wrong.valve.message.sender.fields.layout.decode(frame.data)) == 0
+    assert wrong.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
+
+
+def test_what_a_gateway_passes_on_is_looked_at_too() -> None:
+    deployment = load_deployment(shipped.CONFIG / "gateway-forwarder.yaml")
+    controller = FullSpeed(deployment)
+    guarded, hand = Guarded(controller), Hand(deployment)
+    valve = controller.axes["slew"].bound.valve
+    left = []
+    for number in range(10):
+        for frame in hand.frames(number * 20, Held(enable=True)):
+            left.append(guarded.receive(frame, number * TICK_NS))
+        left += guarded.tick(number * TICK_NS)
+    raws = [valve.message.sender.fields.layout.decode(f.data) for f in left if f and f[1] == 272]
+    assert raws
+    assert {valve.read(raw) for raw in raws} == {0}
+    (refusal,) = [e for e in controller.events if "output=refused" in e.text]
+    assert "0x110" in refusal.text
+    assert "axis=slew limit=stopped why=start" in refusal.text
+    assert controller.axes["slew"].axis.reason is Reason.OUTPUT_REFUSED
+
+
+@pytest.mark.parametrize("name", shipped.NAMES)
+def test_the_last_frames_are_neutral(name: str) -> None:
+    deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
+    controller = Controller(deployment)
+    guarded = Guarded(controller)
+    keys = {axis.valve.message.sender.key for axis in deployment.axes.values()}
+    # J1939 has to have an address, and a gateway that rests sends nothing of its own.
+    hand, tick_ms = Hand(deployment), deployment.config.tick_ms
+    for number in range(1000 // tick_ms):
+        now_ns = number * tick_ms * 1_000_000
+        speed = 0.5 if number * tick_ms > 500 else 0.0
+        held = Held(dict.fromkeys(deployment.axes, speed), enable=True)
+        for frame in hand.frames(number * tick_ms, held):
+            guarded.receive(frame, now_ns)
+        assert all(guarded.tick(now_ns))
+    assert not any("output=refused" in event.text for event in controller.events)
+    if name.startswith("j1939"):  # whose joysticks may have any address
+        assert all(controller.axes[axis].axis.raw for axis in ("slew", "near_far"))
+    left = [frame[:3] for frame in guarded.neutral_frames()]
+    assert keys == set(left)
+    assert left == [frame[:3] for frame in controller.neutral_frames()]
+    bound = next(iter(deployment.axes.values()))
+    valve, put = bound.valve, bound.valve.put
+    valve.put = lambda _steps: put(99)  # type: ignore[method-assign]
+    missing = keys - {f[:3] for f in guarded.neutral_frames()}
+    put(0)
+    assert missing == {valve.message.sender.key}
+
+
+def test_what_the_loop_says_reaches_the_controller() -> None:
+    wrong = Wrong()
+    wrong.runner._put = wrong.sound
+    (frame,) = wrong.tick()
+    assert not wrong.guarded.moves
+    assert not wrong.guarded.withhold(frame)
+    wrong.runner.axis.raw = 5  # as if it moved
+    assert wrong.guarded.withhold(frame)
+    wrong.runner.axis.raw = 0
+    wrong.guarded.send_failed(frame)
+    assert wrong.controller.counters.last_fault is FrameFault.SEND_FAILED
+    wrong.tick()
+    wrong.guarded.stalled()
+    assert wrong.guarded._gate.stood
+    wrong.tick()
+    assert wrong.controller.axes["slew"].axis.reason is Reason.JOYSTICK_TIMEOUT
+
+
+def disagreeing(change: str) -> tuple[Controller, list[Frame]]:
+    """The forwarder moves slew; from a moment on the controller's decoder reads something else."""
+    deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+    controller = Controller(deployment)
+    guarded, hand = Guarded(controller), Hand(deployment)
+    left: list[Frame] = []
+    joystick = controller.joysticks["left"]
+    sound = joystick._codec.decode
+    for number in range(30):
+        if number == 20:
+
+            def decode(data: bytes) -> Any:
+                raw, commands = sound(data)
+                if change == "value":
+                    return raw, commands | {"Slew": 1.0}
+                if change == "fault":
+                    return raw, commands | {"Slew": Reason.JOYSTICK_ERROR}
+                raise WrongLengthError
+
+            joystick._codec = SimpleNamespace(decode=decode)  # type: ignore[assignment]
+        held = Held({"slew": 0.5 if number > 5 else 0.0}, enable=True)
+        for frame in hand.frames(number * 20, held):
+            guarded.receive(frame, number * TICK_NS)
+        frames = [f for f in guarded.tick(number * TICK_NS) if f.can_id == 512]
+        left += frames if number >= 20 else []
+    return controller, left
+
+
+@pytest.mark.parametrize("change", ["value", "fault", "length"])
+def test_two_decoders_that_disagree_stop_at_once(change: str) -> None:
+    controller, left = disagreeing(change)
+    assert {frame.data[0] for frame in left} == {0}
+    texts = [event.text for event in controller.events]
+    said = [text for text in texts if "decoders=disagree axis=slew" in text]
+    assert len(said) == 1
+    assert controller.axes["slew"].axis.reason is Reason.OUTPUT_REFUSED
+    assert not any("output=refused" in text and "id=0x201" in text for text in texts)
+
+
+@pytest.mark.parametrize(
+    "name", ["Open circuit", "Fehler", "Short circuit", "Signal lost", "Virhe"]
+)
+def test_a_broken_wire_moves_nothing(name: str, machine: Machine) -> None:
+    """The DBC names a code within the range; to the codecs it may be full speed."""
+    machine.in_dbc("VAL_ 272 Slew", f'VAL_ 272 Slew -1000 "{name}"')
+    deployment = machine.load()
+    controller = Controller(deployment)
+    guarded, hand = Guarded(controller), Hand(deployment)
+    moved = set()
+    for number in range(60):
+        for frame in hand.frames(number * 20, Held(enable=True)):
+            if frame.can_id == 272 and number > 5:
+                frame = frame._replace(data=struct.pack("<h", -1000) + frame.data[2:])  # noqa: PLW2901
+            guarded.receive(frame, number * TICK_NS)
+        moved |= {f.data[0] for f in guarded.tick(number * TICK_NS) if f.can_id == 512}
+    assert moved == {0}
+
+
+def test_what_is_no_frame_of_a_tick_is_looked_at_too() -> None:
+    wrong = Wrong()
+    assert wrong.guarded.passes(Frame("crane", 0x300, False, bytes(8)), 0)
+    assert not wrong.guarded.passes(Frame("crane", 0x601, False, bytes(8)), 0)
+    assert "limit=identifier" in wrong.controller.events[-1].text
+    wrong.controller.events.clear()
+    assert not wrong.guarded.passes(Frame("crane", 0x601, False, bytes(8)), 1)
+    assert not wrong.controller.events
+
+
+class Extra(Controller):
+    """Which sends more than its valves and its status."""
+
+    def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
+        yield from super().tick(now_ns, missed)
+        yield Frame("crane", 0x601, False, bytes(8))
+
+
+def test_a_frame_that_is_none_of_ours_is_left_out() -> None:
+    deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+    controller = Extra(deployment)
+    guarded = Guarded(controller)
+    assert 0x601 not in {frame.can_id for frame in guarded.tick(TICK_NS)}
+    assert "limit=identifier" in controller.events[-1].text
+    assert not any(
+        runner.axis.reason is Reason.OUTPUT_REFUSED for runner in controller.axes.values()
+    )
+
+
+def test_numbers_and_demands_reach_the_gate() -> None:
+    wrong = Wrong()
+    wrong.guarded.set({"axes.slew.limits.max_pct": 50.0})
+    assert wrong.guarded._gate.axes["slew"].of.maximum == 0.5
+    wrong.guarded.demand("slew", 0.5)
+    assert wrong.guarded._gate.axes["slew"].ramp
+
+
+def test_the_closure_of_the_gate_is_the_standard_library_and_itself() -> None:
+    """All that is loaded with the gate, but for the packages above it, in a process of its own."""
+    program = "import sys; import canshaper.gate.gate, canshaper.gate.build; print(*sys.modules)"
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    ours = {name for name in result.stdout.decode().split() if name.startswith("canshaper")}
+    files = {file.stem for file in Path(gate.__path__[0]).glob("*.py")} - {"__init__"}
+    assert ours == {"canshaper", "canshaper.gate", *(f"canshaper.gate.{name}" for name in files)}
+    others = {name.partition(".")[0] for name in result.stdout.decode().split()}
+    assert not others & {"cantools", "can", "pydantic", "yaml", "bitstruct", "crccheck"}
+
+
+def test_a_reload_goes_on_where_the_gate_was() -> None:
+    wrong = Wrong()
+    wrong.tick()
+    before, after = wrong.guarded, Guarded(Controller(wrong.controller.deployment))
+    after.carry_over(before)
+    assert after._gate.axes["slew"].latched
+    assert after._gate.counts == before._gate.counts
