@@ -181,6 +181,20 @@ class TestReload:
         assert after.axis.hard == "enable"
         assert after.axis.joystick.pressed.released
 
+    def test_an_emergency_stop_that_is_held(self) -> None:
+        deployment = variants.machine("protected")[1]
+        one = Bench(deployment, "near_far")
+        one.rests(10)
+        stop = deployment.emergency_stop
+        assert stop is not None
+        assert stop.protection.check is not None
+        pressed = stop.protection.check.protect(b"\1\1", 0)
+        one.gate.receive(stop.key, pressed, one.now_ns)
+        after = self.reloaded(one)
+        after.axis.hard, after.axis.latches = "", False  # as if a tick had seen it before
+        after.gate.tick(after.now_ns, 0)
+        assert after.axis.latched
+
     def test_counters_go_on(self) -> None:
         one = bench()
         one.rests(5)
