@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.gate.checks import COUNTS, CRCS, HEADERS, Check, Checksum, Crc, E2e
+from canshaper.gate.checks import COUNTS, HEADERS, Check, Checksum, Crc, E2e, crc_of
 from canshaper.gate.fields import EPSILON, Command, Field, Part, Resolution, Stick, openings_of
 from canshaper.gate.record import Axis, Joystick, Key, Message, Record, Switch, Valve
 
@@ -235,7 +235,9 @@ def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
     plus = {"sum": 0, "sum_id": sum(can_id.to_bytes(4, "little")), "sum_length": message.length}
     if kind in plus:
         return Checksum("sum", **where, plus=plus[kind])
-    how: Any = {"xor": "xor", "sum4": "halves", **CRCS}.get(kind)
+    how: Any = {"xor": "xor", "sum4": "halves"}.get(kind)
+    if kind in ("crc8_sae_j1850", "crc8_autosar", "crc16_ccitt_false", "crc16_arc"):
+        how = crc_of(kind)
     return Checksum(how, **where) if how else None
 
 

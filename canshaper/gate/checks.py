@@ -35,17 +35,19 @@ class Crc:
     table: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.table = tuple(map(self._after, range(256)))
+        polynomial, bits, ones = self.polynomial, self.bits, (1 << self.bits) - 1
+        table = []
         if self.reflected:
-            self.start = _turned(self.start, self.bits)
-
-    def _after(self, byte: int) -> int:
-        """Register after one byte, where it was 0 before."""
-        bits, ones = self.bits, (1 << self.bits) - 1
-        value = (_turned(byte, 8) if self.reflected else byte) << (bits - 8)
-        for _ in range(8):
-            value = (value << 1 ^ (self.polynomial if value >> (bits - 1) else 0)) & ones
-        return _turned(value, bits) if self.reflected else value
+            polynomial, self.start = _turned(polynomial, bits), _turned(self.start, bits)
+        for byte in range(256):  # the register after one byte, where it was 0 before
+            value = byte if self.reflected else byte << (bits - 8)
+            for _ in range(8):
+                if self.reflected:
+                    value = value >> 1 ^ (polynomial if value & 1 else 0)
+                else:
+                    value = (value << 1 ^ (polynomial if value >> (bits - 1) else 0)) & ones
+            table.append(value)
+        self.table = tuple(table)
 
     def of(self, data: bytes) -> int:
         """CRC of these bytes."""
@@ -100,23 +102,25 @@ class Checksum:
         return value & ones == sent >> self.shift & ones
 
 
-J1850 = Crc(8, 0x1D, 0, 0)
-"""Of profiles 1 and 11, which neither start with ones nor invert the result."""
-AUTOSAR8 = Crc(8, 0x2F, 0xFF, 0xFF)
-CCITT = Crc(16, 0x1021, 0xFFFF, 0)
-CRC32P4 = Crc(32, 0xF4ACFB13, 0xFFFF_FFFF, 0xFFFF_FFFF, reflected=True)
-CRC64 = Crc(64, 0x42F0_E1EB_A9EA_3693, (1 << 64) - 1, (1 << 64) - 1, reflected=True)
-
-CRCS = {
-    "crc8_sae_j1850": Crc(8, 0x1D, 0xFF, 0xFF),
-    "crc8_autosar": AUTOSAR8,
-    "crc16_ccitt_false": Crc(16, 0x1021, 0xFFFF, 0),
-    "crc16_arc": Crc(16, 0x8005, 0, 0, reflected=True),
-}
-"""Those that the file knows by a name."""
+J1850, J1850_OF_1, AUTOSAR = (8, 0x1D, 0xFF, 0xFF), (8, 0x1D, 0, 0), (8, 0x2F, 0xFF, 0xFF)
+CCITT = 16, 0x1021, 0xFFFF, 0
+P4 = 32, 0xF4ACFB13, 0xFFFF_FFFF, 0xFFFF_FFFF, True
+XZ = 64, 0x42F0_E1EB_A9EA_3693, (1 << 64) - 1, (1 << 64) - 1, True
+CRCS: dict[str, tuple[int, ...]] = {
+    "crc8_sae_j1850": J1850, "crc8_autosar": AUTOSAR, "crc16_ccitt_false": CCITT,
+    "crc16_arc": (16, 0x8005, 0, 0, True), "p01": J1850_OF_1, "p11": J1850_OF_1, "p02": AUTOSAR,
+    "p22": AUTOSAR, "p04": P4, "p05": CCITT, "p06": CCITT, "p07": XZ,
+}  # fmt: skip
+"""Numbers of the CRC of each kind of checksum, and of each profile of E2E, by its name."""
 
 
-@dataclass(frozen=True, slots=True)
+def crc_of(name: str) -> Crc:
+    """A CRC by its name."""
+    bits, polynomial, start, end, *reflected = CRCS[name]
+    return Crc(bits, polynomial, start, end, bool(reflected))
+
+
+@dataclass(slots=True)
 class E2e:
     """CRC and counter in the first bytes of a frame (AUTOSAR PRS_E2EProtocol).
 
@@ -133,6 +137,10 @@ class E2e:
     data_id: int = 0
     mode: str = ""
     ids: bytes = b""
+    crc: Crc = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.crc = crc_of(self.profile)
 
     def count(self, data: bytes) -> int:
         """The counter of a frame."""
@@ -142,25 +150,25 @@ class E2e:
 
     def right(self, data: bytes) -> bool:
         """Whether a frame has the header that it should."""
-        profile, count = self.profile, self.count(data)
+        profile, count, of = self.profile, self.count(data), self.crc.of
         if count >= self.counts:
             return False
         if profile in ("p01", "p11"):
             return self._first(data, count)
         if profile in ("p02", "p22"):
-            return data[0] == AUTOSAR8.of(data[1:] + self.ids[count : count + 1])
+            return data[0] == of(data[1:] + self.ids[count : count + 1])
         # The others lay length, counter and data ID over the frame, high bytes first but in 5.
         if profile == "p05":
-            crc = CCITT.of(data[2:] + self.data_id.to_bytes(2, "little"))
+            crc = of(data[2:] + self.data_id.to_bytes(2, "little"))
             head = crc.to_bytes(2, "little")
         elif profile == "p06":
-            crc = CCITT.of(data[2:] + self.data_id.to_bytes(2, "big"))
+            crc = of(data[2:] + self.data_id.to_bytes(2, "big"))
             head = crc.to_bytes(2, "big") + len(data).to_bytes(2, "big")
         elif profile == "p04":
             head = len(data).to_bytes(2, "big") + data[2:4] + self.data_id.to_bytes(4, "big")
-            head += CRC32P4.of(data[:8] + data[12:]).to_bytes(4, "big")
+            head += of(data[:8] + data[12:]).to_bytes(4, "big")
         else:
-            head = CRC64.of(data[8:]).to_bytes(8, "big") + len(data).to_bytes(4, "big")
+            head = of(data[8:]).to_bytes(8, "big") + len(data).to_bytes(4, "big")
             head += data[12:16] + self.data_id.to_bytes(4, "big")
         return data.startswith(head)
 
@@ -175,7 +183,7 @@ class E2e:
             "nibble": (low, 0),
             "alternating": (high if count & 1 else low,),
         }[self.mode]
-        return data[0] == J1850.of(bytes(first) + data[1:])
+        return data[0] == self.crc.of(bytes(first) + data[1:])
 
 
 COUNTERS = {
