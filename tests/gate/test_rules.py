@@ -112,6 +112,15 @@ class TestStopsAtOnce:
         one.rests(10)
         assert not one.sends(10, near_far=0.5)
 
+    def test_a_press_before_it_is_no_reset(self) -> None:
+        one = bench()
+        one.rests(3)
+        one.rests(3, enable=False)
+        one.ramp(60, near_far=1.0)
+        assert one.sends(-FULL, near_far=1.0)
+        one.rests(10)
+        assert not one.restarts(10, near_far=0.5)
+
     def test_a_reset_is_a_press_too(self) -> None:
         one = self.moving()
         assert one.sends(-FULL, near_far=1.0)
