@@ -18,8 +18,7 @@ NEUTRAL = ("neutral", "neutralposition", "center", "centre", "zero", "released")
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
 # CiA 301 and CiA 408: heartbeat, NMT start; init, disabled, hold, active, reset of a fault.
-HEARTBEAT, NMT, START = 0x700, 0x000, 1
-WORDS = frozenset((0x8, 0x9, 0xB, 0xF, 0x3))
+HEARTBEAT, NMT, START, WORDS = 0x700, 0x000, 1, frozenset((0x8, 0x9, 0xB, 0xF, 0x3))
 
 
 def record_of(deployment: Any) -> Record:
@@ -235,9 +234,8 @@ def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
     plus = {"sum": 0, "sum_id": sum(can_id.to_bytes(4, "little")), "sum_length": message.length}
     if kind in plus:
         return Checksum("sum", **where, plus=plus[kind])
-    how: Any = {"xor": "xor", "sum4": "halves"}.get(kind)
-    if kind in ("crc8_sae_j1850", "crc8_autosar", "crc16_ccitt_false", "crc16_arc"):
-        how = crc_of(kind)
+    named = ("crc8_sae_j1850", "crc8_autosar", "crc16_ccitt_false", "crc16_arc")
+    how: Any = crc_of(kind) if kind in named else {"xor": "xor", "sum4": "halves"}.get(kind)
     return Checksum(how, **where) if how else None
 
 
