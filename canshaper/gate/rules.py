@@ -106,7 +106,7 @@ def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
     """Rule 6: limit: ``fall_per_s``, and a step and a half; neutral ends the motion instead."""
     of, size = axis.of, abs(velocity) if velocity * axis.last >= 0.0 else 0.0
     least = abs(axis.last) - of.fall * max(ticks, 1) - 1.5 * of.step - EPSILON
-    if least > 0.0 and size < least - axis.dropped(made):
+    if size < least and size < least - axis.dropped(made):
         return f"limit=fall allowed={least:.3f}"
     return ""
 
