@@ -112,7 +112,7 @@ def part_of(field: Field, signal: Any, section: Any) -> Part:
     Whatever the name; but for those that the file lists as a value, and neutral at exactly 0.
     """
     of = Scale(signal, section, magnitude=bool(section.flags or section.negative))
-    listed, named = getattr(section, "codes", {}), set()
+    listed, named = section.codes, set()
     for code, name in (signal.choices or {}).items():
         letters = "".join(filter(str.isalpha, str(name))).lower()
         neutral = letters in NEUTRAL and abs(code * of.scale + of.offset) < EPSILON
@@ -172,7 +172,7 @@ def _message(name: str, bound: Any, config: Any) -> Message:
             ids = frozenset(priority << 26 | can_id & 0x03FFFFFF for priority in range(8))
     check, checked, counter, counts = protection_of(section, message, can_id)
     page, alone = None, False
-    if (chosen := bound.codec.chosen) is not None:
+    if (chosen := bound.chosen) is not None:
         page, alone = (field_of(message, chosen.signal), chosen.value), chosen.alone
     node, most = config.buses[section.bus].j1939, min(3, counts // 2)
     return Message(

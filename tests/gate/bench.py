@@ -35,8 +35,8 @@ class Bench:
         self.deployment = deployment
         self.gate, self.hand = Gate(record_of(deployment)), Hand(deployment)
         self.valve = deployment.axes[axis].valve
-        self.valve.put(0)
-        self.key = self.valve.message.sender.key
+        self.sender = self.valve.message.sender()
+        self.key = self.sender.key
         self.axis = self.gate.axes[axis]
         self.tick_ms = deployment.config.tick_ms
         self.number = 0
@@ -61,9 +61,9 @@ class Bench:
 
     def frame(self, steps: int) -> bytes:
         """The next frame of the valve."""
-        self.valve.put(steps)
-        data = self.valve.message.frame().data
-        self.valve.put(0)
+        self.valve.put(self.sender.raw, steps)
+        data = self.sender.frame().data
+        self.valve.put(self.sender.raw, 0)
         return data
 
     def sent(self, steps: int, missed: int = 0) -> str:
@@ -71,7 +71,7 @@ class Bench:
         self.gate.tick(self.now_ns, missed)
         why = self.gate.leaving(self.key, self.frame(steps))
         if why:
-            self.valve.message.sender.protector.take_back()
+            self.sender.protector.take_back()
             self.gate.refused(self.key)
             assert not self.gate.leaving(self.key, self.frame(0))
         self.number += 1

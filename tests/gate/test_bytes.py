@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.rewrite import RewritingSender
 from canshaper.controller.controller import Controller
 from canshaper.gate.build import WORDS, record_of
 from canshaper.gate.fields import word_of
@@ -157,12 +157,9 @@ class Gateway:
         self.deployment = load("gateway-forwarder")
         self.gate, self.hand = Gate(record_of(self.deployment)), Hand(self.deployment)
         self.number = 0
-        message = self.deployment.axes["slew"].valve.message
-        assert isinstance(message, RewrittenMessage)
-        self.message = message
-        self.key = message.sender.key
-        for name in self.deployment.axes:
-            self.deployment.axes[name].valve.put(0)
+        sender = self.deployment.axes["slew"].valve.message.sender()
+        assert isinstance(sender, RewritingSender)
+        self.message, self.key = sender, sender.key
 
     def receives(self, **held: Any) -> Frame:
         """A frame of the joystick, in a tick of its own."""
@@ -194,7 +191,7 @@ def test_every_bit_of_a_gateway_that_is_not_ours() -> None:
         assert ("limit=bits" in why) is not bool(valve.ours >> bit & 1)
     assert one.gate.leaving(one.key, passed, mine.data + b"\0").startswith("limit=bits")
     assert not one.gate.leaving(one.key, passed, mine.data)
-    one.message.sender.protector.take_back()
+    one.message.protector.take_back()
     again = one.message.onto(mine.data).data
     assert one.gate.leaving(one.key, again, mine.data) == "limit=one frame a tick"
 
@@ -217,6 +214,6 @@ def test_a_frame_of_our_own_asks_for_nothing() -> None:
     assert refused
     one.receives(enable=False)
     one.ticks()
-    one.message.sender.protector.take_back()
+    one.message.protector.take_back()
     data = one.message.own(enabled=True).data
     assert one.gate.leaving(one.key, data) == "limit=bits of an own frame"

@@ -18,6 +18,7 @@ from canshaper.shaping.limits import without_deadband
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
 from tests.gate.bench import load
+from tests.rigs.sent import command_raw
 
 HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: JOYSTICK SHAPER\nBO_ 2 Message: 8 JOYSTICK\n'
 DBC = Path(__file__).parents[2] / "dbc"
@@ -136,6 +137,12 @@ def test_neutral_may_have_its_name() -> None:
     assert value(one, b"\1" + bytes(7)) is None
 
 
+def test_what_the_file_lists_as_a_value_is_one() -> None:
+    one = message("Signal : 0|8@1- (1,0) [-128|127]", tables='VAL_ 2 Signal -128 "Full" ;\n')
+    assert value(one, b"\x80" + bytes(7), codes={"Full": "value"}) == -1.0
+    assert value(one, b"\x80" + bytes(7), codes={"Full": "fault"}) is None
+
+
 FLAGS = ("Neutral", "Negative", "Positive")
 
 
@@ -180,10 +187,10 @@ def test_joysticks_are_read_as_the_codec_reads_them(name: str) -> None:
         assert stick.band == config.neutral_pct / 100.0
         for _ in range(300):
             data = rng.randbytes(joystick.message.length)
-            if chosen := joystick.codec.chosen:
-                raw = joystick.codec.decode(data)[0] | {chosen.signal: chosen.value}
+            if chosen := joystick.chosen:
+                raw = joystick.decode(data)[0] | {chosen.signal: chosen.value}
                 data = FieldSet(joystick.message).layout.encode(raw)
-            command = joystick.codec.decode(data)[1][config.signal]
+            command = joystick.decode(data)[1][config.signal]
             demand = stick.demand(word_of(data))
             assert demand == (pytest.approx(command) if isinstance(command, float) else None)
 
@@ -194,17 +201,16 @@ def test_commands_are_read_as_the_valve_codec_writes_them(name: str) -> None:
     record = record_of(deployment)
     for axis in deployment.axes.values():
         command, codec = record.axes[axis.name].command, axis.valve
-        layout = codec.message.sender.fields.layout
+        layout = codec.message.fields.layout
         assert command.size.full == codec.steps
-        assert record.axes[axis.name].valve == codec.message.sender.key
+        assert record.axes[axis.name].valve == codec.message.key
         for steps in (0, 1, -1, codec.steps, -codec.steps, rng.randrange(codec.steps)):
-            codec.put(steps)
-            assert command.steps(word_of(layout.encode(codec.message.raw))) == steps
+            data = layout.encode(command_raw(codec, steps))
+            assert command.steps(word_of(data)) == steps
         for _ in range(300):
             data = rng.randbytes(axis.valve_message.length)
             steps = command.steps(word_of(data))
             assert steps is None or steps == codec.read(layout.decode(data))
-        codec.put(0)
 
 
 @pytest.mark.parametrize("name", shipped.NAMES)

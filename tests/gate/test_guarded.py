@@ -5,8 +5,8 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 
@@ -14,7 +14,6 @@ from canshaper import gate
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import QUIET_NS, Guarded
-from canshaper.errors import WrongLengthError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
 from canshaper_sim.hand import Hand, Held
@@ -52,7 +51,7 @@ class Wrong:
         self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
         self.valve = deployment.axes["slew"].valve
         self.runner = self.controller.axes["slew"]
-        self.sound, self.runner._put = self.runner._put, lambda _steps: self.sound(99)
+        self.sound, self.runner._put = self.runner._put, lambda raw, _: self.sound(raw, 99)
         self.number = 0
 
     def tick(self) -> list[Frame]:
@@ -61,7 +60,7 @@ class Wrong:
         for frame in self.hand.frames(self.number * 20, Held(enable=True)):
             self.guarded.receive(frame, now_ns)
         self.number += 1
-        key = self.valve.message.sender.key
+        key = self.valve.message.key
         return [frame for frame in self.guarded.tick(now_ns) if frame[:3] == key]
 
 
@@ -86,7 +85,7 @@ def test_in_the_place_of_a_wrong_one_neutral_leaves() -> None:
     frames = [frame for _ in range(3) for frame in wrong.tick()]
     assert len(frames) == 3
     for frame in frames:
-        assert wrong.valve.read(wrong.valve.message.sender.fields.layout.decode(frame.data)) == 0
+        assert wrong.valve.read(wrong.valve.message.fields.layout.decode(frame.data)) == 0
     assert wrong.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
 
 
@@ -100,7 +99,7 @@ def test_what_a_gateway_passes_on_is_looked_at_too() -> None:
         for frame in hand.frames(number * 20, Held(enable=True)):
             left.append(guarded.receive(frame, number * TICK_NS))
         left += guarded.tick(number * TICK_NS)
-    raws = [valve.message.sender.fields.layout.decode(f.data) for f in left if f and f[1] == 272]
+    raws = [valve.message.fields.layout.decode(f.data) for f in left if f and f[1] == 272]
     assert raws
     assert {valve.read(raw) for raw in raws} == {0}
     (refusal,) = [e for e in controller.events if "output=refused" in e.text]
@@ -114,7 +113,7 @@ def test_the_last_frames_are_neutral(name: str) -> None:
     deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
     controller = Controller(deployment)
     guarded = Guarded(controller)
-    keys = {axis.valve.message.sender.key for axis in deployment.axes.values()}
+    keys = {axis.valve.message.key for axis in deployment.axes.values()}
     # J1939 has to have an address, and a gateway that rests sends nothing of its own.
     hand, tick_ms = Hand(deployment), deployment.config.tick_ms
     for number in range(1000 // tick_ms):
@@ -132,10 +131,9 @@ def test_the_last_frames_are_neutral(name: str) -> None:
     assert left == [frame[:3] for frame in controller.neutral_frames()]
     bound = next(iter(deployment.axes.values()))
     valve, put = bound.valve, bound.valve.put
-    valve.put = lambda _steps: put(99)  # type: ignore[method-assign]
+    valve.put = lambda raw, _steps: put(raw, 99)  # type: ignore[method-assign]
     missing = keys - {f[:3] for f in guarded.neutral_frames()}
-    put(0)
-    assert missing == {valve.message.sender.key}
+    assert missing == {valve.message.key}
 
 
 def test_what_the_loop_says_reaches_the_controller() -> None:
@@ -144,9 +142,8 @@ def test_what_the_loop_says_reaches_the_controller() -> None:
     (frame,) = wrong.tick()
     assert not wrong.guarded.moves
     assert not wrong.guarded.withhold(frame)
-    wrong.runner.axis.raw = 5  # as if it moved
-    assert wrong.guarded.withhold(frame)
-    wrong.runner.axis.raw = 0
+    with patch.object(Controller, "withhold", lambda *_: True):  # as if it moved
+        assert wrong.guarded.withhold(frame)
     wrong.guarded.send_failed(frame)
     assert wrong.controller.counters.last_fault is FrameFault.SEND_FAILED
     wrong.tick()
@@ -163,19 +160,17 @@ def disagreeing(change: str) -> tuple[Controller, list[Frame]]:
     guarded, hand = Guarded(controller), Hand(deployment)
     left: list[Frame] = []
     joystick = controller.joysticks["left"]
-    sound = joystick._codec.decode
+    sound = joystick._decode
     for number in range(30):
         if number == 20:
 
             def decode(data: bytes) -> Any:
-                raw, commands = sound(data)
-                if change == "value":
-                    return raw, commands | {"Slew": 1.0}
-                if change == "fault":
-                    return raw, commands | {"Slew": Reason.JOYSTICK_ERROR}
-                raise WrongLengthError
+                raw = sound(data)
+                if change == "late":  # the sequence seems to have stood
+                    return raw | {"AliveCounter": 0}
+                return raw | {"Slew": 1000 if change == "value" else 32766}
 
-            joystick._codec = SimpleNamespace(decode=decode)  # type: ignore[assignment]
+            joystick._decode = decode  # type: ignore[method-assign]
         held = Held({"slew": 0.5 if number > 5 else 0.0}, enable=True)
         for frame in hand.frames(number * 20, held):
             guarded.receive(frame, number * TICK_NS)
@@ -184,7 +179,7 @@ def disagreeing(change: str) -> tuple[Controller, list[Frame]]:
     return controller, left
 
 
-@pytest.mark.parametrize("change", ["value", "fault", "length"])
+@pytest.mark.parametrize("change", ["value", "fault", "late"])
 def test_two_decoders_that_disagree_stop_at_once(change: str) -> None:
     controller, left = disagreeing(change)
     assert {frame.data[0] for frame in left} == {0}
@@ -201,6 +196,7 @@ def test_two_decoders_that_disagree_stop_at_once(change: str) -> None:
 def test_a_broken_wire_moves_nothing(name: str, machine: Machine) -> None:
     """The DBC names a code within the range; to the codecs it may be full speed."""
     machine.in_dbc("VAL_ 272 Slew", f'VAL_ 272 Slew -1000 "{name}"')
+    machine.in_yaml("signal: Slew, neutral_pct: 2", f'signal: Slew, codes: {{ "{name}": fault }}')
     deployment = machine.load()
     controller = Controller(deployment)
     guarded, hand = Guarded(controller), Hand(deployment)

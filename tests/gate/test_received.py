@@ -156,7 +156,7 @@ class TestReload:
     def reloaded(self, one: Bench, *reopened: str, **changed: Any) -> Bench:
         after = Bench(replace(one.deployment, **changed), "near_far")
         after.number, after.hand = one.number, one.hand
-        after.valve = one.valve
+        after.sender = one.sender
         after.gate.carry_over(one.gate, frozenset(reopened))
         return after
 
