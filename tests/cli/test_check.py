@@ -26,11 +26,12 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
         "  slew is in no motion: together with another axis it leaves more swing;",
         "    a motion takes one axis that moves the tip in and out, which joints are not",
         "  JoystickLeft.Slew, JoystickLeft.NearFar, JoystickRight.Lift: "
-        '32766 "Error": fault (JOYSTICK_ERROR); 32767 "NotAvailable": fault (JOYSTICK_NOT_AVAILABLE)',
-        '  JoystickLeft.Enable, JoystickRight.Enable: 0 "Off", 2 "Error", 3 "NotAvailable": not on; '
-        '1 "On": on',
-        '  JoystickLeft.Reset, JoystickRight.Reset: 0 "Off", 2 "Error", 3 "NotAvailable": no reset; '
-        '1 "On": reset',
+        '32766 "Error": fault (JOYSTICK_ERROR); '
+        '32767 "NotAvailable": fault (JOYSTICK_NOT_AVAILABLE)',
+        "  JoystickLeft.Enable, JoystickRight.Enable: "
+        '0 "Off", 2 "Error", 3 "NotAvailable": not on; 1 "On": on',
+        "  JoystickLeft.Reset, JoystickRight.Reset: "
+        '0 "Off", 2 "Error", 3 "NotAvailable": no reset; 1 "On": reset',
         "  JoystickLeft.AntiSwayOff, JoystickRight.AntiSwayOff: "
         '0 "Off", 2 "Error", 3 "NotAvailable": no anti_sway_off; 1 "On": anti_sway_off',
         f"  digest {identity.digest:#06x} of deployment, DBC files and program:",
