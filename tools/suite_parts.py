@@ -131,7 +131,8 @@ def rows_of_more() -> list[list[Part]]:
     """Return what `make test-all` runs besides, in order."""
     types = [[f"{BIN}/mypy"], [f"{BIN}/lint-imports"]]
     gate = [f"tests/{room}" for room in GATE.split()]
-    cover = [pytest(*SPREAD, "--cov", "--cov-report=term", *gate)]
+    few = "--hypothesis-profile=few"  # lines need no more
+    cover = [pytest(*SPREAD, few, "--cov", "--cov-report=term", *gate)]
     core = [[sys.executable, "tools/mutation.py", f"-j{JOBS}", "core"]]
     service = [[sys.executable, "-m", "tests.lane.services", "-q"]]
     slow, study = (pytest(*SPREAD, "-m", mark) for mark in ("slow and not study", "study"))

@@ -81,6 +81,7 @@ class AddedByAnother(RuleBasedStateMachine):
         self.armed = False
         # when which command was given by a usable joystick
         self.commanded: list[tuple[int, float]] = []
+        self.demanded: list[tuple[int, float]] = []  # the same, but no rest ends it
         self.idle = 0  # ticks for which no one has asked for anything
         self.keep(2)
 
@@ -168,7 +169,9 @@ class AddedByAnother(RuleBasedStateMachine):
         # what was asked
         if self.usable and self.armed and not centred:
             self.commanded.append((self.now, joystick.command))
+            self.demanded.append((self.now, joystick.command))
         self.commanded = [(at, c) for at, c in self.commanded if self.now - at <= self.tail]
+        self.demanded = [(at, c) for at, c in self.demanded if self.now - at <= self.tail]
         if axis.state not in (*DRIVEN, State.STOPPING):  # at rest: it begins from nothing
             self.commanded = []
         self.armed = self.usable and (self.armed or centred)
@@ -207,7 +210,9 @@ class AddedByAnother(RuleBasedStateMachine):
     def check_speed(self, carried: float, before: float) -> None:
         """No faster than joystick, addition and what is carried of it; except while falling."""
         for sign in (1.0, -1.0):
-            allowed = max([0.0, *(sign * c for _, c in self.commanded)])
+            # Where something is added, demands count that a stop or a trip came after.
+            counted = self.demanded if self.mixed else self.commanded
+            allowed = max([0.0, *(sign * c for _, c in counted)])
             if self.axis.state in DRIVEN and sign * self.axis.command < 0.0:
                 allowed = 0.0
             elif self.mixed and not allowed:
