@@ -111,9 +111,9 @@ def main() -> None:
     rows.append(Row("all", [str(sum(counted.calls.values())), str(whole), "100"]))
     print(f"one tick, {platform.python_implementation()} {platform.python_version()}")
     print_table(["calls", "bytecodes", "%"], rows)
-    with_guard = count(guarded=True)
+    with_gate = count(guarded=True)
     print(f"without the gate: {_size(counted)}")
-    print(f"with it:                  {_size(with_guard)}")
+    print(f"with it:          {_size(with_gate)}")
 
 
 def _size(counted: Counted) -> str:

@@ -100,9 +100,9 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
     return body
 
 
-def daemon(controller: Controller, port: Port, *, guard: bool) -> Callable[[int], None]:
+def daemon(controller: Controller, port: Port, *, gated: bool) -> Callable[[int], None]:
     """What the daemon does in a tick."""
-    driven = Guarded(controller) if guard else controller
+    driven = Guarded(controller) if gated else controller
 
     def body(now_ns: int) -> None:
         for frame in port.frames():
@@ -219,11 +219,11 @@ def main() -> None:
     joysticks = JoystickNode(deployment, random_script(1, ticks * 0.02 + 1.0))
     hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "open", "bare")}
     port = open_port("crane", Bus(interface="virtual", channel="ours"), lambda _fault: None)
-    unguarded = open_port("crane", Bus(interface="virtual", channel="open"), lambda _fault: None)
+    ungated = open_port("crane", Bus(interface="virtual", channel="open"), lambda _fault: None)
     bare = can.Bus(interface="virtual", channel="bare")
     bodies = {
-        "ours": daemon(controller, port, guard=True),
-        "open": daemon(Controller(other), unguarded, guard=False),
+        "ours": daemon(controller, port, gated=True),
+        "open": daemon(Controller(other), ungated, gated=False),
         "bare": gateway(deployment, bare),
     }
     spent: dict[str, list[int]] = {n: [] for n in bodies}
@@ -243,11 +243,11 @@ def main() -> None:
     for bus in (*hands.values(), bare):
         bus.shutdown()
     port.close()
-    unguarded.close()
+    ungated.close()
 
     print_rows(ticks, spent)
-    ours, unguarded_us, bare_us = (statistics.median(row) / 1e3 for row in spent.values())
-    pairs = [(ours, bare_us), (ours, unguarded_us)]
+    ours, ungated_us, bare_us = (statistics.median(row) / 1e3 for row in spent.values())
+    pairs = [(ours, bare_us), (ours, ungated_us)]
     box = black_box(*boxed, ticks)
     two_axis_motion(ticks)
     publish(FIGURES, [*pairs, box])

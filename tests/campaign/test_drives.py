@@ -122,7 +122,7 @@ def test_a_drive_does_not_depend_on_those_before_it() -> None:
     assert measured_drive(deployment, 4, RANGES) == alone
 
 
-def test_a_frame_that_the_guard_refuses_is_a_broken_promise(
+def test_a_frame_that_the_gate_refuses_is_a_broken_promise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert measured_drive(ROBUST, 2, RANGES)["broken"] == 0

@@ -35,7 +35,7 @@ TICK_MS = 20
 
 
 class Cab:
-    """The controller behind its guard, and an operator who has switches of every kind."""
+    """The controller behind its gate, and an operator who has switches of every kind."""
 
     def __init__(self, machine: Machine) -> None:
         self.deployment = machine.load()

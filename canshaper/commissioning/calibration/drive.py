@@ -1,8 +1,8 @@
 """Drives one axis through a ramp with the daemon's own controller, and listens to its speed.
 
 Everything that may stop the daemon stops this too: enable, timeouts, emergency stop, a second
-sender, the output guard, for which the ramp is the demand. The joystick has to stay in neutral;
-moving it ends the measurement.
+sender, the gate, for which the ramp is the demand. The joystick has to stay in neutral; moving it
+ends the measurement.
 """
 
 import statistics
@@ -29,10 +29,10 @@ NEUTRAL_BAND = 1e-4
 
 
 class _RampJoystick:
-    """A joystick that is held in neutral with its enable on; the ramp stands for its joystick.
+    """A joystick that is held in neutral with its enable on; the ramp replaces its deflection.
 
     Attributes:
-        command: of the ramp; that of an axis which is not measured stays 0.
+        deflection: command of the ramp; that of an axis which is not measured stays 0.
         moved: whether the joystick itself is not in neutral.
     """
 
