@@ -103,7 +103,11 @@ class Daemon:
             failure = f"reason={INTERNAL_ERROR} {raised(error)}"
         finally:
             self._manager.stopping()
-            self._send_neutral()
+            valves = "not-sent" if self._controller.deployment.listen_only else "neutral"
+            try:
+                self._send_neutral()
+            except Exception as error:  # the first failure is the one to report
+                valves, failure = "not-sent", failure or f"reason={INTERNAL_ERROR} {raised(error)}"
             if failure:
                 log.critical("failed %s", failure)
                 self._black_box.failed(failure)
@@ -114,8 +118,7 @@ class Daemon:
             if self._control:
                 self._control.close()
             self._black_box.close()
-        listened = self._controller.deployment.listen_only
-        log.info("stopped valves=%s", "not-sent" if listened else "neutral")
+        log.info("stopped valves=%s", valves)
         if failure:
             raise InternalError(failure)
 

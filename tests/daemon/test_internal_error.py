@@ -69,6 +69,28 @@ def test_an_exception_ends_with_neutral_valves_and_its_place(
     assert json.loads(zipfile.ZipFile(box).read("about.json"))["why"] == text
 
 
+@pytest.mark.parametrize("both", [False, True])
+def test_neutral_that_cannot_be_made_hides_no_failure_and_keeps_the_end_orderly(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Log, both: bool
+) -> None:
+    def silent(*_arguments: Any) -> Any:
+        raise LookupError("no neutral")
+
+    def plant() -> None:
+        monkeypatch.setattr(Controller, "neutral_frames", silent)
+        if both:
+            monkeypatch.setattr(Controller, "tick", broken)
+
+    first = "ZeroDivisionError: planted" if both else "LookupError: no neutral"
+    with pytest.raises(InternalError, match=f"^reason=INTERNAL_ERROR {first}"):
+        driven(bench, plant)
+    assert [
+        line for line in log() if line.startswith(f"CRITICAL failed reason=INTERNAL_ERROR {first}")
+    ]
+    assert log()[-1] == "INFO stopped valves=not-sent"
+    assert all(port.closed for port in bench.ports)
+
+
 def test_a_setpoint_that_cannot_be_encoded_is_neutral_and_the_loop_goes_on(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
