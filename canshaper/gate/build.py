@@ -322,7 +322,7 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
     first, message = bound[0], bound[0].valve_message
     valve, forwarded = first.config.valve, _forwarded(first.config, deployment)
     j1939 = message.protocol == "j1939"
-    check, _, counter, counts = protection_of(valve, message, _valve_key(first, deployment)[1])
+    protection = protection_of(valve, message, _valve_key(first, deployment)[1])
     moving = {valve.alive_counter, valve.checksum.signal if valve.checksum else None}
     words = []
     for one in bound:
@@ -354,8 +354,8 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
     group = _group(message.frame_id) if j1939 and not forwarded else 0
     frame = message.length, names, fixed, value, ours, tuple(words)
     if not forwarded:
-        return Valve(*frame, (), None, check, counter, counts, group)
-    return Valve(*frame, tuple(own), field_of(message, enable), check, counter, counts)
+        return Valve(*frame, (), None, *protection, group)
+    return Valve(*frame, tuple(own), field_of(message, enable), *protection)
 
 
 def _start(signal: Any, *, j1939: bool) -> float:

@@ -171,7 +171,7 @@ class Valve:
         words: signals with the values that they may have, such as a control word of CiA 408.
         own: of a frame of our own in the place of a joystick's: signals with their values.
         enable: in such a frame the switch, which may be 1 only while it is held.
-        check, counter, counts: protection, as of ``Message``.
+        check, checked, counter, counts: protection, as of ``Message``.
         group: mask of its group in J1939, which no other address may send; 0 for none.
     """
 
@@ -184,6 +184,7 @@ class Valve:
     own: tuple[tuple[Field, frozenset[float]], ...] = ()
     enable: Field | None = None
     check: Check | None = None
+    checked: bool = True
     counter: Field | None = None
     counts: int = 0
     group: int = 0
@@ -218,4 +219,6 @@ class Record:
     @property
     def unchecked(self) -> list[str]:
         """Messages whose checksum is of another package, which the gate does not know."""
-        return [name for name, one in self.messages.items() if not one.checked]
+        received = [name for name, one in self.messages.items() if not one.checked]
+        valves = [one for one in self.valves.values() if not one.checked]
+        return received + [f"the valve of {' and '.join(one.axes)}" for one in valves]

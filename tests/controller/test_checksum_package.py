@@ -121,6 +121,7 @@ def test_a_machine_drives_by_it(installed: Installed) -> None:
     checked = installed.canshaper("check", file)
     program = sha256(installed.program.encode()).hexdigest()
     assert f"{file}: good" in checked
+    assert "the gate does not know the checksum of left, the valve of slew: it" in checked
     assert f"checksum=sha256:{program} kind=crc16_id package=acme-can 1.5" in checked
     seen = json.loads(installed.python("-c", DRIVE, file))
     assert seen["speed"] > 0.3

@@ -67,6 +67,9 @@ def test_of_another_package_it_is_not_known() -> None:
     assert record.unchecked == []
     messages = record.messages | {"left": replace(record.messages["left"], checked=False)}
     assert replace(record, messages=messages).unchecked == ["left"]
+    key, valve = next((k, one) for k, one in record.valves.items() if one.axes == ("slew",))
+    valves = record.valves | {key: replace(valve, checked=False)}
+    assert replace(record, valves=valves).unchecked == ["the valve of slew"]
 
 
 PROFILES: dict[str, tuple[E2e, dict[str, Any]]] = {
