@@ -83,7 +83,7 @@ class Table:
         return [cells_of(line) for line in self.lines if line.startswith("| ")][1:]
 
     def faults(self) -> list[str]:
-        """What is not as the benchmarks would write it."""
+        """Differences from the form in which the benchmarks write it."""
         where = f"{self.page.name}: {self.command}"
         if self.command not in TABLES:
             return [f"{where}: expected a mark of {' or '.join(TABLES)}"]

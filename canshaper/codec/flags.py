@@ -23,7 +23,7 @@ _NOT_AVAILABLE = 3
 
 
 class Velocity(Protocol):
-    """What reads the velocity that moves an axis from the raw values of a joystick's frame."""
+    """Reads the velocity that moves an axis from the raw values of a joystick's frame."""
 
     @property
     def name(self) -> str:

@@ -65,7 +65,7 @@ class RewrittenMessage(SentMessage):
         return int.from_bytes(self.fields.layout.encode(self.start), "little") & self.ours_mask
 
     def sender(self) -> "RewritingSender":
-        """What sends it, with its counter at the beginning."""
+        """Make its sender, with the counter at the beginning."""
         return RewritingSender(self)
 
 

@@ -44,7 +44,7 @@ class SentMessage:
         self.start: dict[str, Any] = dict(self.fields.start)
 
     def sender(self) -> "Sender":
-        """What sends it, with its counter at the beginning."""
+        """Make its sender, with the counter at the beginning."""
         return Sender(self)
 
 
@@ -76,6 +76,6 @@ class Sender:
         return new_frame(Frame, (self._bus, self._id, self._extended, self._next(raw)))
 
     def instead(self, frame: Frame) -> Frame:
-        """What takes the place of the last frame, which was not sent: with the same count."""
+        """Make the frame in the place of the last one, which was not sent: with the same count."""
         self.protector.take_back()
         return self.frame()

@@ -173,7 +173,7 @@ class FirstAxis:
     node: str | None = None
     """Of a valve on CANopen without CiA 408."""
     codes: Mapping[str, str] = field(default_factory=dict)
-    """Of its command, see ``NamedCodes``."""
+    """Codes of its command, see ``NamedCodes``."""
 
 
 @dataclass(frozen=True)

@@ -196,7 +196,7 @@ def _scaling(scaling: FirstScaling) -> str:
 
 
 def _codes(codes: Mapping[str, str]) -> str:
-    """What named values mean, after a comma."""
+    """Key ``codes`` of a section, after a comma."""
     means = ", ".join(f"{json.dumps(n, ensure_ascii=False)}: {m}" for n, m in codes.items())
     return f", codes: {{ {means} }}" if means else ""
 

@@ -116,7 +116,7 @@ class TickFollower:
 
 
 def tick_follower(deployment: Deployment, controller: Controller) -> TickFollower | None:
-    """What draws the deadlines; None where the ticks stay where they are.
+    """Make the follower of a joystick; None where the ticks stay where they are.
 
     The command line may have put a bus on an interface that does not say when frames came.
     """

@@ -11,24 +11,24 @@ FOREIGN_NS = 1_000_000_000
 
 
 class Asked:
-    """What was asked in one direction within the tail.
+    """Demand in one direction within the tail.
 
     Attributes:
         most: the largest of it.
-        owed: distance that was asked and has not been run, full speed times seconds.
+        remaining: distance that was asked and has not been run, full speed times seconds.
     """
 
-    __slots__ = ("_sizes", "most", "owed")
+    __slots__ = ("_sizes", "most", "remaining")
 
     def __init__(self) -> None:
         # Each with the period when it was asked last, the largest first, each later one smaller.
         self._sizes: deque[tuple[int, float]] = deque()
-        self.most = self.owed = 0.0
+        self.most = self.remaining = 0.0
 
     def note(self, size: float, distance: float, period: int, of: Axis) -> None:
         """So much is asked in this period: a velocity, and a distance since the last one."""
         sizes, oldest = self._sizes, period - of.tail
-        if not (size or sizes or self.owed):
+        if not (size or sizes or self.remaining):
             return
         while sizes and sizes[0][0] < oldest:
             sizes.popleft()
@@ -37,17 +37,17 @@ class Asked:
                 sizes.pop()
             sizes.append((period, size))
         if not sizes:
-            self.most = self.owed = 0.0
+            self.most = self.remaining = 0.0
             return
         self.most = sizes[0][1]
-        # Never more than the tail holds: an output that stays slower is owed nothing for it.
-        owed, most = self.owed + distance, self.most * of.tail * of.period_s
-        self.owed = owed if owed < most else most
+        # Never more than the tail holds: an output that stays slower may not catch up later.
+        remaining, most = self.remaining + distance, self.most * of.tail * of.period_s
+        self.remaining = remaining if remaining < most else most
 
     def forget(self) -> None:
         """Nothing was asked."""
         self._sizes.clear()
-        self.most = self.owed = 0.0
+        self.most = self.remaining = 0.0
 
 
 class AxisState(Pending):
@@ -159,7 +159,7 @@ class AxisState(Pending):
         self.back.note(-now if now < 0.0 else 0.0, forth - distance, period, of)
 
     def free(self, number: int) -> bool:
-        """Whether no distance is owed: the file allows more, or a bypass is not long ago.
+        """Whether no distance bounds it: the file allows more, or a bypass is not long ago.
 
         After a bypass the filter still runs what was asked in it.
         """
@@ -198,7 +198,7 @@ class AxisState(Pending):
             self.way += velocity * of.period_s
             self.alone = self.alone + 1 if velocity else 0
         if size > fallen + EPSILON and not self.free(number):
-            asked.owed -= size * of.period_s * passed
+            asked.remaining -= size * of.period_s * passed
         self.top = size + of.step
         if size > reach + EPSILON:
             if self.armed and size > fallen + EPSILON:
@@ -208,7 +208,7 @@ class AxisState(Pending):
         self.last = velocity
 
     def carry_over(self, before: "AxisState") -> None:
-        """What is latched stays latched over a reload, and what no tick has seen yet counts."""
+        """Keep over a reload what is latched, and a reason to stop that no tick has seen yet."""
         self.latched = self.latched or before.latched
         self.cause = max(self.cause, before.cause)
         self.hard, self.latches = self.hard or before.hard, self.latches or before.latches

@@ -359,7 +359,7 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
 
 
 def _start(signal: Any, *, j1939: bool) -> float:
-    """What a signal carries that no one sets: GenSigStartValue; in J1939 all ones, in others 0."""
+    """Raw value of a signal that no one sets: GenSigStartValue; else in J1939 all ones, or 0."""
     if signal.is_float:
         return float(signal.raw_initial or 0.0)
     low, high = _ends(signal)
@@ -378,7 +378,7 @@ def _rest(signal: Any) -> set[float]:
 
 
 def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
-    """What leaves besides: status, and what our nodes say about themselves."""
+    """Messages besides those of valves: status, and what our nodes say about themselves."""
     anything, config = frozenset[bytes](), deployment.config
     of_axes = (one.status for one in config.axes.values())
     for status in filter(None, (config.status, config.identity, *of_axes)):

@@ -9,7 +9,7 @@ Order = Literal["little", "big"]
 
 
 class Check(Protocol):
-    """What protects the content of a frame."""
+    """Checksum or profile that protects the content of a frame."""
 
     def right(self, data: bytes) -> bool:
         """Whether a frame of the right length carries what it should."""
@@ -63,7 +63,7 @@ class Crc:
 
 
 def _turned(value: int, bits: int) -> int:
-    """The same bits in the other order."""
+    """Bits in the reverse order."""
     return int(f"{value:0{bits}b}"[::-1], 2)
 
 

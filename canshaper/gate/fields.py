@@ -149,7 +149,7 @@ class Opening:
 def openings_of(
     deadband_pct: float, curve: tuple[Sequence[float] | None, Sequence[float] | None], full: int
 ) -> tuple[Opening, Opening]:
-    """Of the positive and of the negative direction.
+    """Return the openings of the positive and of the negative direction.
 
     Args:
         deadband_pct: % of full command.

@@ -289,5 +289,5 @@ def _velocity(axis: AxisState, word: Word) -> float | None:
 
 
 def _known_by(of: Message, places: Mapping[str, Hashable]) -> Hashable:
-    """What a message is on the machine, whatever the file calls it."""
+    """Place and identifiers of a message: they stay where the file gives it another name."""
     return places[of.bus], of.ids, of.extended, of.group

@@ -13,7 +13,7 @@ NEVER = -(1 << 62)
 
 
 class Pending:
-    """What was received since an axis had its turn last, however short it was.
+    """Reasons to stop that were received since an axis had its turn last, however short.
 
     Attributes:
         hard: a reason to stop at once; ``latches`` whether one was that latches at rest too.
@@ -29,10 +29,10 @@ class Received:
 
     Attributes:
         good_ns: when the last frame came that counts; None where none does.
-        heard_ns: the same of the last one with the right checksum.
+        intact_ns: when the last frame with the right checksum came.
         count: its alive counter.
         good: how many good ones came in a row.
-        anew: after silence the next counter may be any but the last one.
+        any_count: after silence the next counter may be any but the last one.
         waiting: a frame that counts has come and was not passed on; of a gateway.
         source, source_ns: of a message from any address, the one that counts, and its last frame.
         switches, joysticks: what is in it; ``axes`` what that moves.
@@ -41,10 +41,10 @@ class Received:
     def __init__(self, message: Message) -> None:
         self.of = message
         self.good_ns: int | None = None
-        self.heard_ns: int | None = None
+        self.intact_ns: int | None = None
         self.count: int | None = None
         self.good = 0
-        self.anew = True
+        self.any_count = True
         self.waiting = False
         self.source, self.source_ns = -1, NEVER
         self.switches: list[SwitchState] = []
@@ -59,12 +59,12 @@ class Received:
         other = of.page is not None and of.page[0].raw(word) != of.page[1]
         if other and of.alone:
             return False, False
-        if self.heard_ns is None or now_ns - self.heard_ns > of.timeout_ns:
-            self.anew, self.good = True, 0
+        if self.intact_ns is None or now_ns - self.intact_ns > of.timeout_ns:
+            self.any_count, self.good = True, 0
         if of.check is not None and not of.check.right(data):
             self.good = 0
             return False, False
-        self.heard_ns = now_ns
+        self.intact_ns = now_ns
         if of.counts and not self._next(data, word):
             return not other, False
         if self.good < of.qualify:
@@ -82,10 +82,10 @@ class Received:
         step = 1 if last is None else (count - last) % of.counts
         if step == 0:
             return False
-        if step > of.most_step and not self.anew:
+        if step > of.most_step and not self.any_count:
             self.good = 0
             return False
-        self.anew = False
+        self.any_count = False
         return True
 
     def from_other(self, source: int, now_ns: int) -> bool:
@@ -107,7 +107,7 @@ class Received:
 
     def forget(self) -> None:
         """Nothing received so far counts."""
-        self.good_ns = self.heard_ns = None
+        self.good_ns = self.intact_ns = None
 
     def carry_over(self, before: "Received", *, missed: bool) -> None:
         """Go on where the same message was before a reload; its values have to come again.
@@ -118,9 +118,9 @@ class Received:
         """
         of, was = self.of, before.of
         self.source, self.source_ns = before.source, before.source_ns
-        self.heard_ns = None if missed else before.heard_ns
+        self.intact_ns = None if missed else before.intact_ns
         if (of.check, of.counter, of.counts) == (was.check, was.counter, was.counts):
-            self.count, self.anew, self.good = before.count, before.anew, before.good
+            self.count, self.any_count, self.good = before.count, before.any_count, before.good
         released = {(one.of.field, one.of.on) for one in before.switches if one.released}
         for switch in self.switches:
             switch.released = switch.was_off = (switch.of.field, switch.of.on) in released
@@ -196,7 +196,7 @@ class JoystickState:
             self.was_reset = reset
 
     def look(self, now_ns: int, number: int) -> None:
-        """What it says in this tick."""
+        """Find whether it may be used in this tick."""
         pressed = self.pressed
         gone = pressed.released or (not self.of.own and pressed.received.lost(now_ns))
         for one in self.others:

@@ -35,7 +35,7 @@ def demand_of(axis: AxisState, now_ns: int) -> float | None:
         return None
     if now_ns - axis.changed_ns > joystick.of.stuck_ns and abs(demand) > axis.of.stick.band:
         return None
-    if axis.ramp is not None:  # whoever touches the joystick ends it; it begins armed
+    if axis.ramp is not None:  # a touch of the joystick ends it; it begins armed
         if abs(demand) > axis.of.stick.band:
             return None
         return axis.ramp if axis.armed else demand
@@ -118,7 +118,7 @@ def distance(axis: AxisState, velocity: float, number: int) -> str:
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
     if asked.most:
-        ahead = asked.owed + SLACK + of.path
+        ahead = asked.remaining + SLACK + of.path
         if abs(velocity) * of.period_s > ahead and not axis.free(number):
             return f"limit=distance allowed={ahead:.3f}"
     elif of.added and not (axis.forth.most or axis.back.most):

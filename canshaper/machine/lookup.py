@@ -118,7 +118,7 @@ class Lookup:
         return frozenset(key for key, used in self.used.items() if is_fd(used.message))
 
     def codes(self) -> tuple[NamedCode, ...]:
-        """What the named values of the signals mean that are read."""
+        """Named values of the signals that are read, with their meanings."""
         return tuple(code for used in self.used.values() for code in used.codes)
 
     def on_bus(self) -> dict[str, list[Message]]:

@@ -132,7 +132,7 @@ def is_guess(signal: Signal, raw: float, name: str) -> bool:
 
 
 def _meaning(used: UsedMessage, listing: Listing, signal: Signal, raw: float, name: str) -> str:
-    """What a value means, for people; a problem is noted where the file has to say it."""
+    """Say for people how a value is taken; note a problem where the file has to decide."""
     value, neutral, listed = _value(signal, raw), is_neutral(signal, raw, name), listing.codes
     needed = "value" if neutral else "fault" if not in_range(signal, value) else None
     if needed and listed.get(name, needed) != needed:
@@ -153,7 +153,7 @@ def _meaning(used: UsedMessage, listing: Listing, signal: Signal, raw: float, na
 
 
 def _effect(listing: Listing, signal: Signal, value: float) -> str:
-    """What a value does."""
+    """Effect of a value, for people."""
     if listing.moves is None:
         return f"{value:g} {signal.unit or ''}".strip()
     if not value:

@@ -83,7 +83,7 @@ class BoundSwaySensor:
 
 
 def sensor_limits(config: SwaySensor) -> SensorLimits:
-    """What a sensor may show."""
+    """Bounds of the measurements of a sensor."""
     noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
     second_s = config.second_period_s
     second = SwayMode.from_period(second_s, SECOND_DAMPING) if second_s else None

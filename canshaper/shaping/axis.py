@@ -80,7 +80,7 @@ class Axis:
 
     @property
     def raw(self) -> int:
-        """What the valve frame carries now, in steps of its grid (deadband included)."""
+        """Command in the valve frame, in steps of its grid (deadband included)."""
         return self.output.steps
 
     @property

@@ -41,7 +41,7 @@ MOST_CARRY = 0.1
 
 @dataclass(slots=True)
 class Output:
-    """What an axis sends in one tick, and what of it is added for the sake of another axis.
+    """Output of an axis in one tick, with the parts that are added for the sake of another axis.
 
     Velocities are fractions of full speed, [-1, 1].
 

@@ -94,7 +94,7 @@ def test_frames_with_another_multiplexor_say_nothing() -> None:
 
         assert take(3, 1) == (True, True)
         assert take(5, 2) == (False, False)
-        assert (one.heard_ns == 2 * MS) is not alone
+        assert (one.intact_ns == 2 * MS) is not alone
         assert take(3, 3) == (True, True)
 
 
@@ -203,9 +203,9 @@ class TestReload:
         assert after.gate.counts[one.key] == count
         assert after.axis.joystick.received.count == one.axis.joystick.received.count
         assert after.axis.joystick.received.good_ns is None
-        assert after.axis.joystick.received.heard_ns is not None
+        assert after.axis.joystick.received.intact_ns is not None
         after = self.reloaded(one, "crane")
-        assert after.axis.joystick.received.heard_ns is None
+        assert after.axis.joystick.received.intact_ns is None
 
     def test_of_another_machine_nothing_is_carried_over(self, tmp_path: Path) -> None:
         one = bench()

@@ -448,7 +448,7 @@ class TestDistance:
         one.rests()
         for _ in range(500):
             assert not one.sends(0, near_far=1.0)
-        assert one.axis.forth.owed == pytest.approx(1.0)
+        assert one.axis.forth.remaining == pytest.approx(1.0)
 
     def test_after_a_bypass_the_filter_runs_what_was_run_in_it(self) -> None:
         one = bench(tail_s=2.0)

@@ -156,7 +156,7 @@ def _print(deployment: "Deployment") -> None:
 
 
 def _print_codes(codes: "Sequence[NamedCode]") -> None:
-    """What named values mean; signals whose names mean the same in one line."""
+    """Print how named values are taken; signals with equal ones share a line."""
     meanings: dict[str, dict[str, list[str]]] = {}
     for code in codes:
         of_signal = meanings.setdefault(f"{code.message}.{code.signal}", {})
