@@ -40,6 +40,7 @@ VALUES = {
     "crc16_arc": 0xBB3D,
 }
 BODY = bytes(range(0x11, 0x19))
+ROWS = frozenset(CHECKSUMS)  # before any test has added a CRC by its numbers
 ROOT = Path(__file__).parents[2]
 
 
@@ -62,7 +63,7 @@ def mask(place: Checksum) -> int:
 
 
 def test_every_row_has_a_value_and_a_reference() -> None:
-    assert VALUES.keys() == REFERENCE.keys() == CHECKSUMS.keys()
+    assert VALUES.keys() == REFERENCE.keys() == ROWS
 
 
 @pytest.mark.parametrize("kind", CHECKSUMS)
