@@ -55,6 +55,7 @@ CORE_TESTS = [
     "test_sets.py",
     "test_small_strokes.py",
     "test_state_machine.py",
+    "test_stop_against.py",
     "test_valve_curve.py",
 ]
 COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
