@@ -148,8 +148,10 @@ class Axis:
         self.path = self.path_m / self.full_m_s
 
     def set(self, key: str, value: float) -> None:
-        """A number of the file was changed, never beyond the range that the file has for it."""
-        low, high = self.ranges.get(key, (value, value))
+        """A number of the file was changed, in the range that the file has for it; else it stays."""
+        if key not in self.ranges or value != value:  # no number
+            return
+        low, high = self.ranges[key]
         value = min(max(value, low), high)
         if key == "limits.max_pct":
             self.maximum = value / 100.0
