@@ -217,8 +217,11 @@ def saw(k: int, was: float) -> float:
     return abs(k % 20 - 10) * 0.09
 
 
-COUNTED = tuple(one for one in NAMES if one not in (
-    "j1939-forwarder", "canopen-forwarder", "moog-forwarder", "cia402-forwarder"))
+COUNTED = tuple(
+    one
+    for one in NAMES
+    if one not in ("j1939-forwarder", "canopen-forwarder", "moog-forwarder", "cia402-forwarder")
+)
 STOPPED = 2.6  # stop_s and what falls
 ONE = "a gateway's frame before the next tick"
 
@@ -241,28 +244,51 @@ KINDS = {
     # stick held
     "faster than asked": Kind(up, before=20, bound=0.7, why="what was asked"),
     "against the stick at once": Kind(lambda k, was: -0.3, before=20),
-    "against the stick by the rates": Kind(lambda k, was: max(-1, was - RATE * (k + 1)), before=20,
-                                           bound=0.15, why="the way to zero"),
+    "against the stick by the rates": Kind(
+        lambda k, was: max(-1, was - RATE * (k + 1)), before=20, bound=0.15, why="the way to zero"
+    ),
     "jump to what is asked": Kind(lambda k, was: 1.0, size=1.0, before=1),
-    "fall at once, not to zero": Kind(lambda k, was: 0.1, before=40, bound=0.13,
-                                      why="with a motion a part of it may end at once: slower"),
-    "saw tooth of 25 Hz": Kind(lambda k, was: 0.1 if k % 2 else 0.5, before=40,
-                               bound=0.02, why="the frame that is as before"),
+    "fall at once, not to zero": Kind(
+        lambda k, was: 0.1,
+        before=40,
+        bound=0.13,
+        why="with a motion a part of it may end at once: slower",
+    ),
+    "saw tooth of 25 Hz": Kind(
+        lambda k, was: 0.1 if k % 2 else 0.5,
+        before=40,
+        bound=0.02,
+        why="the frame that is as before",
+    ),
     "slower than asked": Kind(lambda k, was: was * 0.8, before=40, bound=0.7, why="slower"),
     "the other way and back": Kind(lambda k, was: -0.05, before=40),
     # stick released
     "goes on": Kind(held, release, before=60, ticks=200, bound=2.8, why="tail"),
-    "goes on after a tap": Kind(held, release, before=5, ticks=200, bound=0.6, why="distance"),
+    "goes on after a tap": Kind(
+        held, release, before=5, ticks=200, bound=0.75, why="distance, and the path of a motion"
+    ),
     "falls too slowly": Kind(down, release, before=60, ticks=200, bound=2.8, why="tail"),
     "goes on faster": Kind(up, release, before=20, ticks=200, bound=1.6, why="tail, distance"),
-    "after the tail": Kind(lambda k, was: 0.0 if k < 150 else 0.09 * min(5, k - 150), release,
-                           before=30, ticks=200, bound=0.02, why="nothing"),
-    "again within the tail": Kind(lambda k, was: max(0, was - RATE * k) if k < 20 else
-                                  min(0.4, RATE * (k - 20)), release, before=30, ticks=200,
-                                  bound=0.9, why="tail, distance"),
+    "after the tail": Kind(
+        lambda k, was: 0.0 if k < 150 else 0.09 * min(5, k - 150),
+        release,
+        before=30,
+        ticks=200,
+        bound=0.02,
+        why="nothing",
+    ),
+    "again within the tail": Kind(
+        lambda k, was: max(0, was - RATE * k) if k < 20 else min(0.4, RATE * (k - 20)),
+        release,
+        before=30,
+        ticks=200,
+        bound=0.9,
+        why="tail, distance",
+    ),
     "reversed, output stays": Kind(held, turned, before=40, ticks=200, bound=1.6, why="distance"),
-    "reversed, jump": Kind(lambda k, was: -0.5, turned, before=40, ticks=5, bound=0.02,
-                           why="through zero"),
+    "reversed, jump": Kind(
+        lambda k, was: -0.5, turned, before=40, ticks=5, bound=0.02, why="through zero"
+    ),
     # reasons to stop at once, in motion
     "enable released": Kind(held, flag(enable=0), before=40),
     "enable released, ramp down": Kind(down, flag(enable=0), before=40),
@@ -272,39 +298,86 @@ KINDS = {
     "second sender goes on": Kind(held, sender(0, 999), before=40, bound=0.02, why=ONE),
     "failed send": Kind(held, failed, before=40, ticks=120),
     "loop stalled": Kind(held, stalled, before=40, ticks=120, bound=0.0),
-    "loop late by 0.3 s": Kind(held, gap, before=40, bound=0.7,
-                               why="asked all the time; it is the loop that says so"),
+    "loop late by 0.3 s": Kind(
+        held, gap, before=40, bound=0.7, why="asked all the time; it is the loop that says so"
+    ),
     "emergency stop": Kind(held, flag(stop=1), before=40, only=("remote-forwarder",)),
-    "emergency stop for a tick": Kind(held, again(1, 0, 1, "stop", 0), before=40, ticks=120,
-                                      only=("remote-forwarder",)),
+    "emergency stop for a tick": Kind(
+        held, again(1, 0, 1, "stop", 0), before=40, ticks=120, only=("remote-forwarder",)
+    ),
     "emergency stop in error": Kind(held, flag(stop=2), before=40, only=("remote-forwarder",)),
     # reasons to stop shaped
     "silence, then no frames": Kind(held, drop(), before=60, ticks=20, bound=0.4, why="stop_s"),
     "silence": Kind(held, drop(), before=60, ticks=250, bound=STOPPED, why="stop_s"),
-    "silence, then held again": Kind(lambda k, was: was if k > 200 else 0.0, drop(0, 30),
-                                     before=40, ticks=260, bound=0.06,
-                                     why="a gateway without frames: the last one holds"),
-    "silence, then at once again": Kind(held, drop(0, 20), before=60, ticks=300, bound=STOPPED,
-                                        why="stop_s"),
-    "enable in error": Kind(held, enable_code(2), before=60, ticks=250, bound=STOPPED,
-                            why="stop_s"),
-    "enable not available": Kind(held, enable_code(3), before=60, ticks=250, bound=STOPPED,
-                                 why="stop_s"),
+    "silence, then held again": Kind(
+        lambda k, was: was if k > 200 else 0.0,
+        drop(0, 30),
+        before=40,
+        ticks=260,
+        bound=0.06,
+        why="a gateway without frames: the last one holds",
+    ),
+    "silence, then at once again": Kind(
+        held, drop(0, 20), before=60, ticks=300, bound=STOPPED, why="stop_s"
+    ),
+    "enable in error": Kind(
+        held, enable_code(2), before=60, ticks=250, bound=STOPPED, why="stop_s"
+    ),
+    "enable not available": Kind(
+        held, enable_code(3), before=60, ticks=250, bound=STOPPED, why="stop_s"
+    ),
     "enable in error at rest": Kind(up, enable_code(2)),
-    "counter stands": Kind(held, counter(lambda k: 7), before=60, ticks=250, bound=STOPPED,
-                           why="stop_s", only=COUNTED),
-    "counter jumps": Kind(held, counter(lambda k: 5 * k), before=60, ticks=250, bound=STOPPED,
-                          why="stop_s", only=COUNTED),
-    "wrong length": Kind(held, spoilt(lambda w, f: [f._replace(data=f.data[:-1])]), before=60,
-                         ticks=250, bound=STOPPED, why="stop_s"),
-    "beyond the range": Kind(held, raw(lambda w, n: 1010 if n == "10" else 245 if n == "8" else
-                                       -32768), before=60, ticks=250, bound=STOPPED, why="stop_s"),
-    "code Error": Kind(held, raw(lambda w, n: {"10": 1022, "8": 254}.get(n, 32766)), before=60,
-                       ticks=250, bound=STOPPED, why="stop_s", only=(*COUNTED, "j1939-forwarder")),
-    "code NotAvailable at rest": Kind(up, raw(lambda w, n: {"10": 1023, "8": 255}.get(n, 32767)),
-                                      only=(*COUNTED, "j1939-forwarder")),
-    "flags contradict": Kind(held, flags(0, 1, 1), before=60, ticks=250, bound=STOPPED,
-                             why="stop_s", only=("j1939-forwarder",)),
+    "counter stands": Kind(
+        held, counter(lambda k: 7), before=60, ticks=250, bound=STOPPED, why="stop_s", only=COUNTED
+    ),
+    "counter jumps": Kind(
+        held,
+        counter(lambda k: 5 * k),
+        before=60,
+        ticks=250,
+        bound=STOPPED,
+        why="stop_s",
+        only=COUNTED,
+    ),
+    "wrong length": Kind(
+        held,
+        spoilt(lambda w, f: [f._replace(data=f.data[:-1])]),
+        before=60,
+        ticks=250,
+        bound=STOPPED,
+        why="stop_s",
+    ),
+    "beyond the range": Kind(
+        held,
+        raw(lambda w, n: 1010 if n == "10" else 245 if n == "8" else -32768),
+        before=60,
+        ticks=250,
+        bound=STOPPED,
+        why="stop_s",
+    ),
+    "code Error": Kind(
+        held,
+        raw(lambda w, n: {"10": 1022, "8": 254}.get(n, 32766)),
+        before=60,
+        ticks=250,
+        bound=STOPPED,
+        why="stop_s",
+        only=(*COUNTED, "j1939-forwarder"),
+    ),
+    "code NotAvailable at rest": Kind(
+        up,
+        raw(lambda w, n: {"10": 1023, "8": 255}.get(n, 32767)),
+        only=(*COUNTED, "j1939-forwarder"),
+    ),
+    "flags contradict": Kind(
+        held,
+        flags(0, 1, 1),
+        before=60,
+        ticks=250,
+        bound=STOPPED,
+        why="stop_s",
+        only=("j1939-forwarder",),
+    ),
     "flags neutral, deflected": Kind(up, flags(1, 0, 1), only=("j1939-forwarder",)),
     # frames that are not the joystick's
     "twins say full": Kind(up, spoilt(twin)),

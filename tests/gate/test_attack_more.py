@@ -104,9 +104,11 @@ def test_last_frames_move_nothing(name: str) -> None:
     frames = world.guarded.neutral_frames()
     keys = {world.valve(axis): axis for axis in world.axes}
     sound = world.evil.neutral_frames
-    world.evil.neutral_frames = lambda: [  # type: ignore[method-assign]
-        frame._replace(data=world.encode(keys[frame[:3]], frame.data, 0.3)) for frame in sound()
-    ]
+    world.evil.neutral_frames = (
+        lambda: [  # type: ignore[method-assign]
+            frame._replace(data=world.encode(keys[frame[:3]], frame.data, 0.3)) for frame in sound()
+        ]
+    )
     assert not [one for one in world.guarded.neutral_frames() if one[:3] in keys], frames
 
 
