@@ -206,8 +206,9 @@ class World:
         self.evil.plant = plant or list
         self.left = []
         frames = [*self.others(), *(self.joystick(one) for one in self.file["joysticks"])]
-        for frame in (one for frame in frames for one in self.change(frame)):
-            self.left += self.receive(frame)
+        for frame in frames:
+            for changed in self.change(frame):
+                self.left += self.receive(changed)
         self.left += self.guarded.tick(self.n * TICK_MS * 1_000_000, missed)
         self.n += 1
         for frame in self.left:
@@ -217,10 +218,10 @@ class World:
                     self.last[axis] = self.n
                     if "cia408" in self.axes[axis]["valve"]:
                         self.control[axis] = frame.data[0]
-        for axis, speed in self.seen.items():  # a command holds until the valve's timeout
+        for axis in self.axes:  # a command holds until the valve's timeout
             if self.n - self.last[axis] > self.axes[axis]["valve"]["timeout_ms"] // TICK_MS:
-                speed = self.seen[axis] = 0.0
-            self.way[axis] += abs(speed) * TICK_S
+                self.seen[axis] = 0.0
+            self.way[axis] += abs(self.seen[axis]) * TICK_S
         return self.left
 
     def go(self, ticks: int, plant: Plant | None = None, **stick: float) -> None:

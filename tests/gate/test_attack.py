@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import pytest
 
 from canshaper.codec.frame import Frame
-from tests.gate.attacker import TICK_S, World
+from tests.gate.attacker import World
 
 pytestmark = pytest.mark.slow
 
 NAMES = """forwarder-robust forwarder-sensor j1939-forwarder canopen-forwarder moog-forwarder
-    cia402-forwarder gateway-forwarder two-cranes remote-forwarder""".split()
+    cia402-forwarder gateway-forwarder two-cranes remote-forwarder""".split()  # noqa: SIM905
 MOTION = ("forwarder-robust", "forwarder-sensor")
 RATE = 0.09  # of full speed in a tick: within rise and fall
 REST = 25  # ticks until claims, nodes and neutral are seen
@@ -120,7 +120,7 @@ def raw(of: Callable[[World, str], int]) -> Each:
     """A raw value in the place of that of every stick."""
 
     def each(world: World, k: int) -> None:
-        for axis, config in world.axes.items():
+        for config in world.axes.values():
             command = config["command"]
             message = world.messages[world.file["joysticks"][command["joystick"]]["message"]]
             length = message.get_signal_by_name(command["signal"]).length
