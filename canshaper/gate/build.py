@@ -314,7 +314,7 @@ def _add_motion(axes: dict[str, Axis], motion: Any, deployment: Any) -> None:
         sensor = deployment.axes[near_far.name].config.sway_sensor
         damps = sensor is not None and sensor.use == "damp"
         near_far.path_m = motion.max_path_m * (2.0 if damps else 1.0)
-        near_far.set("sway.full_speed_m_s", near_far.full_m_s)
+        near_far.path = near_far.path_m / near_far.full_m_s
 
 
 def _valve(names: tuple[str, ...], deployment: Any) -> Valve:

@@ -3,6 +3,7 @@
 Nothing here changes while the machine runs but three limits of an axis, see ``Gate.set``.
 """
 
+import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 
@@ -148,8 +149,10 @@ class Axis:
         self.path = self.path_m / self.full_m_s
 
     def set(self, key: str, value: float) -> None:
-        """A number of the file was changed, never beyond the range that the file has for it."""
-        low, high = self.ranges.get(key, (value, value))
+        """A number was changed, never beyond the range of the file; without one it stays."""
+        if key not in self.ranges or math.isnan(value):
+            return
+        low, high = self.ranges[key]
         value = min(max(value, low), high)
         if key == "limits.max_pct":
             self.maximum = value / 100.0

@@ -241,6 +241,7 @@ def test_a_frame_that_is_none_of_ours_is_left_out() -> None:
 
 def test_numbers_and_demands_reach_the_gate() -> None:
     wrong = Wrong()
+    wrong.guarded._gate.axes["slew"].of.ranges = {"limits.max_pct": (20.0, 80.0)}
     wrong.guarded.set({"axes.slew.limits.max_pct": 50.0})
     assert wrong.guarded._gate.axes["slew"].of.maximum == 0.5
     wrong.guarded.demand("slew", 0.5)

@@ -1,5 +1,6 @@
 """What the gate believes of a message: sequence, senders, and what a reload carries over."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -233,17 +234,22 @@ class TestReload:
 def test_numbers_are_set_within_the_range_of_the_file() -> None:
     one = bench()
     of = one.axis.of
-    of.ranges = {"limits.max_pct": (50.0, 80.0)}
+    of.ranges = dict.fromkeys(("limits.rise_per_s", "limits.fall_per_s"), (2.0, 4.0))
+    of.ranges |= {"limits.max_pct": (50.0, 80.0), "sway.full_speed_m_s": (1.0, 2.0)}
     for value, maximum in ((60.0, 0.6), (90.0, 0.8), (10.0, 0.5)):
         one.gate.set("axes.near_far.limits.max_pct", value)
         assert of.maximum == maximum
     one.gate.set("axes.near_far.limits.rise_per_s", 2.0)
     one.gate.set("axes.near_far.limits.fall_per_s", 4.0)
+    one.gate.set("axes.near_far.limits.rise_per_s", math.nan)
     one.gate.set("axes.near_far.filter.a1", 0.7)
     assert (of.rise, of.fall) == (pytest.approx(0.04), pytest.approx(0.08))
     of.path_m = 0.6
     one.gate.set("axes.near_far.sway.full_speed_m_s", 1.5)
     assert of.path == pytest.approx(0.4)
+    of.ranges = {}
+    one.gate.set("axes.near_far.limits.max_pct", 100.0)
+    assert of.maximum == 0.5
 
 
 def test_a_measurement_is_the_demand_while_the_stick_rests() -> None:
