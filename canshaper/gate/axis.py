@@ -197,8 +197,8 @@ class AxisState(Pending):
         else:
             self.way += velocity * of.period_s
             self.alone = self.alone + 1 if velocity else 0
-        # A fall that is no steeper than the rise may go on for longer than was asked.
-        if (size > fallen + EPSILON or of.fall >= of.rise) and not self.free(number):
+        # A fall counts no distance: counted, the sound G_FF of forwarder.yaml is refused.
+        if size > fallen + EPSILON and not self.free(number):
             asked.remaining -= size * of.period_s * passed
         self.top = size + of.step
         if size > reach + EPSILON:
