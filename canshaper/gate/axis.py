@@ -1,4 +1,4 @@
-"""What the gate remembers of one axis: what was asked of it, and what left for its valve."""
+"""The gate's memory of one axis: demands that were asked of it, frames that left for its valve."""
 
 from collections import deque
 

@@ -1,4 +1,4 @@
-"""What the gate knows of the frames that came in: messages, switches, joysticks.
+"""The gate's memory of received frames: messages, switches, joysticks.
 
 Bad news counts in every frame with the right length and checksum, however short; good news only in
 one that is in sequence too.

@@ -1,4 +1,4 @@
-"""What the gate knows of a machine: identifiers, bits and limits. Filled in once, by ``build.py``.
+"""The gate's record of a machine: identifiers, bits and limits. ``build.py`` fills it in once.
 
 Nothing here changes while the machine runs but three limits of an axis, see ``Gate.set``.
 """

@@ -75,7 +75,7 @@ def bounds(axis: AxisState) -> tuple[float, float]:
 
 
 def unseen(axis: AxisState, number: int, late: int) -> bool:
-    """Whether it may be in a shaped stop of whose reason nothing on the bus tells the gate."""
+    """Return whether it may be in a shaped stop whose reason no frame shows."""
     return axis.of.node or number - late < LATE
 
 

@@ -1,4 +1,4 @@
-"""What the motion of two axes may add to the velocity of one of them.
+"""Bounds of the velocity that the motion of two axes adds to one of them.
 
 The operator of an axis answers for its motion only where he commands it. What the motion adds
 beyond that is the other operator's doing, so it has bounds of its own: in speed
