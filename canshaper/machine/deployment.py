@@ -48,7 +48,7 @@ class Deployment:
     source: Source = field(compare=False)
     """The file, for the lines of what is wrong with it on this machine."""
     codes: tuple[NamedCode, ...] = ()
-    """Return the meaning of each named value of the signals that are read."""
+    """Meanings of the named values of the signals that are read."""
     listen_only: bool = False
     """Nothing is sent but status: another controller drives the machine, or no one does."""
 
