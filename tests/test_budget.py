@@ -1,10 +1,13 @@
 """The rule that keeps `make test` short sees a slow test, a slow child and a slow fixture."""
 
+from pathlib import Path
+
 import pytest
 
 from tests import budget
 
 pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parents[1]
 LIMIT_S = 0.05
 COSTLY_S = 0.15
 TESTS = """
@@ -47,6 +50,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(budget, "IMPORTED", ())
     monkeypatch.setattr(budget, "LIMIT_S", LIMIT_S)
     monkeypatch.setattr(budget, "speed", lambda: 1.0)
+    monkeypatch.setattr(budget, "AGAIN", 0)
 
 
 def run(pytester: pytest.Pytester, *arguments: str) -> tuple[int, str]:
@@ -90,7 +94,7 @@ def test_a_list_that_is_too_long_fails_the_run(
     monkeypatch.setattr(budget, "LISTED_S", COSTLY_S)
     status, text = run(pytester, "--budget")
     assert status == pytest.ExitCode.TESTS_FAILED
-    assert "tests of the list take" in text
+    assert "the list takes" in text
 
 
 def test_a_name_that_is_no_test_fails_the_run(
@@ -101,3 +105,19 @@ def test_a_name_that_is_no_test_fails_the_run(
     status, text = run(pytester, "--budget")
     assert status == pytest.ExitCode.TESTS_FAILED
     assert "test_costs.py::test_gone of the list is no test that ran" in text
+
+
+@pytest.mark.parametrize("again", [pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED])
+def test_slow_once_is_measured_again_alone(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, again: pytest.ExitCode
+) -> None:
+    """The other process has the limits of the file, not those of this test."""
+    monkeypatch.setattr(budget, "AGAIN", 2)
+    monkeypatch.setattr(budget, "LISTED", {})
+    if again == pytest.ExitCode.OK:
+        monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    else:
+        monkeypatch.setattr(budget.sys, "executable", "false")  # in no run is it quick
+    status, text = run(pytester, "--budget")
+    assert status == again
+    assert ("takes" in text) == (again != pytest.ExitCode.OK)

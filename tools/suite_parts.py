@@ -112,7 +112,8 @@ FAULTS = "faults process_faults interface_faults"
 def rows_of_test() -> list[list[Part]]:
     """Return what `make test` runs, in order; the parts of a row run side by side."""
     style = [[f"{BIN}/ruff", "check"], [f"{BIN}/ruff", "format", "--check"]]
-    fast = pytest(*SPREAD, "--budget", "-m", "not slow and not study")
+    repeatable = "--hypothesis-profile=repeatable"
+    fast = pytest(*SPREAD, "--budget", repeatable, "-m", "not slow and not study")
     few = browser("--budget", "-m", "not slow")
     kernel = hil("socketcan daemon", "-m", "not slow")
     return [

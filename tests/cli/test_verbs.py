@@ -119,6 +119,7 @@ def test_help_loads_nothing_of_the_work(arguments: tuple[str, ...]) -> None:
     assert not loaded_by(*arguments) & {*NOT_FOR_HELP}
 
 
+@pytest.mark.slow
 def test_the_daemon_does_not_load_asammdf_through_python_can(tmp_path: Path) -> None:
     (tmp_path / "asammdf.py").write_text("MDF = SignalSource = object\nimport os; os._exit(99)\n")
     run = [sys.executable, "-m", "canshaper", "run", str(tmp_path / "none.yaml")]

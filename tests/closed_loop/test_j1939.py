@@ -20,6 +20,7 @@ def residual_reduction_pct(file: str) -> dict[str, float]:
     return {name: value for name, value in reductions.items() if value is not None}
 
 
+@pytest.mark.slow
 def test_sway_is_reduced_as_with_messages_of_our_own() -> None:
     ours = residual_reduction_pct("forwarder.yaml")
     j1939 = residual_reduction_pct("j1939-forwarder.yaml")

@@ -72,6 +72,7 @@ def along_boom_deg(
     return max(map(abs, (recording.axes["near_far"].sway_deg or [])[600:]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slew", SLEWS)
 def test_what_slewing_swings_along_the_boom_is_damped(slew: str, tmp_path: Path) -> None:
     damped, watched = load_deployment(FILE), watching(tmp_path)

@@ -26,6 +26,7 @@ def residual_reduction_pct(file: str, crane: str | None = None) -> dict[str, flo
     return {name: value for name, value in reductions.items() if value is not None}
 
 
+@pytest.mark.slow
 def test_a_gateway_in_the_line_damps_as_much() -> None:
     """By the joystick's own frames with our velocities in them, a cycle later."""
     reductions = residual_reduction_pct("gateway-forwarder.yaml")

@@ -47,6 +47,7 @@ def texts(playback: Playback, crane: str) -> list[str]:
     return [text for _, name, text, _ in playback.as_dict()["events"] if name == crane]
 
 
+@pytest.mark.slow
 def test_a_log_shows_its_own_crane_and_what_each_deployment_would_have_done(tmp_path: Path) -> None:
     log = recorded(tmp_path / "drive.log")
     _, cranes = opened(log, "forwarder.yaml", "forwarder-robust.yaml")
@@ -90,6 +91,7 @@ def test_a_black_box_is_played_as_it_was_next_to_another_one(
         assert any("slew: tripped: neutral" in text for text in texts(playback, name))
 
 
+@pytest.mark.slow
 def test_of_a_pause_there_are_no_pictures_and_no_silence_is_reported_in_it(tmp_path: Path) -> None:
     rows = recorded(tmp_path / "all.log").read_text().splitlines(keepends=True)
     rows = [row for row in rows if " 110#" in row or " 111#" in row]

@@ -137,6 +137,7 @@ def test_what_nothing_measures_is_judged_by_eye(machine: Path) -> None:
     assert "NOTHING MEASURED the swing of slew, near_far" in report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("saw", "text"),
     [
@@ -218,6 +219,7 @@ def test_a_sensor_that_falls_silent_is_no_grapple_that_hangs_still(machine: Path
     assert "SwayPerpendicular: no value for 13." in proposal.poor[0]
 
 
+@pytest.mark.slow
 def test_a_speed_is_no_swing(machine: Path) -> None:
     driver = Driver("less")
     _, proposal = drive(machine, driver, dict.fromkeys(SIGNALS, "TipVelocity.RadialSpeed"))

@@ -109,6 +109,7 @@ def test_movements_of_a_tap_are_counted(
     assert moves == {"off": 1, "ZV": 2, ROBUST: 1}
 
 
+@pytest.mark.slow
 def test_a_load_and_a_slow_valve_change_the_crane(
     deployment: Deployment, by_name: dict[str, Candidate]
 ) -> None:

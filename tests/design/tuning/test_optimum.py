@@ -215,6 +215,7 @@ def gain(poles: Vector, mode: SwayMode) -> float:
     return float(above * np.prod((1.0 - e) / abs(z - e)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("range_pct", [15.0, 30.0])
 def test_least_worst_swing_over_a_range_of_length(range_pct: float) -> None:
     require = Requirements(max_run_on_s=2.0)

@@ -240,6 +240,7 @@ def test_the_file_records_it(file: Path) -> None:
     assert f"{where}: expected 0 to 60 %, got 61.0" in " ".join(checked.output.split())
 
 
+@pytest.mark.slow
 def test_another_period_stretches_the_taps_as_long_as_the_second_mode_is_covered(
     file: Path,
 ) -> None:

@@ -260,6 +260,7 @@ def test_a_shipped_file_is_not_written_to(tmp_path: Path, monkeypatch: pytest.Mo
     assert "copy it" in result.output
 
 
+@pytest.mark.slow
 def test_the_daemon_never_imports_the_tuner() -> None:
     code = (
         "import sys, canshaper.cli.app, canshaper.daemon.daemon\n"
