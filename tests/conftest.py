@@ -10,8 +10,8 @@ from tests.rigs.forwarder import changed_rig, rig
 __all__ = ["changed_rig", "machine", "rig"]
 pytest_plugins = ["tests.budget", "pytester"]
 
-# No time limit, neither for an example nor for making ten: machines are noisy. On a build machine
-# the examples are the same every time, so that a red run can be repeated; else each run has new ones.
+# No time limit, not even for making the first examples: machines are noisy. On a build machine they
+# are the same every time, so that a red run can be repeated; else every run has new ones.
 settings.register_profile(
     "canshaper",
     deadline=None,
