@@ -29,6 +29,7 @@ AGAIN = 2  # times
 LISTED_S = 60.0
 # Slow tests that every run of `make test` has, by the beginning of their names.
 STUDIO = "tests/studio/test_server.py::test_every_shipped_machine_is_driven_with_all_its_axes"
+PAGE = "tests/studio/test_browser.py"
 FAMILIES = ("forwarder-robust", "j1939-forwarder", "canopen-forwarder", "two-cranes")
 LISTED: Mapping[str, str] = {
     "tests/blackbox/test_sequences.py::test_what_is_played_is_the_same[forwarder-robust": "replay",
@@ -41,7 +42,8 @@ LISTED: Mapping[str, str] = {
     "tests/controller/test_any_frames.py": "whatever frames come, nothing moves unasked",
     "tests/docs/test_commands.py::test_a_page_shows_what_the_command_prints[README": "read first",
     "tests/shaping/test_axis_properties.py::TestAxisUnderWatch": "the promises of an axis",
-    "tests/studio/test_browser.py": "the live page in a browser",
+    f"{PAGE}::test_it_loads_without_an_error_and_requests_nothing_elsewhere[dark": "the live page",
+    f"{PAGE}::test_keys_drive_both_cranes_and_the_shaped_one_swings_less": "a drive by the page",
     "tests/studio/test_server.py::fixture shared": "the studio, as a process",
     "tests/commissioning/identification/test_identify_command.py::fixture logs": "swings",
     **{f"{STUDIO}[{name}": "one machine of a family" for name in FAMILIES},

@@ -37,18 +37,13 @@ def free_groups() -> tuple[str, str]:
     return f"239.250.{port // 256}.{port % 256}", f"239.251.{port // 256}.{port % 256}"
 
 
-# The others take minutes: make test-browser-all.
-IN_MAKE_TEST = ("test_it_loads_without", "test_keys_drive_both_cranes")
-
-
 @pytest.hookimpl(tryfirst=True)  # before marks select
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     skip = pytest.mark.skip(reason="needs a browser: run make test-browser-all")
     for item in items:
         # This hook sees the items of all directories.
         if item.path.parent == HERE and item.path.name.startswith("test_browser"):
-            if not item.name.startswith(IN_MAKE_TEST):
-                item.add_marker(pytest.mark.slow)
+            item.add_marker(pytest.mark.slow)  # those of make test: tests/budget.py
             if "CANSHAPER_BROWSER" not in os.environ:
                 item.add_marker(skip)
 
