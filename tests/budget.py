@@ -42,6 +42,7 @@ LISTED: Mapping[str, str] = {
     "tests/controller/test_any_frames.py": "whatever frames come, nothing moves unasked",
     "tests/docs/test_commands.py::test_a_page_shows_what_the_command_prints[README": "read first",
     "tests/shaping/test_axis_properties.py::TestAxisUnderWatch": "the promises of an axis",
+    f"{PAGE}::fixture ": "a browser and a studio for it",
     f"{PAGE}::test_it_loads_without_an_error_and_requests_nothing_elsewhere[dark": "the live page",
     f"{PAGE}::test_keys_drive_both_cranes_and_the_shaped_one_swings_less": "a drive by the page",
     "tests/studio/test_server.py::fixture shared": "the studio, as a process",
