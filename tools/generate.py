@@ -24,7 +24,7 @@ from canshaper.config.uncertainty import MEASURES
 from canshaper.controller.counters import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
-from canshaper.shaping.state_machine import TRANSITIONS
+from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
 from tools.marks import marked, with_sections
@@ -67,7 +67,7 @@ def diagram() -> Iterator[str]:
     yield "```mermaid"
     yield "stateDiagram-v2"
     yield "    [*] --> NEUTRAL_WAIT"
-    for (old, new), reasons in TRANSITIONS.items():
+    for (old, new), reasons in transitions().items():
         yield f"    {old.name} --> {new.name}: {_names(reasons)}"
     yield "```"
 

@@ -104,7 +104,7 @@ def _run(name: str, items: list[pytest.Item], killer: Path) -> None:
         items[0].config.pluginmanager.register(Verdict(killer))
         for item, following in zip(items, [*items[1:], None], strict=True):
             # A loop that never ends, by processor time: four times what it takes without a mutant.
-            signal.setitimer(signal.ITIMER_PROF, 2.0 + 4.0 * _duration_s(item))
+            signal.setitimer(signal.ITIMER_PROF, 1.0 + 4.0 * _duration_s(item))
             # One that waits for ever, by the clock: long, as a busy machine kills no survivor.
             signal.setitimer(signal.ITIMER_REAL, 20.0 + 30.0 * _duration_s(item))
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)

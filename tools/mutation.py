@@ -51,6 +51,7 @@ CORE_TESTS = [
     "test_limits.py",
     "test_motion*.py",
     "test_other_plane.py",
+    "test_output_stage.py",
     "test_sensed.py",
     "test_sets.py",
     "test_small_strokes.py",

@@ -277,10 +277,8 @@ class Axis:
 
         In TRIPPED the first reason stays, and the first error is reported, not one in each tick.
         """
-        state = self._states.state
-        if state is not TRIPPED:
+        if self._states.state is not TRIPPED:
             self._states.trip(Reason.OUTPUT_INVALID)
-            self._transfer.entered(TRIPPED, state)
         self._transfer.rest()
         self._stage.rest()
         self.command = 0.0

@@ -130,26 +130,8 @@ TABLE: Mapping[State, tuple[Row, ...]] = {
 """The rows of each state, in the order of their priority."""
 
 
-class FirstRow(dict[int, Row | None]):
-    """For one state: the first row that fits, by the conditions that hold; None if no row fits.
-
-    An answer is looked for once, and remembered: the same few conditions hold in most ticks.
-    """
-
-    def __init__(self, rows: tuple[Row, ...]) -> None:
-        super().__init__()
-        self._rows = rows
-
-    def __missing__(self, holding: int) -> Row | None:
-        fits = (row for row in self._rows if row.when & holding == row.when)
-        row = self[holding] = next(fits, None)
-        return row
-
-
-FIRST_ROW = {state: FirstRow(rows) for state, rows in TABLE.items()}
-
-
-def _transitions() -> dict[tuple[State, State], frozenset[Reason]]:
+def transitions() -> dict[tuple[State, State], frozenset[Reason]]:
+    """Return all changes of state in the table with their reasons, trips last."""
     reasons: dict[tuple[State, State], frozenset[Reason]] = {}
     for old, rows in TABLE.items():
         for _, new, why in rows:
@@ -157,10 +139,6 @@ def _transitions() -> dict[tuple[State, State], frozenset[Reason]]:
                 more = why if isinstance(why, frozenset) else {why}
                 reasons[old, new] = reasons.get((old, new), frozenset()) | more
     return {way: reasons[way] for way in sorted(reasons, key=lambda way: TRIPPED in way)}
-
-
-TRANSITIONS: Mapping[tuple[State, State], frozenset[Reason]] = _transitions()
-"""All changes of state in the table with their reasons, trips last: for pages and tests."""
 
 
 class StateMachine:
@@ -233,14 +211,13 @@ class StateMachine:
             if self._stopping >= self._stop_ticks:
                 holding |= STOP_OVER
 
-        row = FIRST_ROW[state][holding]
-        if row is None:
-            return state
-        return self._take(row, fault if trip is None else trip)
+        for when, new, why in TABLE[state]:
+            if when & holding == when:
+                return self._take(new, why, fault if trip is None else trip)
+        return state
 
-    def _take(self, row: Row, cause: Reason | None) -> State:
+    def _take(self, new: State, why: Reason | frozenset[Reason], cause: Reason | None) -> State:
         """Change state and reason; a cause that the row does not accept trips the axis."""
-        _, new, why = row
         if isinstance(why, Reason):
             self.state, self.reason = new, why
         else:

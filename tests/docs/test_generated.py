@@ -11,7 +11,7 @@ import pytest
 from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
-from canshaper.shaping.state_machine import TRANSITIONS
+from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
 
@@ -79,7 +79,7 @@ def test_the_reaction_is_reported_by_the_number() -> None:
 
 def test_the_page_names_every_transition() -> None:
     text = GENERATED[ROOT / "docs" / "states.md"]
-    for old, new in TRANSITIONS:
+    for old, new in transitions():
         assert f"    {old.name} --> {new.name}: " in text
 
 

@@ -94,3 +94,17 @@ def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
         axis.hold(2)
         axis.tick(CommandInput(), sign * 0.2)
         assert axis.raw == 0
+
+
+def test_missed_ticks_of_an_axis_that_stands_use_up_no_time() -> None:
+    """The motion asks for less than a step of the frame."""
+    sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
+    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis.allow_added(LARGEST, 10 * TICK_S)
+    axis.tick(CommandInput())
+    for _ in range(3):
+        axis.tick(CommandInput(), 0.001)
+    assert (axis.state, axis.raw) == (State.ACTIVE, 0)
+    axis.hold(20)
+    axis.tick(CommandInput(), 0.2)
+    assert axis.raw

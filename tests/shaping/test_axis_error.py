@@ -76,6 +76,14 @@ def test_a_filter_that_gives_no_number_is_named_too(drive_with: DriveWith) -> No
     assert tripped.error.startswith("ValueError: filter output is nan (")
 
 
+def test_an_added_velocity_that_is_none_is_named_too(drive_with: DriveWith) -> None:
+    drive = drive_with(Faulty())
+    drive.axis.allow_added(0.25, 5.0)
+    tripped = drive.moving().axis.tick(PUSHED, math.nan)
+    assert tripped == INVALID
+    assert tripped.error.startswith("ValueError: added velocity is nan (")
+
+
 def test_a_filter_that_goes_on_raising_is_reported_once(drive_with: DriveWith) -> None:
     faulty = Faulty()
     drive = drive_with(faulty).moving()

@@ -158,8 +158,9 @@ def test_a_command_that_is_no_number_never_reaches_the_valve(
 ) -> None:
     for shaper in (None, Off()):
         drive = drive_with(shaper).moving()
-        drive.tick(CommandInput(bad))
-        assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
+        tripped = drive.tick(CommandInput(bad))
+        assert tripped == Transition(State.ACTIVE, State.TRIPPED, Reason.OUTPUT_INVALID)
+        assert tripped.error.startswith(f"ValueError: command is {bad} (")
         assert (drive.axis.raw, drive.axis.command) == (0, 0.0)
         drive.tick(RESET)
         drive.moving()

@@ -157,6 +157,19 @@ def test_what_another_axis_wants_in_vain_is_not_due() -> None:
     assert small.output(0.0, 0.0, 0.0, 0.0, 0.1) == least_velocity(LIMITS, 125)
 
 
+@pytest.mark.parametrize("path", [0.05, -0.05])
+def test_what_is_added_for_the_path_is_no_part_of_the_stroke(path: float) -> None:
+    axis = axis_with()
+    axis.allow_added(0.25, 5.0)
+    own = added = 0.0
+    for tick in range(200):
+        axis.tick(CommandInput(0.1 if tick < 5 else 0.0), path if 10 <= tick < 40 else 0.0)
+        own += axis.applied
+        added += axis.sent - axis.applied
+    assert added == pytest.approx(30 * path)
+    assert own == pytest.approx(0.5, rel=0.05)
+
+
 LEAST = least_velocity(LIMITS, 125)
 MOST = SMALL_S / TICK_S * LEAST  # full speed times ticks; larger strokes are not small
 

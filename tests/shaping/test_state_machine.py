@@ -1,9 +1,10 @@
 """The state machine follows its table: every row is reached, and nothing else happens."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.state_machine import TABLE, TRANSITIONS, TRIP, StateMachine
+from canshaper.shaping.state_machine import TABLE, TRIP, StateMachine, transitions
 from canshaper.shaping.states import MOVING, REACTION_OF, CommandInput, Reaction, Reason, State
 
 STOPS = [reason for reason, one in REACTION_OF.items() if one is Reaction.SHAPED_STOP]
@@ -27,6 +28,7 @@ STEPS = st.lists(
 def test_every_change_of_state_is_declared(
     steps: list[tuple[CommandInput, bool, bool]],
 ) -> None:
+    declared = transitions()
     machine = StateMachine(0.02, 5)
     for given_joystick, added, at_rest in steps:
         joystick = given_joystick
@@ -36,7 +38,7 @@ def test_every_change_of_state_is_declared(
         new = machine.step(joystick, at_rest, added)
         assert new is machine.state
         if new is not old:
-            assert machine.reason in TRANSITIONS[old, new]
+            assert machine.reason in declared[old, new]
             input_reason = joystick.trip or joystick.fault
             assert new is not State.TRIPPED or machine.reason in (input_reason, Reason.ENABLE_LOST)
 
@@ -84,7 +86,7 @@ def test_every_declared_reason_is_one_that_an_input_gives() -> None:
                     assert machine.reason in (Reason.ENABLE_LOST, *never), (state, joystick)
                 if new is not state:
                     reasons_of.setdefault((state, new), set()).add(machine.reason)
-    for way, reasons in TRANSITIONS.items():
+    for way, reasons in transitions().items():
         assert reasons <= reasons_of[way], way
 
 
@@ -95,9 +97,31 @@ def test_a_cause_that_no_row_accepts_ends_neutral_and_latched() -> None:
         assert (machine.state, machine.reason) == (State.TRIPPED, Reason.RESET)
 
 
+@pytest.mark.parametrize("fault", [None, Reason.JOYSTICK_TIMEOUT])
+@pytest.mark.parametrize("enabled", [False, True])
+@pytest.mark.parametrize("command", [0.0, 1.0])
+@pytest.mark.parametrize("state", [state for state in State if state is not State.TRIPPED])
+def test_a_cause_for_neutral_at_once_wins(
+    state: State, command: float, enabled: bool, fault: Reason | None
+) -> None:
+    machine = in_state(state)
+    joystick = CommandInput(command, fault, enabled, trip=Reason.EMERGENCY_STOP)
+    machine.step(joystick, at_rest=True, added=False)
+    assert (machine.state, machine.reason) == (State.TRIPPED, Reason.EMERGENCY_STOP)
+
+
+def test_missed_ticks_before_a_stop_do_not_shorten_it() -> None:
+    machine = in_state(State.ACTIVE)
+    machine.hold(100)
+    lost = CommandInput(fault=Reason.JOYSTICK_TIMEOUT)
+    states = [machine.step(lost, at_rest=False, added=False) for _ in range(6)]
+    assert states == [State.STOPPING] * 5 + [State.NEUTRAL_WAIT]
+
+
 def test_the_table_keeps_the_promises_of_its_page() -> None:
     """Of motion, of trips and of the way out of them."""
-    ways = set(TRANSITIONS)
+    ways = transitions()
+    assert sorted(ways, key=lambda way: State.TRIPPED in way) == list(ways)  # trips last
     into_motion = {old for old, new in ways if new in MOVING and old not in MOVING}
     assert into_motion == {State.READY}
     assert {old for old, new in ways if new is State.READY} - MOVING == {State.NEUTRAL_WAIT}

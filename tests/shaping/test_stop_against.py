@@ -76,3 +76,23 @@ def test_where_a_reversal_may_run_on_a_stop_may_too(drive_with: DriveWith, key: 
     drive = stopping(drive_with, 1.0, replace(LIMITS, **{key: True}))
     drive.run(CommandInput(-1.0, fault=LATE), 0.5)
     assert drive.axis.sent == pytest.approx(0.8, abs=0.01)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_held_the_same_way_it_leaves_a_run_on_that_has_yet_to_begin(
+    drive_with: DriveWith, sign: float
+) -> None:
+    class Late:
+        output = 0.0
+
+        def step(self, command: float) -> float:
+            return self.output
+
+    shaper = Late()
+    drive = drive_with(shaper, LIMITS).to_ready()
+    drive.run(CommandInput(sign * 0.8), 0.1)
+    drive.run(CommandInput(sign * 0.8, fault=LATE), 0.1)
+    assert (drive.axis.raw, drive.state) == (0, State.STOPPING)
+    shaper.output = sign * 0.8
+    drive.run(CommandInput(sign * 0.8, fault=LATE), 0.5)
+    assert drive.axis.sent == pytest.approx(sign * 0.8, abs=0.01)

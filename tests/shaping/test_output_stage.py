@@ -1,0 +1,60 @@
+"""The output stage by itself: how it begins, and for how long nothing runs on."""
+
+import pytest
+
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.output import OutputStage
+
+TICK_S, TAIL = 0.02, 5
+LIMITS = OutputLimits(tail_s=TAIL * TICK_S, rise_per_s=20.0, fall_per_s=100.0)
+
+
+def stage() -> OutputStage:
+    return OutputStage(LIMITS, 125, TICK_S, spreads=False)
+
+
+def driven(stage: OutputStage, demand: float, reference: float = 0.4, path: float = 0.0) -> float:
+    stage.drive(demand, reference, path, 0.0, sensor_damps=False)
+    return stage.output.setpoint
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_new_stage_begins_as_one_that_rests(sign: float) -> None:
+    rested = stage()
+    driven(rested, 0.4)
+    rested.rest()
+    for one in (stage(), rested):
+        assert not one.commanded
+        assert driven(one, sign * 0.32, sign * 0.32) == sign * 0.32
+        one.drop_added()  # nothing was: it goes on
+        assert one.ramp == sign * 0.32
+
+
+@pytest.mark.parametrize("path", [0.16, -0.16])
+def test_a_new_stage_adds_nothing_until_it_may_and_then_no_more_than_is_asked(path: float) -> None:
+    assert driven(stage(), 0.0, 0.0, path) == 0.0
+    may = stage()
+    may.largest_added = 0.25
+    assert driven(may, 0.0, 0.0, path) == path
+
+
+def test_a_demand_runs_on_for_the_tail() -> None:
+    one = stage()
+    assert driven(one, 0.4) == 0.4
+    assert [driven(one, 0.0) for _ in range(TAIL)] == [0.4] * TAIL
+    assert driven(one, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("rests", [0, 1, 2])
+def test_for_a_tail_after_the_filter_has_started_nothing_runs_on(rests: int) -> None:
+    """Time at rest counts."""
+    for demanded in range(1, TAIL - rests + 1):
+        one = stage()
+        driven(one, 0.4)
+        one.start_filter()
+        for _ in range(rests):
+            one.rest()
+        for _ in range(demanded):
+            assert driven(one, 0.4) == 0.4
+        over = rests + demanded == TAIL
+        assert driven(one, 0.0) == (0.4 if over else 0.0), demanded
