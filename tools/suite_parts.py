@@ -133,7 +133,7 @@ def rows_of_more() -> list[list[Part]]:
     types = [[f"{BIN}/mypy"], [f"{BIN}/lint-imports"]]
     gate = [f"tests/{room}" for room in GATE.split()]
     few = "--hypothesis-profile=few"  # lines need no more
-    cover = [pytest(*SPREAD, few, "--cov", "--cov-report=term", *gate)]
+    cover = [pytest(*SPREAD, few, "-m", "not slow", "--cov", "--cov-report=term", *gate)]
     core = [[sys.executable, "tools/mutation.py", f"-j{JOBS}", "core"]]
     service = [[sys.executable, "-m", "tests.lane.services", "-q"]]
     slow, study = (pytest(*SPREAD, "-m", mark) for mark in ("slow and not study", "study"))

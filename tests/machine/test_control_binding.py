@@ -22,7 +22,6 @@ def test_numbers_of_sway_filter_and_limits_may_be_changed(machine: Machine) -> N
     assert str(control.path(path)) == "/run/canshaper/machine/control.sock"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "why"),
     [

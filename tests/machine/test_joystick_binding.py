@@ -54,6 +54,16 @@ def test_a_range_that_fits_no_flags_either_is_reported_alone(machine: Machine) -
     ]
 
 
+def test_each_direction_flag_is_looked_up(machine: Machine) -> None:
+    flags = "flags: { neutral: Mid, positive: Right, negative: Left }"
+    line = machine.in_yaml("signal: Slew", f"signal: Slew, {flags}")
+    begin = f"machine.yaml:{line}: axes.slew.command.flags"
+    wanted = "expected a signal of JoystickLeft, got"
+    problems = machine.problems()
+    for key, name in (("neutral", "Mid"), ("positive", "Right"), ("negative", "Left")):
+        assert any(problem.startswith(f"{begin}.{key}: {wanted} '{name}'") for problem in problems)
+
+
 def test_a_rocker_is_bound(machine: Machine) -> None:
     rocker(machine)
     joystick = machine.load().joysticks["left"]
