@@ -83,6 +83,23 @@ def test_a_reload_in_motion_waits_and_the_log_says_so_once(
     assert [line.split()[1] for line in lines[1:]] == ["reload=applied"]
 
 
+def test_a_motion_that_begins_while_the_file_is_read_ends_before_it_is_in_force(
+    bench: Bench, log: Callable[[], list[str]]
+) -> None:
+    def script(number: int) -> None:
+        bench.joysticks(Slew=1000 if 11 <= number < 20 else 0)
+        if number == 10:
+            bench.reload()
+        if 12 <= number < 20:
+            assert bench.reported()[0] == "ACTIVE"
+            assert not any("reload=applied" in line for line in log())
+        if number == 200:
+            bench.stop()
+
+    bench.run(script)
+    assert any("reload=applied" in line for line in log())
+
+
 def test_signals_are_those_of_a_service(bench: Bench) -> None:
     at(bench, {})
     assert {signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGCHLD} == bench._handlers.keys()
