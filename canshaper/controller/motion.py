@@ -49,6 +49,7 @@ class _Member:
             moving.follow(axis.sway)
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
         moving.commanded, moving.able = axis.commanded, axis.state in ABLE
+        moving.unattended = axis.unattended
 
 
 class MotionRunner:
@@ -123,6 +124,8 @@ class MotionRunner:
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
             member.runner.add_velocity(member.moving.added, damps=member.moving.damps)
+            if self._motion.unattended:
+                member.runner.axis.renew_added_time()
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
         return None if apart == self._apart else self._changed(apart)

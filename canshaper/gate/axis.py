@@ -70,7 +70,8 @@ class AxisState(Pending):
         ticks: periods since its last frame.
         last: velocity of that frame; ``top`` what it may have been before it was rounded.
         zero_at: ticks that were made before it came to rest, or lost the right to move.
-        way, alone: distance and periods in motion since something was asked of it.
+        way, alone: distance and periods in motion since something was asked of it, or nothing
+            of its partner; a pause gives none of it back.
     """
 
     def __init__(self, axis: Axis, joystick: JoystickState) -> None:
@@ -192,11 +193,8 @@ class AxisState(Pending):
             if abs(self.last) > fall + self.dropped(made):
                 # Nothing falls so fast but a stop: from here on it is neutral first.
                 self.halt("fell to neutral at once", made, latch=False)
-        if not self.asked or self.forth.most or self.back.most:
-            self.way, self.alone = 0.0, 0
-        else:
-            self.way += velocity * of.period_s
-            self.alone = self.alone + 1 if velocity else 0
+        self.way += velocity * of.period_s
+        self.alone += velocity != 0.0
         # A fall counts no distance: counted, the sound G_FF of forwarder.yaml is refused.
         if size > fallen + EPSILON and not self.free(number):
             asked.remaining -= size * of.period_s * passed

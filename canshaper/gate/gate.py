@@ -190,6 +190,8 @@ class Gate:
                 if partner is not None:
                     asks = asks or bool(partner.forth.most or partner.back.most)
                 axis.asks, axis.asked = asks, asks or axis.asks
+                if not axis.asked or axis.forth.most or axis.back.most:
+                    axis.way, axis.alone = 0.0, 0
                 axis.least, axis.most = rules.bounds(axis)
                 axis.unseen = rules.unseen(axis, self.number, self.late)
 

@@ -50,17 +50,22 @@ class AddedTime:
     def __init__(self, ticks: int) -> None:
         self._ticks = self._left = ticks
 
+    def renew(self) -> None:
+        """Give the axis its full time back: neither of its motion's operators is at work."""
+        self._left = self._ticks
+
     def allows(self, asked: bool, commanded: bool, moved: bool, ticks: int = 1) -> bool:
         """Count time, and say whether the motion may move the axis now.
 
         Args:
-            asked: the motion asks for it. When it does not, the axis gets its full time back.
-            commanded: the operator demanded motion within the tail. Then too.
-            moved: the valve was open. An axis that stands uses up no time.
+            asked: the motion asks for it.
+            commanded: the operator demanded motion within the tail. The axis gets its full time
+                back.
+            moved: the valve was open. An axis that stands uses up no time, and gets none back.
             ticks: how many ticks have passed.
         """
-        if commanded or not asked:
-            self._left = self._ticks
+        if commanded:
+            self.renew()
         elif moved:
             self._left -= ticks
         return asked and self._left > 0

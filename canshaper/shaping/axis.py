@@ -31,6 +31,9 @@ from canshaper.shaping.transfer import BumplessTransfer
 # Missed ticks that the filter and the model go through at most: after so many of them nothing moves
 # any more, and the first neutral frame must not wait.
 MOST_HELD = 2000
+# Ticks beyond the tail until an axis counts as unattended. The gate counts them by the tail alone:
+# what it gives back, it never gives back later than the axis does.
+UNATTENDED_TICKS = 3
 
 
 class Axis:
@@ -77,6 +80,7 @@ class Axis:
         self.output = self._stage.output
         self._added_time = AddedTime(0)
         self._asked = False  # the motion asked this axis for something in the last tick
+        self._unattended = 0  # ticks since its joystick was deflected, in whatever state
 
     @property
     def raw(self) -> int:
@@ -139,10 +143,13 @@ class Axis:
         old = states.state
         sensor_damps = self.sensed is not None and self.sensed.weight > 0.0
         asked = damps_now = may_add = False
-        if stage.largest_added and not joystick.bypass:
+        if stage.largest_added:
+            deflected = abs(joystick.command) > self._neutral_band
+            self._unattended = 0 if deflected else self._unattended + 1
             commanded, moved = stage.commanded, self.output.steps != 0
-            damps_now = damps and sensor_damps and not commanded
-            asked = added != 0.0 or damps_now
+            if not joystick.bypass:
+                damps_now = damps and sensor_damps and not commanded
+                asked = added != 0.0 or damps_now
             may_add = self._added_time.allows(asked, commanded, moved)
         self._asked = asked
 
@@ -199,6 +206,7 @@ class Axis:
         demand = self._clamped_demand()
         self._states.hold(ticks)
         self._stage.hold(demand, ticks)
+        self._unattended += ticks
         self._added_time.allows(self._asked, self.commanded, self.output.steps != 0, ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
@@ -237,6 +245,15 @@ class Axis:
         """
         self._stage.largest_added = largest
         self._added_time = AddedTime(round(time_s / self._tick_s))
+
+    @property
+    def unattended(self) -> bool:
+        """Whether its joystick rested for longer than the tail; of an axis that may be moved."""
+        return self._unattended > self._stage.tail + UNATTENDED_TICKS
+
+    def renew_added_time(self) -> None:
+        """Give it the full time back for which a motion may move it."""
+        self._added_time.renew()
 
     def drop_added(self) -> None:
         """End what was added at once: the motion has lost the right to move this axis."""

@@ -49,9 +49,12 @@ class TwoAxisMotion:
         slew: the axis that turns.
         near_far: the axis that moves the tip in and out, or None.
         path_m: farthest that near-far is moved for slew, and as far again to damp its swing.
+
+    Attributes:
+        unattended: every joystick of it rested for longer than the tail: way and time begin again.
     """
 
-    __slots__ = ("_near_far", "_path_m", "_radius_m", "_slew", "_weight")
+    __slots__ = ("_near_far", "_path_m", "_radius_m", "_slew", "_weight", "unattended")
 
     def __init__(self, slew: MovingAxis, near_far: MovingAxis | None, path_m: float) -> None:
         self._slew = slew
@@ -59,6 +62,7 @@ class TwoAxisMotion:
         self._path_m = path_m
         self._radius_m: float | None = None  # of the grapple
         self._weight = 1.0
+        self.unattended = False
 
     def step(self, elapsed_s: float, tip_m: float | None, circle_m: float | None = None) -> None:
         """Find what is added from now on, by each axis whose period begins now: its ``added``.
@@ -75,11 +79,12 @@ class TwoAxisMotion:
         if weight < 1.0 or not able:
             fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
             weight = self._weight = min(max(weight + fade, 0.0), 1.0)
+        self.unattended = slew.unattended and (near_far is None or near_far.unattended)
+        if near_far is not None:
+            self._moved(near_far, elapsed_s)
         if not commanded or not weight:
             self._rest(over=not commanded)
             return
-        if near_far is not None:
-            self._moved(near_far, elapsed_s)
         if near_far is None:
             radius_m = None
         elif circle_m is None:
@@ -116,12 +121,10 @@ class TwoAxisMotion:
                 axis.added = axis.reached = axis.damped = 0.0
                 axis.damps = False
                 axis.joins = not over
-                if over:
-                    axis.way = 0.0
 
     def _moved(self, near_far: MovingAxis, elapsed_s: float) -> None:
         """Count how far near-far was moved; it damps no farther than it may be moved."""
-        if near_far.commanded:
+        if near_far.commanded or self.unattended:
             near_far.damps, near_far.damped, near_far.way = False, 0.0, 0.0
             return
         passed = near_far.full_speed * elapsed_s

@@ -81,6 +81,7 @@ class OutputStage:
             rounded one, it would stick on a coarse grid.
         largest_added: largest |velocity| that the motion of two axes may give to this axis while no
             one commands it; 0 where it may add nothing.
+        tail: ticks for which the output may run on.
     """
 
     __slots__ = (
@@ -94,12 +95,12 @@ class OutputStage:
         "_recent",
         "_small",
         "_spreads",
-        "_tail",
         "_tick_s",
         "largest_added",
         "limits",
         "output",
         "ramp",
+        "tail",
     )
 
     def __init__(
@@ -111,9 +112,9 @@ class OutputStage:
         self._grid_steps = grid_steps
         self._tick_s = tick_s
         self._spreads = spreads
-        self._tail = round(limits.tail_s / tick_s)  # ticks
-        self._recent = RecentCommand(self._tail)
-        self._demanded = RecentCommand(self._tail)  # the same, but no rest ends it
+        self.tail = round(limits.tail_s / tick_s)  # ticks
+        self._recent = RecentCommand(self.tail)
+        self._demanded = RecentCommand(self.tail)  # the same, but no rest ends it
         self._no_run_on = 0  # ticks that are left without run-on
         self.change_limits(limits)
         self._own_ramp = 0.0  # what ``ramp`` would be if nothing had been added
@@ -244,7 +245,7 @@ class OutputStage:
 
     def start_filter(self) -> None:
         """Anti-sway was switched on in motion: nothing runs on for a tail, see the prologue."""
-        self._no_run_on = self._tail
+        self._no_run_on = self.tail
 
     def rest(self) -> None:
         """Go to neutral at once, and forget all that may run on."""

@@ -186,7 +186,6 @@ ENDLESS = {
 }  # fmt: skip
 
 
-@pytest.mark.xfail(strict=True, reason="one neutral frame begins the time of what is added again")
 @pytest.mark.parametrize("moved", ENDLESS)
 def test_what_is_added_ends_after_its_time(moved: str) -> None:
     """With pauses of a frame, by hand of one who holds the other stick: 6 s of 0.25 at most."""

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.shaping.added import AddedTime, range_with_added
+from canshaper.shaping.axis import UNATTENDED_TICKS
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.kind import Shaper
@@ -111,8 +112,45 @@ def test_time_counts_while_the_axis_is_moved_and_no_one_commands_it() -> None:
     assert time.allows(asked=True, commanded=True, moved=True)
     assert time.allows(asked=True, commanded=False, moved=True, ticks=2)
     assert not time.allows(asked=True, commanded=False, moved=True)
-    assert not time.allows(asked=False, commanded=False, moved=True)
-    assert time.allows(asked=True, commanded=False, moved=True)
+
+
+def test_a_pause_gives_no_time_back() -> None:
+    """Only its operator does, or that no joystick of the motion was deflected for the tail."""
+    time = AddedTime(2)
+    time.allows(asked=True, commanded=False, moved=True)
+    time.allows(asked=False, commanded=False, moved=True)
+    for _ in range(500):
+        assert not time.allows(asked=False, commanded=False, moved=False)
+    assert not time.allows(asked=True, commanded=False, moved=False)
+    time.renew()
+    assert time.allows(asked=True, commanded=False, moved=False)
+
+
+@pytest.mark.parametrize("fault", [None, Reason.LOOP_OVERRUN])
+def test_its_joystick_rests_for_longer_than_the_tail(fault: Reason | None) -> None:
+    """In whatever state: a stick that is held through a stop is at work."""
+    axis, _ = pair(OutputLimits(tail_s=1.0))
+    axis.tick(CommandInput(0.5, fault=fault))
+    axis.hold(3)
+    for _ in range(20 + UNATTENDED_TICKS - 3):
+        assert not axis.unattended
+        axis.tick(CommandInput(0.02, fault=fault))
+    axis.tick(CommandInput())
+    assert axis.unattended
+    axis.tick(CommandInput(-0.5, fault=fault))
+    assert not axis.unattended
+
+
+def test_time_is_used_up_in_the_bypass_too() -> None:
+    axis, _ = pair(OutputLimits(fall_per_s=1.0))
+    for _ in range(27):
+        axis.tick(CommandInput(), 0.2)
+    for _ in range(3):
+        axis.tick(CommandInput(bypass=True), 0.2)
+        assert axis.sent
+    before = axis.sent
+    axis.tick(CommandInput(), 0.2)
+    assert axis.sent < before
 
 
 def test_when_the_time_is_over_it_falls_and_rests() -> None:

@@ -114,10 +114,16 @@ def test_the_way_begins_again_with_the_next_motion() -> None:
     for _ in range(30):  # what was added has faded; slew is still commanded
         near_far.sent = 0.0
         motion.step(TICK_S, 3.0)
-    assert near_far.way < 0.0
     slew.commanded = False
+    for one, other in ((False, False), (True, False), (False, True)):
+        slew.unattended, near_far.unattended = one, other
+        motion.step(TICK_S, 3.0)
+        assert near_far.way < 0.0
+        assert not motion.unattended
+    slew.unattended = near_far.unattended = True
     motion.step(TICK_S, 3.0)
     assert near_far.way == 0.0
+    assert motion.unattended
 
 
 def test_what_was_not_added_while_an_axis_could_not_is_not_made_up_for() -> None:
