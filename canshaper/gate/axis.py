@@ -8,6 +8,8 @@ from canshaper.gate.record import Axis
 
 FOREIGN_NS = 1_000_000_000
 """So long a second sender has to be silent."""
+BLEND_S = 0.3
+"""Seconds for which a velocity may go on as it was, where another filter takes over from one."""
 
 
 class Asked:
@@ -15,19 +17,23 @@ class Asked:
 
     Attributes:
         most: the largest of it.
+        before: the largest of it, and of what was asked before the last stop.
         remaining: distance that was asked and has not been run, full speed times seconds.
     """
 
-    __slots__ = ("_sizes", "most", "remaining")
+    __slots__ = ("_before_until", "_sizes", "before", "most", "remaining")
 
     def __init__(self) -> None:
         # Each with the period when it was asked last, the largest first, each later one smaller.
         self._sizes: deque[tuple[int, float]] = deque()
-        self.most = self.remaining = 0.0
+        self.most = self.before = self.remaining = 0.0
+        self._before_until = 0
 
     def note(self, size: float, distance: float, period: int, of: Axis) -> None:
         """So much is asked in this period: a velocity, and a distance since the last one."""
         sizes, oldest = self._sizes, period - of.tail
+        if self.before and period > self._before_until:
+            self.before = 0.0
         if not (size or sizes or self.remaining):
             return
         while sizes and sizes[0][0] < oldest:
@@ -39,13 +45,15 @@ class Asked:
         if not sizes:
             self.most = self.remaining = 0.0
             return
-        self.most = sizes[0][1]
+        self.most = most = sizes[0][1]
+        if most >= self.before:
+            self.before, self._before_until = most, sizes[0][0] + of.tail
         # Never more than the tail holds: an output that stays slower may not catch up later.
-        remaining, most = self.remaining + distance, self.most * of.tail * of.period_s
+        remaining, most = self.remaining + distance, most * of.tail * of.period_s
         self.remaining = remaining if remaining < most else most
 
     def forget(self) -> None:
-        """Nothing was asked."""
+        """Nothing of it may run on."""
         self._sizes.clear()
         self.most = self.remaining = 0.0
 
@@ -68,7 +76,9 @@ class AxisState(Pending):
         unseen: it may be in a shaped stop of whose reason the gate does not know.
         due: it has its turn in this tick, and has sent nothing yet.
         ticks: periods since its last frame.
+        flips: how often anti-sway was switched in its joystick, as this axis knows it.
         last: velocity of that frame; ``top`` what it may have been before it was rounded.
+        uncounted: up to this velocity a fall counts no distance.
         zero_at: ticks that were made before it came to rest, or lost the right to move.
         way, alone: distance and periods in motion since something was asked of it, or nothing
             of its partner; a pause gives none of it back.
@@ -90,8 +100,8 @@ class AxisState(Pending):
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
         self.asks = self.asked = self.unseen = self.due = False
-        self.ticks = 0
-        self.last, self.top = 0.0, axis.step
+        self.ticks = self.flips = 0
+        self.last, self.top, self.uncounted = 0.0, axis.step, axis.step
         self.zero_at = NEVER
         self.way, self.alone = 0.0, 0
 
@@ -154,18 +164,17 @@ class AxisState(Pending):
     def _ask(self, before: float, period: int, passed: int) -> None:
         """Remember what is asked; over deadlines that were missed the demand before was held."""
         of, now = self.of, self.now
+        if self.flips != self.joystick.flips:
+            self.flips = self.joystick.flips
+            self.blend()
         distance = (now + before * (passed - 1)) * of.period_s
         forth = distance if distance > 0.0 else 0.0
         self.forth.note(now if now > 0.0 else 0.0, forth, period, of)
         self.back.note(-now if now < 0.0 else 0.0, forth - distance, period, of)
 
-    def free(self, number: int) -> bool:
-        """Whether no distance bounds it: the file allows more, or a bypass is not long ago.
-
-        After a bypass the filter still runs what was asked in it.
-        """
-        of = self.of
-        return of.faster or of.reverse or number - self.joystick.bypass <= (of.tail + 2) * of.period
+    def blend(self) -> None:
+        """Another filter takes over, or none: what differs between both fades."""
+        (self.forth if self.last > 0.0 else self.back).remaining += abs(self.last) * BLEND_S
 
     def dropped(self, made: int) -> float:
         """How much of the velocity may end in one frame: what a partner added, when that stops.
@@ -179,7 +188,7 @@ class AxisState(Pending):
             return 1.0
         return 0.0 if partner.last else self.of.added
 
-    def left(self, velocity: float, made: int, number: int) -> None:
+    def left(self, velocity: float, made: int) -> None:
         """A frame has left."""
         of, size = self.of, abs(velocity)
         passed, self.ticks = self.ticks, 0
@@ -195,8 +204,11 @@ class AxisState(Pending):
                 self.halt("fell to neutral at once", made, latch=False)
         self.way += velocity * of.period_s
         self.alone += velocity != 0.0
-        # A fall counts no distance: counted, the sound G_FF of forwarder.yaml is refused.
-        if size > fallen + EPSILON and not self.free(number):
+        # Of a fall counts what is faster than the way back from what was asked last.
+        held = max(self.now if velocity > 0.0 else -self.now, 0.0)
+        on = self.uncounted - of.fall * passed if velocity * self.last > 0.0 else 0.0
+        self.uncounted = max(on, held + of.step)
+        if size > min(fallen, self.uncounted) + EPSILON:
             asked.remaining -= size * of.period_s * passed
         self.top = size + of.step
         if size > reach + EPSILON:

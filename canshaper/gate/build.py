@@ -14,6 +14,11 @@ from canshaper.gate.record import Axis, Joystick, Key, Message, Record, Switch, 
 REALS = {16: "<e", 32: "<f", 64: "<d"}
 NEUTRAL = ("neutral", "neutralposition", "center", "centre", "zero", "released")
 """Names of a code that is a measurement where its value is 0."""
+SPREADING = ("off", "first_order", "s_curve", "zv", "zvd", "ei", "two_mode")
+"""Filters that spread the demand over time, and know of no swing."""
+SLACK, SWING_SLACK = 0.4, 1.5
+"""Of those, and of the others. A G_FF damps by 1.04 s of full speed what taps in the time of the
+swing have summed up, a robust shaper by .9 s what a bypass has left (gate/test_distance.py)."""
 # J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
@@ -278,11 +283,20 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         *(limits.rise_per_s * period_s, limits.fall_per_s * period_s),
         *(round(limits.tail_s / period_s), max(1, round(limits.stop_s / period_s))),
         *(limits.allow_faster, limits.allow_reverse, limits.reversal == "brake_shaped"),
+        slack_of(config),
         forwarded,
         joystick.config.node is not None,
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
         ranges={k.removeprefix(start): tuple(ends) for k, ends in ranges if k.startswith(start)},
     )
+
+
+def slack_of(config: Any) -> float:
+    """How far the filter of an axis may run ahead, full speed times seconds."""
+    if config.limits.allow_faster or config.limits.allow_reverse:
+        return math.inf
+    one = not (config.gain_schedule or config.profiles or config.sway_sensor)
+    return SLACK if one and config.filter.kind in SPREADING else SWING_SLACK
 
 
 def _forwarded(axis: Any, deployment: Any) -> bool:

@@ -151,7 +151,9 @@ class Gate:
     def set(self, key: str, value: float) -> None:
         """A number of the file is another one from now on: axes.NAME.SECTION.KEY."""
         name, section, last = key.rsplit(".", 2)
-        self.axes[name.removeprefix("axes.")].of.set(f"{section}.{last}", value)
+        axis = self.axes[name.removeprefix("axes.")]
+        axis.of.set(f"{section}.{last}", value)
+        axis.blend()
 
     def measure(self, name: str, part: float) -> None:
         """A measurement moves an axis: so large a part of full command is the demand, [-1, 1]."""
@@ -173,7 +175,7 @@ class Gate:
             for message in self.messages.values():
                 message.forget()
         for joystick in self.joysticks.values():
-            joystick.look(now_ns, self.number)
+            joystick.look(now_ns)
         axes = self.axes.values()
         for axis in axes:
             period = axis.of.period
@@ -221,11 +223,11 @@ class Gate:
             velocity = _velocity(axis, word)
             if velocity is None:
                 return f"axis={axis.of.name} limit=command"
-            if velocity and (why := rules.velocity_refused(axis, velocity, self.made, self.number)):
+            if velocity and (why := rules.velocity_refused(axis, velocity, self.made)):
                 return why
             velocities.append(velocity)
         for axis, velocity in zip(axes, velocities, strict=True):
-            axis.left(velocity, self.made, self.number)
+            axis.left(velocity, self.made)
         if of is None:
             axes[-1].due = False
         else:

@@ -169,7 +169,7 @@ class JoystickState:
     Attributes:
         press: ticks that were made before enable or reset was pressed last.
         enabled: its own switch was on in the last frame that counts.
-        bypassed: anti-sway was off in it; ``bypass`` the number of the last such tick.
+        bypassed: anti-sway was off in it; ``flips`` how often that has changed.
         gone: why nothing that it moves may move in this tick, at once.
         valid: it may be used in this tick.
     """
@@ -180,7 +180,7 @@ class JoystickState:
         self.of, self.received = joystick, received
         self.pressed, *self.others = switches
         self.was_reset = True
-        self.press = self.bypass = NEVER
+        self.press, self.flips = NEVER, 0
         self.enabled = self.bypassed = self.valid = False
         self.gone = ""
 
@@ -188,21 +188,20 @@ class JoystickState:
         """A frame of it that counts. One that has waited in a standstill is no press."""
         of = self.of
         self.enabled = not of.own or of.pressed.field.raw(word) == 1
-        self.bypassed = of.bypass is not None and of.bypass.raw(word) == 1
+        bypassed = of.bypass is not None and of.bypass.raw(word) == 1
+        self.flips += bypassed is not self.bypassed
+        self.bypassed = bypassed
         if of.reset is not None:
             reset = of.reset.raw(word) == 1
             if reset and not self.was_reset and not stood:
                 self.press = made
             self.was_reset = reset
 
-    def look(self, now_ns: int, number: int) -> None:
+    def look(self, now_ns: int) -> None:
         """Find whether it may be used in this tick."""
         pressed = self.pressed
         gone = pressed.released or (not self.of.own and pressed.received.lost(now_ns))
         for one in self.others:
             gone = gone or one.off(now_ns)
         self.gone = "enable" if gone else ""
-        fresh = not self.received.lost(now_ns)
-        self.valid = fresh and self.enabled
-        if fresh and self.bypassed:
-            self.bypass = number
+        self.valid = self.enabled and not self.received.lost(now_ns)

@@ -105,6 +105,7 @@ class Axis:
         tail: for how long the output may stay as fast as was asked.
         stop: longest shaped stop.
         faster, reverse, brake_shaped: what the file allows beyond that.
+        slack: how far a sound filter may run ahead of what was asked, full speed times seconds.
         forwarded: its command leaves in the frames of its own joystick, through a gateway.
         node: a CANopen node stops it shaped, which the gate does not watch.
         partner: the axis that adds velocity to this one; empty for none.
@@ -133,6 +134,7 @@ class Axis:
     faster: bool
     reverse: bool
     brake_shaped: bool
+    slack: float
     forwarded: bool
     node: bool = False
     partner: str = ""

@@ -9,8 +9,6 @@ from canshaper.gate.fields import EPSILON, Word
 from canshaper.gate.received import SwitchState
 from canshaper.gate.record import Key, Record, Valve
 
-SLACK = 0.4
-"""Distance that a sound filter may run ahead of what was asked, full speed times seconds."""
 LATE = 100
 """Ticks after a missed deadline in which the loop may count as overrun."""
 
@@ -67,9 +65,9 @@ def bounds(axis: AxisState) -> tuple[float, float]:
             most = 0.0
     if of.added and axis.armed and axis.asked:
         if now <= 0.0:
-            least = min(least, low, 0.0 if now else -of.added)
+            least = min(least, -axis.back.before, 0.0 if now else -of.added)
         if now >= 0.0:
-            most = max(most, high, 0.0 if now else of.added)
+            most = max(most, axis.forth.before, 0.0 if now else of.added)
     maximum = of.maximum
     return (-maximum if least < -maximum else least), (maximum if most > maximum else most)
 
@@ -111,15 +109,15 @@ def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
     return ""
 
 
-def distance(axis: AxisState, velocity: float, number: int) -> str:
-    """Rule 7: no farther than was asked and not yet run; limit: ``SLACK``.
+def distance(axis: AxisState, velocity: float) -> str:
+    """Rule 7: no farther than was asked and not yet run; limit: the slack of its filter.
 
     Where nothing was asked within the tail a partner moves it: limits are its path and its time.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
     if asked.most:
-        ahead = asked.remaining + SLACK + of.path
-        if abs(velocity) * of.period_s > ahead and not axis.free(number):
+        ahead = asked.remaining + of.slack + of.path
+        if abs(velocity) * of.period_s > ahead:
             return f"limit=distance allowed={ahead:.3f}"
     elif of.added and not (axis.forth.most or axis.back.most):
         if axis.alone > of.most_periods + 1:
@@ -131,7 +129,7 @@ def distance(axis: AxisState, velocity: float, number: int) -> str:
     return ""
 
 
-def velocity_refused(axis: AxisState, velocity: float, made: int, number: int) -> str:
+def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
     """Why a velocity that is not 0 may not leave: rules 3 to 7."""
     ticks = axis.ticks if axis.of.forwarded else 1
     fallen = axis.top - axis.of.fall * ticks if velocity * axis.last >= 0.0 else 0.0
@@ -143,7 +141,7 @@ def velocity_refused(axis: AxisState, velocity: float, made: int, number: int) -
     )
     # What falls is on its way back, however far that is.
     if not why and abs(velocity) > fallen + EPSILON:
-        why = distance(axis, velocity, number)
+        why = distance(axis, velocity)
     return f"axis={axis.of.name} {why} speed={velocity:.3f}" if why else ""
 
 

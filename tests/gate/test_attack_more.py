@@ -197,7 +197,6 @@ def test_what_is_added_ends_after_its_time(moved: str) -> None:
     assert world.way[moved] <= 1.6, world.way
 
 
-@pytest.mark.xfail(strict=True, reason="frames that fall by fall_per_s count as no distance")
 def test_a_saw_tooth_after_a_tap_goes_no_farther() -> None:
     """A tap of 0.12 s: 0.52 s of full speed and a fall, as after any other tap."""
     world = rested("forwarder-robust")
@@ -213,7 +212,6 @@ def test_a_saw_tooth_after_a_tap_goes_no_farther() -> None:
     assert world.way["slew"] <= 0.65, world.way
 
 
-@pytest.mark.xfail(strict=True, reason="no distance is counted in a bypass and a tail after it")
 @pytest.mark.parametrize(("name", "bit"), [("forwarder-robust", "AntiSwayOff"),
                                            ("j1939-forwarder", "Button3")])  # fmt: skip
 def test_a_tap_with_anti_sway_off_goes_no_farther(name: str, bit: str) -> None:

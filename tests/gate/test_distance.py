@@ -1,0 +1,198 @@
+"""Rule 7: how far an axis goes, by itself and by what a motion adds."""
+
+import math
+
+import pytest
+
+from canshaper.controller.events import RefusalEvent
+from canshaper.gate.axis import BLEND_S
+from canshaper.gate.build import SLACK, SWING_SLACK, slack_of
+from tests.gate.attacker import World
+from tests.gate.bench import Bench, bench, limited, load, signs
+
+FULL = 125
+
+
+class TestDistance:
+    """Rule 7: a wrong filter drives no farther than was asked, and a little."""
+
+    @signs
+    def test_after_a_tap(self, sign: int) -> None:
+        one = bench(tail_s=2.0)
+        one.rests()
+        for _ in range(5):
+            assert not one.sends(sign * FULL, near_far=float(sign))
+        left = [one.sends(sign * FULL) for _ in range(120)]
+        first = [bool(why) for why in left].index(True)
+        assert first * 0.02 == pytest.approx(SWING_SLACK, abs=0.021)
+        assert "limit=distance" in left[first]
+
+    def test_while_it_is_asked_there_is_no_end(self) -> None:
+        one = bench()
+        one.ramp(FULL, near_far=1.0)
+        assert not any(one.sends(FULL, near_far=1.0) for _ in range(500))
+
+    def test_what_was_not_run_is_owed_for_the_tail_only(self) -> None:
+        one = bench(tail_s=1.0)
+        one.rests()
+        for _ in range(500):
+            assert not one.sends(0, near_far=1.0)
+        assert one.axis.forth.remaining == pytest.approx(1.0)
+
+    @signs
+    def test_a_saw_tooth_counts_its_falls(self, sign: int) -> None:
+        """Only the way back from what was asked last is free."""
+        one = bench(tail_s=2.0, fall_per_s=5.0)
+        one.rests()
+        for _ in range(5):
+            assert not one.sends(sign * FULL, near_far=float(sign))
+        left = [one.sends(sign * (FULL - 12 * (k % 2))) for k in range(120)]
+        first = [bool(why) for why in left].index(True)
+        assert first * 0.02 <= SWING_SLACK + 0.06
+        assert "limit=distance" in left[first]
+
+    @signs
+    def test_a_bypass_changes_nothing_but_what_fades(self, sign: int) -> None:
+        """Each switching of anti-sway lets the velocity fade; the way in a bypass counts."""
+        one = bench(tail_s=2.0)
+        one.rests()
+        for _ in range(5):
+            one.receive(one.joysticks(anti_sway=False, near_far=float(sign)))
+            assert not one.sent(sign * FULL)
+        left = [one.sends(sign * FULL) for _ in range(120)]
+        first = [bool(why) for why in left].index(True)
+        assert first * 0.02 == pytest.approx(SWING_SLACK + BLEND_S, abs=0.021)
+
+    def test_what_spreads_the_demand_has_less(self) -> None:
+        """A filter that knows of no swing damps none."""
+        axes = load("forwarder").axes
+        assert slack_of(axes["lift"].config) == SLACK
+        assert slack_of(axes["slew"].config) == SWING_SLACK
+        lift = axes["lift"].config
+        for key in ("allow_faster", "allow_reverse"):
+            limits = lift.limits.model_copy(update={key: True})
+            assert slack_of(lift.model_copy(update={"limits": limits})) == math.inf
+        for key in ("gain_schedule", "profiles", "sway_sensor"):
+            assert slack_of(lift.model_copy(update={key: [1]})) == SWING_SLACK
+
+
+def refusals(world: World, ticks: int, **stick: float) -> list[RefusalEvent]:
+    """What the gate refuses of the sound controller, the sticks held so."""
+    world.stick = stick
+    refused = []
+    for _ in range(ticks):
+        world.step()
+        refused += [one for one in world.evil.events if isinstance(one, RefusalEvent)]
+        world.evil.events.clear()
+    return refused
+
+
+class TestSound:
+    """Sequences in which a sound filter goes farthest beyond what was asked."""
+
+    def test_taps_in_the_time_of_the_swing(self) -> None:
+        world = World("forwarder")
+        assert not refusals(world, 25)
+        for _ in range(9):
+            assert not refusals(world, 8, slew=1.0)
+            assert not refusals(world, 98)
+
+    def test_a_tap_after_a_long_way_back(self) -> None:
+        world = World("forwarder")
+        assert not refusals(world, 25)
+        for slew, ticks in ((-1.0, 178), (0.04, 12), (0.87, 1), (0.0, 1), (0.04, 55), (0.0, 60)):
+            assert not refusals(world, ticks, slew=slew)
+
+    def test_what_a_bypass_has_left(self) -> None:
+        world = World("forwarder-robust")
+        assert not refusals(world, 25)
+        for _ in range(3):
+            world.raw = {"left": {"AntiSwayOff": 1}}
+            assert not refusals(world, 60, slew=1.0)
+            assert not refusals(world, 5)
+            world.raw = {}
+            assert not refusals(world, 120)
+        assert not refusals(world, 40, slew=1.0)
+        assert not refusals(world, 120)
+
+    @pytest.mark.parametrize(("wait", "slew", "ticks"), [(20, 0.5, 80), (60, -1.0, 40)])
+    def test_what_trips_have_left(self, wait: int, slew: float, ticks: int) -> None:
+        """What was asked before a trip bounds what a motion adds after it."""
+        world = World("forwarder-robust")
+        assert not refusals(world, 25)
+        for _ in range(3):
+            assert not refusals(world, 90 if slew < 0.0 else 30, slew=1.0)
+            world.enable = 0
+            assert not refusals(world, 3)
+            world.enable = 1
+            assert not refusals(world, wait)
+        assert not refusals(world, ticks, slew=slew)
+        assert not refusals(world, 120)
+
+
+class TestAdded:
+    """What slew and near-far of forwarder-robust add to each other."""
+
+    def robust(self, axis: str = "near_far") -> Bench:
+        free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}
+        return Bench(limited(load("forwarder-robust"), axis, **free), axis)
+
+    @signs
+    @pytest.mark.parametrize("axis", ["slew", "near_far"])
+    def test_as_fast_as_the_file_says(self, sign: int, axis: str) -> None:
+        other = {"slew": "near_far", "near_far": "slew"}[axis]
+        for steps, passes in ((31, True), (32, False)):  # 25 %
+            one = self.robust(axis)
+            one.rests()
+            why = one.sends(sign * steps, **{other: 1.0})
+            assert ("limit=asked allowed=0.250" in why) is not passes
+
+    @signs
+    def test_not_against_a_stick_that_is_held(self, sign: int) -> None:
+        one = self.robust()
+        one.rests()
+        assert "limit=asked" in one.sends(-sign * 10, slew=1.0, near_far=sign * 0.3)
+
+    @signs
+    def test_without_a_demand_nothing_is_added(self, sign: int) -> None:
+        one = self.robust()
+        one.rests()
+        assert "limit=asked" in one.sends(sign * 10)
+
+    def test_as_far_as_the_file_says(self) -> None:
+        one = self.robust()
+        one.rests()
+        left = [one.sends(31, slew=1.0) for _ in range(200)]
+        first = [bool(why) for why in left].index(True)
+        assert "limit=path" in left[first]
+        way_m = first * 0.02 * 0.248 * one.axis.of.full_m_s
+        assert way_m == pytest.approx(1.1 * one.axis.of.path_m, abs=0.02)
+        assert one.axis.of.path_m == 0.3
+        one = self.robust()
+        one.rests()
+        assert not any(one.sends(31 if n // 20 % 2 else -31, slew=1.0) for n in range(200))
+
+    def test_as_long_as_the_file_says(self) -> None:
+        one = self.robust("slew")
+        one.rests()
+        left = [one.sends(10, near_far=1.0) for _ in range(400)]
+        first = [bool(why) for why in left].index(True)
+        assert "limit=time" in left[first]
+        assert first == round(6.0 / 0.02) + 2
+
+    def test_it_ends_at_once_where_the_other_one_stops(self) -> None:
+        one = Bench(limited(load("forwarder-robust"), "near_far", deadband_pct=0.0), "near_far")
+        one.rests()
+        for steps in (10, 20, 31):
+            assert not one.sends(steps, slew=1.0)
+        slew = one.gate.axes["slew"]
+        assert one.axis.dropped(one.gate.made) == 0.25  # at rest: when it stopped is not known
+        slew.last = 0.5
+        assert one.axis.dropped(one.gate.made) == 0.0
+        slew.halt("refused", one.gate.made, latch=True)
+        assert one.axis.dropped(one.gate.made) == 1.0
+
+    def test_a_motion_of_slew_alone_moves_nothing_else(self) -> None:
+        one = Bench(load("forwarder"), "near_far")
+        assert not one.axis.of.added
+        assert one.axis.partner is None
