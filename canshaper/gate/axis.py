@@ -75,7 +75,7 @@ class AxisState(Pending):
         asks, asked: something is asked of it or its partner: in this period, in it or the last one.
         unseen: it may be in a shaped stop of whose reason the gate does not know.
         due: it has its turn in this tick, and has sent nothing yet.
-        ticks: periods since its last frame.
+        ticks: periods since its last frame; ``sent_at`` number of the deadline of that.
         flips: how often anti-sway was switched in its joystick, as this axis knows it.
         last: velocity of that frame; ``top`` what it may have been before it was rounded.
         uncounted: up to this velocity a fall counts no distance.
@@ -100,7 +100,7 @@ class AxisState(Pending):
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
         self.asks = self.asked = self.unseen = self.due = False
-        self.ticks = self.flips = 0
+        self.ticks = self.flips = self.sent_at = 0
         self.last, self.top, self.uncounted = 0.0, axis.step, axis.step
         self.zero_at = NEVER
         self.way, self.alone = 0.0, 0
@@ -144,6 +144,8 @@ class AxisState(Pending):
         of, before = self.of, self.now
         self.now = 0.0
         self.ticks += 1
+        if self.last and number - self.sent_at > of.silent:  # its valve has closed by itself
+            self.last, self.top, self.zero_at = 0.0, of.step, made
         left = self.stop_left - passed if self.stop_left > passed else 0
         if why:
             self.halt(why, made, latch=latches or self.last != 0.0)
@@ -188,10 +190,10 @@ class AxisState(Pending):
             return 1.0
         return 0.0 if partner.last else self.of.added
 
-    def left(self, velocity: float, made: int) -> None:
+    def left(self, velocity: float, made: int, number: int) -> None:
         """A frame has left."""
         of, size = self.of, abs(velocity)
-        passed, self.ticks = self.ticks, 0
+        passed, self.ticks, self.sent_at = self.ticks, 0, number
         asked = self.forth if velocity > 0.0 else self.back
         reach = self.most if velocity > 0.0 else -self.least
         fallen = self.top - of.fall * passed if velocity * self.last >= 0.0 else 0.0

@@ -282,6 +282,7 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         *(bound.period_ticks, period_s, limits.max_pct / 100.0),
         *(limits.rise_per_s * period_s, limits.fall_per_s * period_s),
         *(round(limits.tail_s / period_s), max(1, round(limits.stop_s / period_s))),
+        valve.timeout_ms // deployment.config.tick_ms,
         *(limits.allow_faster, limits.allow_reverse, limits.reversal == "brake_shaped"),
         slack_of(config),
         forwarded,

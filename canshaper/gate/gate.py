@@ -227,7 +227,7 @@ class Gate:
                 return why
             velocities.append(velocity)
         for axis, velocity in zip(axes, velocities, strict=True):
-            axis.left(velocity, self.made)
+            axis.left(velocity, self.made, self.number)
         if of is None:
             axes[-1].due = False
         else:

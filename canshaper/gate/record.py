@@ -104,6 +104,7 @@ class Axis:
         rise, fall: fastest change of the output, in a period.
         tail: for how long the output may stay as fast as was asked.
         stop: longest shaped stop.
+        silent: ticks without a frame after which the valve closes.
         faster, reverse, brake_shaped: what the file allows beyond that.
         slack: how far a sound filter may run ahead of what was asked, full speed times seconds.
         forwarded: its command leaves in the frames of its own joystick, through a gateway.
@@ -131,6 +132,7 @@ class Axis:
     fall: float
     tail: int
     stop: int
+    silent: int
     faster: bool
     reverse: bool
     brake_shaped: bool

@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from tests.gate.attacker import World, get, put
-from tests.gate.test_attack import NAMES, REST
+from tests.gate.kinds import NAMES, REST
 
 pytestmark = pytest.mark.slow
 

@@ -124,6 +124,20 @@ class TestRates:
         assert "limit=rise" in one.sends(sign * 37, missed=5, near_far=float(sign))
 
     @signs
+    @pytest.mark.parametrize(("silent", "passes"), [(9, True), (10, False)])
+    def test_a_valve_that_has_closed_rises_from_rest(
+        self, sign: int, silent: int, passes: bool
+    ) -> None:
+        one = bench(rise_per_s=4.0)
+        one.ramp(sign * 60, near_far=float(sign))
+        for _ in range(silent):  # 200 ms are its timeout
+            one.receive(one.joysticks(near_far=float(sign)))
+            one.gate.tick(one.now_ns, 0)
+            one.number += 1
+        why = one.sends(sign * 60, near_far=float(sign))
+        assert ("limit=rise" in why) is not passes
+
+    @signs
     @pytest.mark.parametrize(("steps", "passes"), [(80, True), (79, False)])
     def test_slower_than_the_last_by_the_fall(self, sign: int, steps: int, passes: bool) -> None:
         one = bench(fall_per_s=2.0)  # 0.04 in a tick
