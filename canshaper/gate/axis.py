@@ -73,7 +73,6 @@ class AxisState(Pending):
         forth, back: what was asked in each direction.
         least, most: what may leave in this tick.
         asks, asked: something is asked of it or its partner: in this period, in it or the last one.
-        unseen: it may be in a shaped stop of whose reason the gate does not know.
         due: it has its turn in this tick, and has sent nothing yet.
         ticks: periods since its last frame; ``sent_at`` number of the deadline of that.
         flips: how often anti-sway was switched in its joystick, as this axis knows it.
@@ -99,7 +98,7 @@ class AxisState(Pending):
         self.now = 0.0
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
-        self.asks = self.asked = self.unseen = self.due = False
+        self.asks = self.asked = self.due = False
         self.ticks = self.flips = self.sent_at = 0
         self.last, self.top, self.uncounted = 0.0, axis.step, axis.step
         self.zero_at = NEVER
@@ -213,11 +212,8 @@ class AxisState(Pending):
         if size > min(fallen, self.uncounted) + EPSILON:
             asked.remaining -= size * of.period_s * passed
         self.top = size + of.step
-        if size > reach + EPSILON:
-            if self.armed and size > fallen + EPSILON:
-                self.armed, self.stop_left, self.why = False, of.stop, "ran on against its stick"
-            else:
-                self.top = min(self.top, max(reach, fallen))
+        if size > reach + EPSILON:  # on its way back, by the fall with each frame
+            self.top = min(self.top, max(reach, fallen))
         self.last = velocity
 
     def carry_over(self, before: "AxisState") -> None:

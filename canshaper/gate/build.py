@@ -286,7 +286,6 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         *(limits.allow_faster, limits.allow_reverse, limits.reversal == "brake_shaped"),
         slack_of(config),
         forwarded,
-        joystick.config.node is not None,
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
         ranges={k.removeprefix(start): tuple(ends) for k, ends in ranges if k.startswith(start)},
     )

@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterable, Mapping
 from canshaper.gate import rules
 from canshaper.gate.axis import AxisState
 from canshaper.gate.fields import Word, word_of
-from canshaper.gate.received import NEVER, JoystickState, Received, SwitchState
+from canshaper.gate.received import JoystickState, Received, SwitchState
 from canshaper.gate.record import Key, Message, Record, Switch
 
 
@@ -25,7 +25,6 @@ class Gate:
         self.record = record
         self.number = -1  # of this deadline
         self.made = 0  # ticks; deadlines that were missed are none
-        self.late = NEVER  # number of the last deadline that was missed
         self.stood = False  # the loop stood still, and no tick was made since
         self.messages = {name: Received(one) for name, one in record.messages.items()}
         self.joysticks: dict[str, JoystickState] = {}
@@ -168,8 +167,6 @@ class Gate:
         """A tick begins, after so many deadlines that were missed."""
         last, self.number = self.number, self.number + 1 + missed
         self.made += 1
-        if missed:
-            self.late = last + missed
         if self.stood:
             self.stood = False
             for message in self.messages.values():
@@ -195,7 +192,6 @@ class Gate:
                 if not axis.asked or axis.forth.most or axis.back.most:
                     axis.way, axis.alone = 0.0, 0
                 axis.least, axis.most = rules.bounds(axis)
-                axis.unseen = rules.unseen(axis, self.number, self.late)
 
     # --- what goes out ---------------------------------------------------------------------------
 

@@ -108,7 +108,6 @@ class Axis:
         faster, reverse, brake_shaped: what the file allows beyond that.
         slack: how far a sound filter may run ahead of what was asked, full speed times seconds.
         forwarded: its command leaves in the frames of its own joystick, through a gateway.
-        node: a CANopen node stops it shaped, which the gate does not watch.
         partner: the axis that adds velocity to this one; empty for none.
         added: largest velocity that is added where no one asks.
         most_periods: longest motion of that kind.
@@ -138,7 +137,6 @@ class Axis:
     brake_shaped: bool
     slack: float
     forwarded: bool
-    node: bool = False
     partner: str = ""
     added: float = 0.0
     most_periods: int = 0

@@ -9,8 +9,6 @@ from canshaper.gate.fields import EPSILON, Word
 from canshaper.gate.received import SwitchState
 from canshaper.gate.record import Key, Record, Valve
 
-LATE = 100
-"""Ticks after a missed deadline in which the loop may count as overrun."""
 
 
 def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool]:
@@ -72,18 +70,10 @@ def bounds(axis: AxisState) -> tuple[float, float]:
     return (-maximum if least < -maximum else least), (maximum if most > maximum else most)
 
 
-def unseen(axis: AxisState, number: int, late: int) -> bool:
-    """Return whether it may be in a shaped stop whose reason no frame shows."""
-    return axis.of.node or number - late < LATE
-
-
 def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
     """Rule 4: within ``bounds``, or on its way back there, lower with each frame."""
     size = abs(velocity)
     reach = axis.most if velocity > 0.0 else 0.0 - axis.least
-    if size > reach + EPSILON and axis.unseen:
-        asked = axis.forth if velocity > 0.0 else axis.back
-        reach = max(reach, min(asked.most, axis.of.maximum))
     if size > reach + EPSILON and size > fallen + EPSILON:
         return f"limit=asked allowed={max(reach, fallen):.3f}"
     return ""

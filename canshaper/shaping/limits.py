@@ -67,6 +67,15 @@ class RecentCommand:
         self._smallest.clear()
         self.low = self.high = 0.0
 
+    def clear_against(self, held: float) -> None:
+        """Invalidate the commands of the other direction."""
+        if held > 0.0:
+            self._smallest.clear()
+            self.low = 0.0
+        else:
+            self._largest.clear()
+            self.high = 0.0
+
     def age(self, ticks: int) -> None:
         """Let ``ticks`` pass without a command; the bounds follow with the next ``add``."""
         self._now += ticks

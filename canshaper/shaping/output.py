@@ -237,11 +237,16 @@ class OutputStage:
     def stop_against(self, held: float) -> None:
         """End the run-on of a stop by the fall, where the joystick is held against it.
 
-        After a reversal the limits may let the output run on; then they do so here.
+        Nor does the filter begin to run against a joystick that is held. After a reversal the
+        limits may let the output run on; then they do so here.
         """
         limits = self.limits
-        if held * self.ramp < 0.0 and not (limits.brake_shaped or limits.allow_reverse):
+        if limits.brake_shaped or limits.allow_reverse:
+            return
+        if held * self.ramp < 0.0:
             self._recent.clear()
+        else:
+            self._recent.clear_against(held)
 
     def start_filter(self) -> None:
         """Anti-sway was switched on in motion: nothing runs on for a tail, see the prologue."""

@@ -53,6 +53,22 @@ def test_held_the_other_way_it_ends_the_run_on_by_the_fall(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_it_begins_no_run_on_against_a_joystick_that_is_held(
+    drive_with: DriveWith, sign: float
+) -> None:
+    """Both directions were commanded within the tail; the filter changes over to the other one."""
+    shaper = Delay()
+    drive = drive_with(shaper, LIMITS)
+    drive.to_ready().run(CommandInput(-sign * 0.8), 0.5)
+    drive.run(CommandInput(sign * 0.8), 0.5)
+    shaper.repeated = -sign * 0.5
+    for _ in range(20):
+        drive.tick(CommandInput(sign * 0.8, fault=LATE))
+        assert sign * drive.axis.sent >= 0.0
+    assert drive.axis.sent == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_short_touch_is_enough(drive_with: DriveWith, sign: float) -> None:
     """It does not run on again when the joystick is let go of."""
     drive = stopping(drive_with, sign)
