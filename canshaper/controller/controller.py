@@ -37,12 +37,14 @@ class Controller:
         motions: the two-axis motions.
         status: the status messages.
         moves: whether the frame that was handed out last is one of a valve, and any moves.
+        not_neutral: what was raised in the last ``neutral_frames``.
     """
 
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
         self.counters = Counters()
         self.events: list[Event] = []
+        self.not_neutral: Exception | None = None
         inputs = MachineInputs(deployment)
         self.joysticks, self._stop = inputs.joysticks, inputs.stop
         self._senders = {one.key: one.sender() for one in deployment.sent()}
@@ -303,7 +305,13 @@ class Controller:
         return self._outputs.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve: the last thing sent."""
+        """A neutral frame for every valve: the last thing sent; see ``not_neutral``."""
+        errors: list[Exception] = []
         for protocol in self._protocols:
-            protocol.leave()
-        return self._outputs.neutral_frames(self.silent_buses)
+            try:
+                protocol.leave()
+            except Exception as error:
+                errors.append(error)
+        frames = self._outputs.neutral_frames(self.silent_buses, errors)
+        self.not_neutral = errors[0] if errors else None
+        return frames

@@ -95,9 +95,14 @@ class Guarded:
         return withheld
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve: the last thing sent."""
-        frames = self._controller.neutral_frames()
-        return [frame for frame in frames if not self._gate.last(frame[:3], frame[3])]
+        """A neutral frame for every valve: the last thing sent. One that is refused is an event."""
+        passed = []
+        for frame in self._controller.neutral_frames():
+            if why := self._gate.last(frame[:3], frame[3]):
+                self._controller.events.append(RefusalEvent(frame, why))
+            else:
+                passed.append(frame)
+        return passed
 
     def _compare(self, message: Received, frame: Frame, now_ns: int) -> None:
         """Two decoders have read a joystick's frame; where they disagree its axes stop."""

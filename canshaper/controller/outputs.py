@@ -72,14 +72,22 @@ class ValveOutputs:
             runner.put(0)
         return runners[0].valve.instead(frame)
 
-    def neutral_frames(self, silent: frozenset[str]) -> list[Frame]:
-        """A neutral frame for every valve whose bus is not silent: the last thing sent."""
+    def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
+        """A neutral frame for every valve whose bus is not silent: the last thing sent.
+
+        Args:
+            silent: names of those buses.
+            errors: takes what was raised; it costs no other valve its frame.
+        """
         frames: list[Frame] = []
         for key, runners in self._axes.items():
-            for runner in runners:
-                runner.put(0)
-            if (rule := self._forwarding.get(key)) is not None:
-                frames += rule.last()
-            elif key[0] not in silent:
-                frames.append(runners[-1].valve.frame())
+            try:
+                for runner in runners:
+                    runner.put(0)
+                if (rule := self._forwarding.get(key)) is not None:
+                    frames += rule.last()
+                elif key[0] not in silent:
+                    frames.append(runners[-1].valve.frame())
+            except Exception as error:
+                errors.append(error)
         return frames

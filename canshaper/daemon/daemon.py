@@ -14,6 +14,7 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
+from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import tick_follower
@@ -105,7 +106,8 @@ class Daemon:
             self._manager.stopping()
             valves = "not-sent" if self._controller.deployment.listen_only else "neutral"
             try:
-                self._send_neutral()
+                if not self._send_neutral():
+                    valves = "not-sent"
             except Exception as error:  # the first failure is the one to report
                 valves, failure = "not-sent", failure or f"reason={INTERNAL_ERROR} {raised(error)}"
             if failure:
@@ -130,7 +132,7 @@ class Daemon:
         A reload, refused or not, has taken its time as all else has: the next tick sees it.
         """
         controller = self._controller
-        io_cycle(self._guarded, self._ports, now_ns, missed, self._standstill)
+        io_cycle(self._recorder, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
         self._reporter.late(late_ns)
@@ -143,7 +145,7 @@ class Daemon:
     def _wait(self, seconds: float) -> None:
         """In a gateway: pass frames on until the next deadline."""
         assert self._line is not None  # asked of a gateway only
-        self._line.wait(seconds, self._guarded, self._ports, self._standstill)
+        self._line.wait(seconds, self._recorder, self._ports, self._standstill)
 
     def _housekeeping(self, now_ns: int) -> None:
         """Report what changed; everything that may take time comes after the frames are out."""
@@ -154,7 +156,7 @@ class Daemon:
         controller.events.clear()
         for name, port in self._ports.items():
             if port.state in OFF_BUS:
-                self._guarded.on_bus_off(name)
+                self._recorder.on_bus_off(name)
         self._reporter.buses()
         if self._follower and (news := self._follower.news()):
             log.warning("%s", news)
@@ -186,7 +188,7 @@ class Daemon:
             except ValueError as error:
                 log.warning("set=refused %s %s", peer, error)
                 raise
-            self._guarded.set(values)
+            self._recorder.set(values)
             for change in changes:
                 log.info("set %s %s", change, peer)
         return {"adjustable": self._adjuster.table()}
@@ -195,12 +197,12 @@ class Daemon:
 
     def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
         self._controller = Controller(deployment)
-        gated = Guarded(self._controller)
+        guarded = Guarded(self._controller)
         if before:
             self._controller.carry_over(before)
-            gated.carry_over(self._gated)
-        self._gated: Guarded = gated
-        self._guarded = self._black_box.around(gated, self._controller)
+            guarded.carry_over(self._guarded)
+        self._guarded: Guarded = guarded
+        self._recorder = self._black_box.around(guarded, self._controller)
         self._adjuster = Adjuster(self._controller)
         self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
@@ -274,28 +276,42 @@ class Daemon:
 
     def _read(self, waited: Iterable[Frame]) -> None:
         """Frames of a bus that is opened again: old by now, but bad news among them counts."""
-        self._gated.stalled()
+        self._guarded.stalled()
         now_ns = boottime_ns()
         for frame in waited:
-            self._gated.receive(frame, now_ns)
+            self._guarded.receive(frame, now_ns)
 
     # -- ends ----------------------------------------------------------------------------------
 
-    def _send_neutral(self) -> None:
-        """Send every valve neutral."""
-        send_neutral(self._ports, self._guarded.neutral_frames())
+    def _send_neutral(self) -> bool:
+        """Send every valve neutral.
+
+        Returns:
+            Whether the gate refused none.
+
+        Raises:
+            Exception: what kept a frame from being made, after all others were sent.
+        """
+        send_neutral(self._ports, self._recorder.neutral_frames())
+        events = self._controller.events
+        refused = any(isinstance(one, RefusalEvent) for one in events)
+        self._reporter.events()
+        events.clear()
+        if error := self._controller.not_neutral:
+            raise error
+        return not refused
 
     def _send_identity(self) -> None:
         """The digest of what runs, where a message carries it and its bus may be used."""
         status = self._controller.deployment.identity_status
         if status and status.message.key[0] not in self._controller.silent_buses:
             frame = self._controller.status.identity(status)
-            passes = self._gated.passes(frame, boottime_ns())
+            passes = self._guarded.passes(frame, boottime_ns())
             if passes and not self._ports[frame.bus].send(frame):
-                self._guarded.send_failed(frame)
+                self._recorder.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:
-        self._guarded.fault(fault)
+        self._recorder.fault(fault)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGHUP:
@@ -307,8 +323,9 @@ class Daemon:
 
     def _leave_at_once(self, number: int) -> NoReturn:
         """The second signal to stop: neutral is tried once more, and nothing is waited for."""
-        for frame in self._guarded.neutral_frames():
+        for frame in self._recorder.neutral_frames():
             self._ports[frame.bus].send(frame)
+        self._reporter.events()
         log.warning("stopped at-once signal=%s", signal.Signals(number).name)
         flush()
         os._exit(128 + number)

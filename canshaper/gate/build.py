@@ -31,8 +31,8 @@ def record_of(deployment: Any) -> Record:
     config = deployment.config
     messages = {name: _message(name, one, config) for name, one in deployment.joysticks.items()}
     switches: dict[str, Switch] = {}
-    for number, bound in enumerate(deployment.switches):
-        name = f"switches {number}"
+    for bound in deployment.switches:
+        name = "switch " + " and ".join(bound.switches)
         messages[name] = _message(name, bound, config)
         for switch, (signal, on) in bound.switches.items():
             switches[switch] = Switch(name, field_of(bound.message, signal), on)

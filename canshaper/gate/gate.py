@@ -24,6 +24,7 @@ class Gate:
     def __init__(self, record: Record) -> None:
         self.record = record
         self.number = -1  # of this deadline
+        self.others: dict[Key, int] = {}  # frames since it, of messages that are no valve's
         self.made = 0  # ticks; deadlines that were missed are none
         self.stood = False  # the loop stood still, and no tick was made since
         self.messages = {name: Received(one) for name, one in record.messages.items()}
@@ -120,7 +121,7 @@ class Gate:
         """Someone else commands these axes; one who only listens is no one's rival."""
         if not self.record.listens:
             for axis in axes:
-                axis.foreign_ns = now_ns
+                axis.foreign_ns, axis.hard, axis.latches = now_ns, "second sender", True
 
     def disagrees(self, axes: Iterable[AxisState]) -> None:
         """Another decoder has read something else in a frame of their joystick."""
@@ -167,6 +168,7 @@ class Gate:
         """A tick begins, after so many deadlines that were missed."""
         last, self.number = self.number, self.number + 1 + missed
         self.made += 1
+        self.others.clear()
         if self.stood:
             self.stood = False
             for message in self.messages.values():
@@ -205,7 +207,8 @@ class Gate:
         """
         found = self.valves.get(key)
         if found is None:
-            return rules.other_refused(self.record, key, data)
+            self.others[key] = sent = self.others.get(key, 0) + 1
+            return rules.other_refused(self.record, key, data, sent)
         valve, axes = found
         word, joystick = word_of(data), axes[0].joystick
         if why := rules.bytes_refused(valve, data, word, of, held=not joystick.pressed.released):

@@ -9,6 +9,8 @@ from canshaper.gate.fields import EPSILON, Word
 from canshaper.gate.received import SwitchState
 from canshaper.gate.record import Key, Record, Valve
 
+OTHERS = 8
+"""Frames in a tick of a message that is no valve's: answers to others come several at once."""
 
 
 def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool]:
@@ -86,7 +88,8 @@ def rise(axis: AxisState, velocity: float, ticks: int) -> str:
     if velocity * axis.last >= 0.0:
         highest = axis.top + most + 0.5 * step
     else:  # a part of the time goes by on the way to zero
-        highest = max(1.0 - max(last - step, 0.0) / (of.fall * ticks), 0.0) * most + 1.5 * step
+        left = 1.0 - max(last - step, 0.0) / (of.fall * ticks) if ticks else 0.0
+        highest = max(left, 0.0) * most + 1.5 * step
     return "" if abs(velocity) <= highest + EPSILON else f"limit=rise allowed={highest:.3f}"
 
 
@@ -173,12 +176,15 @@ def turn_refused(valve: Valve, count: int, last: int | None, *, due: bool) -> st
     return ""
 
 
-def other_refused(record: Record, key: Key, data: bytes) -> str:
-    """Rule 10: nothing leaves that is not in the file, or not as the file has it."""
+def other_refused(record: Record, key: Key, data: bytes, sent: int) -> str:
+    """Rule 10: nothing leaves that is not in the file, or not as the file has it.
+
+    Limit: ``OTHERS`` frames of an identifier in a tick, and one for each content that is given.
+    """
     allowed = record.others.get(key)
     if allowed is None:
         return "limit=identifier"
     lengths, contents = allowed
     if len(data) not in lengths or (contents and data not in contents):
         return "limit=content"
-    return ""
+    return "limit=rate" if sent > OTHERS + len(contents) else ""

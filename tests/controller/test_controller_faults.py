@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from canshaper.protocols.interface import BusProtocol
 from canshaper.shaping.states import State
 from tests.rigs.forwarder import Rig
 
@@ -90,6 +91,19 @@ def test_neutral_frames_are_neutral_whatever_moves(rig: Rig) -> None:
     ]
     counted = rig.run(1, Slew=1000)["SlewCommand"]["AliveCounter"]
     assert counted == (frames[0].data[1] + 1) % 256
+
+
+def test_a_protocol_that_cannot_leave_costs_no_valve_its_neutral(rig: Rig) -> None:
+    class Raising(BusProtocol):
+        def leave(self) -> None:
+            raise LookupError("no leave")
+
+    rig.controller._protocols = [Raising()]
+    assert len(rig.controller.neutral_frames()) == 3
+    assert str(rig.controller.not_neutral) == "no leave"
+    rig.controller._protocols = []
+    rig.controller.neutral_frames()
+    assert rig.controller.not_neutral is None
 
 
 # -- time ------------------------------------------------------------------------------------------

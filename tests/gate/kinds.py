@@ -219,7 +219,6 @@ COUNTED = tuple(
     if one not in ("j1939-forwarder", "canopen-forwarder", "moog-forwarder", "cia402-forwarder")
 )
 STOPPED = 2.6  # stop_s and what falls
-ONE = "a gateway's frame before the next tick"
 
 
 def attacked(name: str, kind: Kind) -> tuple[World, dict[str, float]]:

@@ -5,7 +5,6 @@ import pytest
 from tests.gate.kinds import (
     COUNTED,
     NAMES,
-    ONE,
     STOPPED,
     Kind,
     again,
@@ -35,8 +34,12 @@ KINDS = {
     "enable released, ramp down": Kind(down, flag(enable=0), before=40),
     "enable released for a tick": Kind(held, again(0, 0, 1), before=40),
     "enable released for a second": Kind(held, again(0, 0, 50), before=40, ticks=120),
-    "second sender": Kind(held, sender(0, 1), before=40, ticks=120, bound=0.02, why=ONE),
-    "second sender goes on": Kind(held, sender(0, 999), before=40, bound=0.02, why=ONE),
+    "second sender": Kind(held, sender(0, 1), before=40, ticks=120),
+    "second sender goes on": Kind(
+        held,
+        sender(0, 999),
+        before=40,
+    ),
     "failed send": Kind(held, failed, before=40, ticks=120),
     "loop stalled": Kind(held, stalled, before=40, ticks=120, bound=0.0),
     "loop late by 0.3 s": Kind(

@@ -11,6 +11,7 @@ from canshaper.gate.build import WORDS, record_of
 from canshaper.gate.fields import word_of
 from canshaper.gate.gate import Gate
 from canshaper.gate.record import Key
+from canshaper.gate.rules import OTHERS
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
 from tests.gate.bench import Bench, bench, load
@@ -126,11 +127,26 @@ def test_what_leaves_besides_is_as_the_file_has_it(name: str) -> None:
     gate = Gate(record_of(load(name)))
     for key, (lengths, contents) in gate.record.others.items():
         for length in range(9):
+            gate.tick(length, 0)
             data = bytes(length)
             right = length in lengths and (not contents or data in contents)
             assert (gate.leaving(key, data) == "") is right
         for data in contents:
             assert not gate.leaving(key, data)
+
+
+def test_a_message_besides_leaves_some_times_in_a_tick() -> None:
+    """Status and answers, not a flood that keeps a valve's frames back."""
+    gate = Gate(record_of(load("forwarder")))
+    gate.tick(0, 0)
+    key, (lengths, _) = next(iter(gate.record.others.items()))
+    left = [gate.leaving(key, bytes(min(lengths))) for _ in range(20)]
+    assert left == [""] * OTHERS + ["limit=rate"] * (20 - OTHERS)
+    gate.tick(20_000_000, 0)
+    assert not gate.leaving(key, bytes(min(lengths)))
+    nmt = Gate(record_of(load("canopen-forwarder")))
+    starts = nmt.record.others["crane", 0, False][1]
+    assert not any(nmt.leaving(("crane", 0, False), one) for one in starts for _ in range(2))
 
 
 def test_nmt_but_start_and_a_heartbeat_but_ours() -> None:

@@ -67,6 +67,10 @@ def test_of_another_package_it_is_not_known() -> None:
     assert record.unchecked == []
     messages = record.messages | {"left": replace(record.messages["left"], checked=False)}
     assert replace(record, messages=messages).unchecked == ["left"]
+    switches = record_of(load("ecu-forwarder"))
+    (name,) = (name for name in switches.messages if name not in switches.joysticks)
+    messages = {name: replace(switches.messages[name], checked=False)}
+    assert replace(switches, messages=messages).unchecked == ["switch seat and crane_mode"]
     key, valve = next((k, one) for k, one in record.valves.items() if one.axes == ("slew",))
     valves = record.valves | {key: replace(valve, checked=False)}
     assert replace(record, valves=valves).unchecked == ["the valve of slew"]

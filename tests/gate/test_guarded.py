@@ -18,6 +18,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
+from tests.gate.attacker import World
 from tests.rigs.files import Machine
 
 TICK_NS = 20_000_000
@@ -132,8 +133,10 @@ def test_the_last_frames_are_neutral(name: str) -> None:
     bound = next(iter(deployment.axes.values()))
     valve, put = bound.valve, bound.valve.put
     valve.put = lambda raw, _steps: put(raw, 99)  # type: ignore[method-assign]
+    controller.events.clear()
     missing = keys - {f[:3] for f in guarded.neutral_frames()}
     assert missing == {valve.message.key}
+    assert ["limit=" in event.text for event in controller.events] == [True]
 
 
 def test_what_the_loop_says_reaches_the_controller() -> None:
@@ -266,3 +269,19 @@ def test_a_reload_goes_on_where_the_gate_was() -> None:
     after.carry_over(before)
     assert after._gate.axes["slew"].latched
     assert after._gate.counts == before._gate.counts
+
+
+@pytest.mark.parametrize(
+    ("stick", "first", "second"), [(0.5, 0.0, 0.05), (-0.5, -0.096, -0.3)], ids=["faster", "back"]
+)
+def test_two_frames_of_a_joystick_in_a_tick(stick: float, first: float, second: float) -> None:
+    """The second one may not be faster, nor go the other way: no time has passed."""
+    world = World("gateway-forwarder")
+    world.go(25)
+    world.go(20, slew=0.5)
+    world.go(1, slew=stick)
+    speed, axis = world.seen["slew"], world.guarded._gate.axes["slew"]
+    for change, latched in ((first, False), (second, True)):
+        world.evil.plant = world.commands(slew=speed + change)
+        world.receive(world.joystick("left"))
+        assert axis.latched is latched
