@@ -137,7 +137,10 @@ def test_a_sway_sensor(machine: Machine) -> None:
     assert "axes.near_far.sway_sensor.codes to say whether 9000" in problem
 
 
-@pytest.mark.parametrize("name", ["Error", "NotAvailable"])
+@pytest.mark.parametrize(
+    "name",
+    ["Error", "NotAvailable", "ShortCircuit", "Open circuit", "Fehler", "SIGNAL_LOST", "Virhe"],
+)
 def test_a_code_that_enables_has_no_name_of_an_error(machine: Machine, name: str) -> None:
     machine.in_dbc(SWITCH, f'VAL_ 272 Enable 0 "Off" 1 "{name}" ;')
     (problem,) = machine.problems()
