@@ -25,6 +25,7 @@ class Port(Protocol):
     """One open bus."""
 
     name: str
+    waited: int  # valve frames that were in the kernel's queue for longer than their cycle
 
     @property
     def state(self) -> BusState:
@@ -117,7 +118,7 @@ class ListeningPort:
     def __init__(self, port: Port, ids: BusRoutes) -> None:
         self._port = port
         self._sent = ids.sent | ids.claims
-        self.name = port.name
+        self.name, self.waited = port.name, 0
 
     @property
     def state(self) -> BusState:

@@ -64,6 +64,7 @@ class PythonCanPort:
         self._fd, self._fd_bus = frozenset(fd), config.fd
         self._brs = config.data_bitrate is not None
         self.state = BusState.UP
+        self.waited = 0  # what does not leave in time is dropped, see ``BusApart``
         self.arrived_ns = 0
         self._arrivals = Arrivals()  # before a frame can arrive
         self._on_fault = on_fault

@@ -90,7 +90,7 @@ class RawPort:
     ) -> None:
         self.name = name
         self.state = UP
-        self.arrived_ns = 0
+        self.arrived_ns = self.waited = 0
         self._open = open_sockets
         self._on_fault = on_fault
         self._confirms = confirms
@@ -192,8 +192,11 @@ class RawPort:
         if extended:
             word |= EFF_FLAG
         under_way = self._unconfirmed.get(word, 0)
-        if under_way and self._stuck(word):
-            return False
+        if under_way:
+            if self._stuck(word):
+                return False
+            # The last one may have its confirmation behind this tick, but the one before it?
+            self.waited += under_way > 1 and word in self._valves
         if word in self._fd:
             packed = FD_FRAME.pack(word, len(data), self._fd_flags, data)
         else:

@@ -36,6 +36,7 @@ class Reporter:
         self._controller = controller
         self._ports = ports
         self._bus_states = dict.fromkeys(ports, BusState.UP)
+        self._waited = {name: port.waited for name, port in ports.items()}
 
     def events(self) -> None:
         """Log what the axes said in this tick."""
@@ -70,6 +71,10 @@ class Reporter:
         if now_ns < self._status_ns:
             return False
         self._status_ns = now_ns + SECOND_NS
+        for name, port in self._ports.items():
+            if port.waited != self._waited[name]:
+                self._waited[name] = port.waited
+                log.warning("bus=%s waited=%d: valve frames, in a queue", name, port.waited)
         self._manager.status(self._summary())
         self._latest_ns = 0
         return True

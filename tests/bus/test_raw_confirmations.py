@@ -73,6 +73,24 @@ def test_a_confirmation_may_come_two_ticks_late(line: Line) -> None:
     assert line.faults == []
 
 
+@pytest.mark.parametrize(("late", "waited"), [(1, 0), (2, 498)])
+def test_a_valves_frame_that_waits_for_longer_than_its_cycle_is_counted(
+    line: Line, late: int, waited: int
+) -> None:
+    """What the kernel has sent is known behind the tick; a status message may wait."""
+    for tick in range(500):
+        line.now_ns += TICK_NS
+        for frame in (VALVE, STATUS):
+            assert line.port.send(frame)
+        line.sent()
+        if tick >= late:
+            for frame in (VALVE, STATUS):
+                line.confirm(frame)
+        assert line.received() == []
+    assert line.port.waited == waited
+    assert line.faults == []
+
+
 def test_a_fast_loop_on_a_slow_bus_is_no_fault(line: Line) -> None:
     """A tick of 1 ms, and confirmations that take 15."""
     for tick in range(500):

@@ -30,6 +30,7 @@ class FakePort:
     """A port that receives what comes to its channel, of other ports of ours too, after a while."""
 
     state = BusState.UP
+    waited = 0
 
     def __init__(self, name: str, channel: str, bench: "Bench") -> None:
         self.name = name

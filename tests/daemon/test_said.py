@@ -81,6 +81,16 @@ def test_once_a_second_it_says_how_axes_buses_and_loop_are(bench: Bench, diary: 
     assert third == (2 * SECOND_TICKS - 1, f"{READY}, late 0 us, missed 1")
 
 
+def test_valve_frames_that_waited_are_in_the_log_once_a_second(
+    bench: Bench, diary: Diary, log: Callable[[str], Any]
+) -> None:
+    def wait() -> None:
+        bench.ports[0].waited += 2
+
+    diary.run(120, {10: wait, 11: wait})
+    assert log("waited=") == ["WARNING bus=crane waited=4: valve frames, in a queue"]
+
+
 def test_who_only_listens_says_so_first(bench: Bench, diary: Diary) -> None:
     bench.script = lambda number: bench.stop() if number == 3 else None
     Daemon(lambda: replace(load_deployment(bench.file), listen_only=True)).run()

@@ -37,6 +37,7 @@ class BenchPort:
     """One bus: what comes waits until it is read, and its time of arrival stays known."""
 
     state = BusState.UP
+    waited = 0
 
     def __init__(self, name: str, channel: str, bench: "Bench") -> None:
         self.name, self.channel = name, channel

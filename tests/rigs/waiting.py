@@ -21,6 +21,7 @@ class Waiting:
 
     name = "crane"
     state = BusState.UP
+    waited = 0
 
     def __init__(self, most: int = 1000) -> None:
         self.queue: list[tuple[int, Frame]] = []
