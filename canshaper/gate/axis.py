@@ -21,19 +21,17 @@ class Asked:
         remaining: distance that was asked and has not been run, full speed times seconds.
     """
 
-    __slots__ = ("_before_until", "_sizes", "before", "most", "remaining")
+    __slots__ = ("_last", "_since", "_sizes", "before", "most", "remaining")
 
     def __init__(self) -> None:
         # Each with the period when it was asked last, the largest first, each later one smaller.
         self._sizes: deque[tuple[int, float]] = deque()
         self.most = self.before = self.remaining = 0.0
-        self._before_until = 0
+        self._last = self._since = -1  # periods, of the last note and of the last stop
 
     def note(self, size: float, distance: float, period: int, of: Axis) -> None:
         """So much is asked in this period: a velocity, and a distance since the last one."""
-        sizes, oldest = self._sizes, period - of.tail
-        if self.before and period > self._before_until:
-            self.before = 0.0
+        sizes, oldest, self._last = self._sizes, period - of.tail, period
         if not (size or sizes or self.remaining):
             return
         while sizes and sizes[0][0] < oldest:
@@ -42,19 +40,15 @@ class Asked:
             while sizes and sizes[-1][1] <= size:
                 sizes.pop()
             sizes.append((period, size))
-        if not sizes:
-            self.most = self.remaining = 0.0
-            return
-        self.most = most = sizes[0][1]
-        if most >= self.before:
-            self.before, self._before_until = most, sizes[0][0] + of.tail
+        self.before = sizes[0][1] if sizes else 0.0
+        self.most = most = next((one for at, one in sizes if at > self._since), 0.0)
         # Never more than the tail holds: an output that stays slower may not catch up later.
         remaining, most = self.remaining + distance, most * of.tail * of.period_s
-        self.remaining = remaining if remaining < most else most
+        self.remaining = (remaining if remaining < most else most) if most else 0.0
 
     def forget(self) -> None:
         """Nothing of it may run on."""
-        self._sizes.clear()
+        self._since = self._last
         self.most = self.remaining = 0.0
 
 

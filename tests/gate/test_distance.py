@@ -5,7 +5,7 @@ import math
 import pytest
 
 from canshaper.controller.events import RefusalEvent
-from canshaper.gate.axis import BLEND_S
+from canshaper.gate.axis import BLEND_S, Asked
 from canshaper.gate.build import SLACK, SWING_SLACK, slack_of
 from tests.gate.attacker import World
 from tests.gate.bench import Bench, bench, limited, load, signs
@@ -85,6 +85,23 @@ def refusals(world: World, ticks: int, **stick: float) -> list[RefusalEvent]:
         refused += [one for one in world.evil.events if isinstance(one, RefusalEvent)]
         world.evil.events.clear()
     return refused
+
+
+def test_a_stop_forgets_what_may_run_on_and_not_what_was_asked() -> None:
+    """What a motion adds goes by every demand within the tail, each for its own time."""
+    of, asked = bench(tail_s=0.2).axis.of, Asked()
+    for period, size in enumerate((1.0, 0.5, 0.3, 0.3)):
+        asked.note(size, size * 0.02, period, of)
+    asked.forget()
+    assert (asked.most, asked.remaining, asked.before) == (0.0, 0.0, 1.0)
+    seen = []
+    for period in range(4, 16):
+        asked.note(0.1 if period == 5 else 0.0, 0.0, period, of)
+        seen.append((asked.before, asked.most))
+    assert seen == [
+        *[(1.0, 0.0), *[(1.0, 0.1)] * 6],
+        *[(0.5, 0.1), (0.3, 0.1), (0.3, 0.1), (0.1, 0.1), (0.1, 0.1)],
+    ]
 
 
 class TestSound:
