@@ -278,7 +278,9 @@ class Axis:
         if state is not ACTIVE:
             self._stage.interrupt_stroke()
         elif old is BYPASS_ON:
-            self._stage.start_filter()
+            self._stage.hold_run_on()
+        if old in MOVING and state not in MOVING and self._stage.commanded:
+            self._stage.hold_run_on()
         if old is TRIPPED:
             self.error = ""
 
@@ -297,6 +299,8 @@ class Axis:
         if self._states.state is not TRIPPED:
             self._states.trip(Reason.OUTPUT_INVALID)
         self._transfer.rest()
+        if self._stage.commanded:
+            self._stage.hold_run_on()
         self._stage.rest()
         self.command = 0.0
         if self.sway is not None:

@@ -6,10 +6,10 @@ In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
 
 1. Range. The operator bounds the output: it is never faster than he demands now or demanded within
    the tail, and never against his joystick, unless the limits allow that. The reference is clamped
-   to this range. For a tail after anti-sway was switched on in motion there is no run-on: the
-   output is never faster than he demands now, and rests in neutral. What the axis did without the
-   filter is in the memory and in the sway model of the filter, which would run it once more, also
-   after a rest.
+   to this range. For a tail after anti-sway was switched on in motion, or a motion was cut off by
+   a trip or the end of a stop, there is no run-on: the output is never faster than he demands now,
+   and rests in neutral. What the axis did without the filter, or has not run to its end, is in the
+   memory and in the sway model of the filter, which would run it once more, also after a rest.
 2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
    of the frame. The axis makes one short movement of them.
 3. Added velocity. The motion of two axes may add to that, in a range of its own. It counts every
@@ -248,8 +248,11 @@ class OutputStage:
         else:
             self._recent.clear_against(held)
 
-    def start_filter(self) -> None:
-        """Anti-sway was switched on in motion: nothing runs on for a tail, see the prologue."""
+    def hold_run_on(self) -> None:
+        """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.
+
+        Anti-sway was switched on in motion, or a motion was cut off.
+        """
         self._no_run_on = self.tail
 
     def rest(self) -> None:
