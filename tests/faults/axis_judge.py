@@ -166,7 +166,8 @@ class AxisJudge:
             return
         self.command = command if self.mode == FREE else 0.0
         low, high = self._range = self._range_since(index - axis.tail, index)
-        if self.state == BYPASS_ON and not self.joystick.bypasses():
+        in_motion = self.raw or before or self.command
+        if self.state == BYPASS_ON and in_motion and not self.joystick.bypasses():
             self._shaped_since = index
         self.commanded = low < 0.0 or high > 0.0
         if index < self._shaped_since + axis.tail:  # the filter does not run on yet
