@@ -10,7 +10,8 @@ stop for itself, remembers what it needs of them, and looks at every byte of eve
 to leave, in every tick: no answer is kept. What it refuses becomes neutral with a reason in the
 log, or nothing where that is refused too.
 
-    build.py     makes the record, once: numbers of the file, signals as cantools has loaded them
+    build.py     makes the record, once, from the numbers of the file
+    signals.py   for that: signals, as cantools has loaded them
     record.py    the record: identifiers, bits, limits
     fields.py    bits to numbers and velocities
     checks.py    checksums, AUTOSAR E2E
@@ -36,6 +37,6 @@ pressed again. Bad news counts in every frame, however short; good news when the
     10 identifiers     nothing that the file does not send
 
 The gate allows what the controller may do, and its memory holds more than the controller's, never
-less: where it forgets sooner it refuses a sound frame. What it cannot know: nodes of CANopen, how
-late the loop is, checksums of other packages, and whether slower than asked is right.
+less: where it forgets sooner it refuses a sound frame. What it cannot know: nodes of CANopen,
+checksums of other packages, and whether slower than asked is right.
 """

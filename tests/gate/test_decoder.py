@@ -12,8 +12,9 @@ from canshaper.codec.signals import FieldSet
 from canshaper.config.limits import Limits
 from canshaper.config.schema import Command as Stick
 from canshaper.config.schema import Valve
-from canshaper.gate.build import command_of, field_of, part_of, record_of, stick_of
+from canshaper.gate.build import record_of
 from canshaper.gate.fields import openings_of, word_of
+from canshaper.gate.signals import command_of, field_of, part_of, stick_of
 from canshaper.shaping.limits import without_deadband
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from canshaper.gate.build import _start, _valve_key, record_of
+from canshaper.gate.build import _valve_key, record_of
+from canshaper.gate.signals import start_of
 from canshaper.machine.binding import load_deployment
 from tests.faults import shipped
 from tests.gate.bench import load
@@ -39,13 +40,13 @@ def test_who_is_not_the_master_starts_no_node() -> None:
 
 def test_what_a_signal_carries_that_no_one_sets() -> None:
     (real,) = message("Real : 0|32@1- (1,0) [0|0]", floats="Real").signals
-    assert _start(real, j1939=True) == 0.0
+    assert start_of(real, j1939=True) == 0.0
     signed, plain = message("A : 0|8@1- (1,0) [0|0]", "B : 8|8@1+ (1,0) [0|0]").signals
-    assert [_start(one, j1939=True) for one in (signed, plain)] == [-1, 255]
-    assert [_start(one, j1939=False) for one in (signed, plain)] == [0, 0]
+    assert [start_of(one, j1939=True) for one in (signed, plain)] == [-1, 255]
+    assert [start_of(one, j1939=False) for one in (signed, plain)] == [0, 0]
     for start, expected in ((7, 7), (300, 255), (-1, 0)):
         plain.raw_initial = start
-        assert _start(plain, j1939=True) == expected
+        assert start_of(plain, j1939=True) == expected
 
 
 @pytest.mark.parametrize(("source", "can_id"), [(None, 0x0CFDD633), (0x44, 0x0CFDD644)])

@@ -1,0 +1,137 @@
+"""Signals, as cantools has loaded them, to fields, scales, sticks and commands of the gate."""
+
+import math
+from typing import Any
+
+from canshaper.gate.fields import EPSILON, Command, Field, Part, Resolution, Stick
+
+REALS = {16: "<e", 32: "<f", 64: "<d"}
+NEUTRAL = ("neutral", "neutralposition", "center", "centre", "zero", "released")
+"""Names of a code that is a measurement where its value is 0."""
+
+
+def signal_of(message: Any, name: str) -> Any:
+    """The signal of that name."""
+    return next(signal for signal in message.signals if signal.name == name)
+
+
+def field_of(message: Any, name: str) -> Field:
+    """Where a signal lies in its message."""
+    signal = signal_of(message, name)
+    big = signal.byte_order == "big_endian"
+    # Of Intel ``start`` is the lowest bit; of Motorola the highest, counted within its byte.
+    first = signal.start // 8 * 8 + 7 - signal.start % 8
+    shift = 8 * message.length - first - signal.length if big else signal.start
+    sign = 1 << signal.length - 1 if signal.is_signed and not signal.is_float else 0
+    real = REALS[signal.length] if signal.is_float else ""
+    return Field(shift, (1 << signal.length) - 1, sign, int(big), real)
+
+
+def bits_of(field: Field, length: int, raw: int = -1) -> int:
+    """Where a field lies in a frame of so many bytes, byte 0 the lowest; or a value of it."""
+    placed = (raw & field.mask) << field.shift
+    return int.from_bytes(placed.to_bytes(length, "big" if field.order else "little"), "little")
+
+
+def ends_of(signal: Any) -> tuple[int, int]:
+    """Smallest and largest raw value that the bits of an integer signal hold."""
+    low = -(1 << signal.length - 1) if signal.is_signed else 0
+    return low, low + (1 << signal.length) - 1
+
+
+class Scale:
+    """Scale, offset, range and full scale of a velocity: of the DBC, as the file corrects them."""
+
+    def __init__(self, signal: Any, section: Any, *, magnitude: bool) -> None:
+        full, zero, invert = (
+            (section.full, section.zero or 0.0, section.invert) if section else (None, 0.0, False)
+        )
+        scale, offset = signal.scale, signal.offset - zero
+        low, high = signal.minimum, signal.maximum
+        if full is not None:
+            low, high = 0.0 if magnitude else -full, full
+            if not signal.is_float and not magnitude:
+                # Two's complement reaches one step farther on one side.
+                ends = sorted(raw * scale + offset for raw in ends_of(signal))
+                step = abs(scale) * (1.0 + EPSILON)
+                low = ends[0] if 0.0 < low - ends[0] <= step else low
+                high = ends[1] if 0.0 < ends[1] - high <= step else high
+        elif zero:
+            low, high = low - zero, high - zero
+        if invert:
+            scale, offset, low, high = -scale, -offset, -high, -low
+        self.scale, self.offset, self.low, self.high = scale, offset, low, high
+        self.full = min(-low, high) if low < 0.0 else high
+
+
+def part_of(field: Field, signal: Any, section: Any) -> Part:
+    """A signal of a joystick, as the DBC has it; a code with a name is no measurement.
+
+    Whatever the name; but for those that the file lists as a value, and neutral at exactly 0.
+    """
+    of = Scale(signal, section, magnitude=bool(section.flags or section.negative))
+    listed, named = section.codes, set()
+    for code, name in (signal.choices or {}).items():
+        letters = "".join(filter(str.isalpha, str(name))).lower()
+        neutral = letters in NEUTRAL and abs(code * of.scale + of.offset) < EPSILON
+        if listed.get(str(name)) != "value" and not neutral:
+            named.add(code)
+    low, high = min(of.low / of.full, -1.0) - EPSILON, of.high / of.full + EPSILON
+    return Part(field, of.scale, of.offset, of.full, low, high, frozenset(named))
+
+
+def stick_of(message: Any, command: Any, in_dbc: Any) -> Stick:
+    """The demand of an axis in the message of its joystick; ``in_dbc`` has it uncorrected."""
+    part, *back = (
+        part_of(field_of(message, name), signal_of(in_dbc, name), command)
+        for name in filter(None, (command.signal, command.negative))
+    )
+    flags: tuple[Field, ...] = ()
+    if one := command.flags:
+        flags = tuple(field_of(message, name) for name in (one.neutral, one.negative, one.positive))
+    return Stick(part, back[0] if back else None, flags, command.neutral_pct / 100.0)
+
+
+def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
+    """The command of an axis in its valve's message; ``joystick`` where that is one of its own."""
+    names: tuple[str, ...] = ()
+    signs: dict[tuple[float, ...], int] = {}
+    if one := valve.direction:
+        names, signs = (one.signal,), {(one.neutral,): 0, (one.positive,): 1, (one.negative,): -1}
+    elif joystick and (flags := joystick.flags):
+        names = flags.neutral, flags.negative, flags.positive
+        signs = {(1, 0, 0): 0, (0, 0, 1): 1, (0, 1, 0): -1}
+    back = joystick.negative if joystick else None
+
+    def resolution(name: str, section: Any) -> Resolution:
+        of = Scale(signal_of(in_dbc, name), section, magnitude=bool(names or back))
+        full = math.floor(of.full / abs(of.scale) + EPSILON)
+        zero = round(-of.offset / of.scale)
+        return Resolution(field_of(message, name), zero, 1 if of.scale > 0 else -1, full)
+
+    return Command(
+        resolution(valve.signal, joystick or valve),
+        tuple(field_of(message, name) for name in names),
+        signs,
+        resolution(back, joystick) if back else None,
+        tuple(resolution(name, None) for name in valve.also),
+    )
+
+
+def start_of(signal: Any, *, j1939: bool) -> float:
+    """Raw value of a signal that no one sets: GenSigStartValue; else in J1939 all ones, or 0."""
+    if signal.is_float:
+        return float(signal.raw_initial or 0.0)
+    low, high = ends_of(signal)
+    if j1939 and signal.raw_initial is None:
+        return -1 if signal.is_signed else high
+    return min(max(int(signal.raw_initial or 0), low), high)
+
+
+def rest_of(signal: Any) -> set[float]:
+    """Raw value 0 of a velocity, which asks for nothing either."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or not low < 0 < high:
+        return set()
+    rest = -signal.offset / signal.scale
+    return {rest if signal.is_float else round(rest)}
