@@ -40,8 +40,11 @@ class Asked:
             while sizes and sizes[-1][1] <= size:
                 sizes.pop()
             sizes.append((period, size))
-        self.before = sizes[0][1] if sizes else 0.0
-        self.most = most = next((one for at, one in sizes if at > self._since), 0.0)
+        at, most = sizes[0] if sizes else (0, 0.0)
+        self.before = most
+        if at <= self._since:
+            most = next((one for at, one in sizes if at > self._since), 0.0)
+        self.most = most
         # Never more than the tail holds: an output that stays slower may not catch up later.
         remaining, most = self.remaining + distance, most * of.tail * of.period_s
         self.remaining = (remaining if remaining < most else most) if most else 0.0
