@@ -51,7 +51,7 @@ def test_for_a_tail_after_the_filter_has_started_nothing_runs_on(rests: int) -> 
     for demanded in range(1, TAIL - rests + 1):
         one = stage()
         driven(one, 0.4)
-        one.start_filter()
+        one.hold_run_on()
         for _ in range(rests):
             one.rest()
         for _ in range(demanded):
