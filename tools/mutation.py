@@ -48,6 +48,7 @@ CORE = [
 CORE_TESTS = [
     "test_added*.py",
     "test_axis*.py",
+    "test_cut_off.py",
     "test_limits.py",
     "test_motion*.py",
     "test_other_plane.py",

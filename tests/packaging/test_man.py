@@ -27,11 +27,15 @@ def run(*words: str, **environment: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def man() -> None:
     try:
         install(missing({"groff": "groff", "man": "man-db"}))
     except NoLane as error:
         pytest.skip(f"nothing shows manual pages: {error}")
+
+
+@pytest.fixture(scope="module")
+def pages(man: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("man")
     run(sys.executable, str(ROOT / "tools" / "man.py"), str(directory))
     return directory
@@ -66,8 +70,8 @@ def test_a_page_has_the_options_and_examples_of_help(verb: str, pages: Path) -> 
         assert line.strip() in text, line
 
 
-def test_text_that_roff_would_read_as_its_own_is_shown(tmp_path: Path) -> None:
-    man = runpy.run_path(str(ROOT / "tools" / "man.py"))
-    text = man["escaped"](".hidden 'a\n'first \\d a-b")
+def test_text_that_roff_would_read_as_its_own_is_shown(man: None, tmp_path: Path) -> None:
+    tool = runpy.run_path(str(ROOT / "tools" / "man.py"))
+    text = tool["escaped"](".hidden 'a\n'first \\d a-b")
     (tmp_path / "a.1").write_text(f".TH A 1\n{text}\n")
     assert ".hidden 'a 'first \\d a-b" in shown(tmp_path / "a.1")

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh, eigvalsh
 from scipy.optimize import least_squares
 
 G_M_S2 = 9.81
@@ -38,18 +39,18 @@ class DoublePendulum:
 
     def __init__(self, first: float, second: float) -> None:
         def errors(sizes: Vector) -> list[float]:
-            squares = np.linalg.eigvals(np.linalg.solve(*_matrices(*sizes)))
-            slow, quick = np.sort(np.sqrt(squares.real))
+            mass, stiffness = _matrices(*sizes)
+            slow, quick = np.sqrt(eigvalsh(stiffness, mass))
             return [slow - first, quick - second, 0.3 * (sizes[2] - 0.5)]
 
         bounds = ((0.15, 0.3, 0.1), (1.2, 1.6, 1.5))
         fit = least_squares(errors, (0.35, 0.7, 0.5), bounds=bounds)
         assert max(abs(one) for one in fit.fun[:2]) < 0.05, "no link and log swing like that"
         self.mass, self.stiffness = _matrices(*fit.x)
-        squares, shapes = np.linalg.eig(np.linalg.solve(self.mass, self.stiffness))
+        squares, shapes = eigh(self.stiffness, self.mass)
         modal = np.diag(shapes.T @ self.mass @ shapes)
         inverse = np.linalg.inv(shapes)
-        damping = np.diag(2.0 * DAMPING_RATIO * np.sqrt(squares.real) * modal)
+        damping = np.diag(2.0 * DAMPING_RATIO * np.sqrt(squares) * modal)
         self.damping = inverse.T @ damping @ inverse
         self.state = np.zeros(4)  # angles of link and log, and their rates
 
