@@ -89,6 +89,6 @@ def _value_fault(kind: Any, value: object) -> str | None:
     except PydanticSchemaGenerationError:  # a class of python-can, which makes it of what it gets
         return None
     except ValidationError:
-        expected = getattr(kind, "__name__", None) or str(kind)
+        expected = kind.__name__ if isinstance(kind, type) else str(kind)
         return f"expected {expected}, got {value!r}"
     return None

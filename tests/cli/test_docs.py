@@ -52,8 +52,9 @@ def test_it_serves_the_pages_until_ctrl_c(site: Path) -> None:
                 assert page.read() == b"<h1>pages</h1>"
             with urlopen(f"{url}machine.yaml") as file:
                 assert file.headers["Content-Type"] == "text/plain"
-            with pytest.raises(HTTPError, match="404"):
+            with pytest.raises(HTTPError, match="404") as absent:
                 urlopen(f"{url}../{site.name}/index.html")
+            absent.value.close()
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate()
         finally:

@@ -63,7 +63,8 @@ def served(machine: Path) -> Iterator[Callable[..., Request]]:
                 with urllib.request.urlopen(request, timeout=WAIT_S) as answer:
                     data = answer.read()
             except urllib.error.HTTPError as error:
-                return error.code, error.read().decode()
+                with error:
+                    return error.code, error.read().decode()
             return json.loads(data) if answer.headers["Content-Type"].endswith("json") else data
 
         return request

@@ -185,7 +185,8 @@ def test_each_drive_is_made_when_it_is_requested() -> None:
             drive = got(f"/drive/{number}.json")
             assert drive["title"].startswith(f"drive {seed}: ")
             assert drive["hello"]["cranes"] == ["forwarder", "raw"] == list(drive["cranes"])
-        with pytest.raises(HTTPError, match="404"):
+        with pytest.raises(HTTPError, match="404") as absent:
             got("/drive/2.json")
+        absent.value.close()
     finally:
         studio.stop()
