@@ -31,6 +31,13 @@ _NOT_AVAILABLE = re.compile(r"not ?avail|unavail|\bsna\b|^n ?a$")
 _ERROR = re.compile(
     r"\berr(?!and)|err\b|error|(?<!\bde)fault|fail|invalid|not ?valid|(?<!\bp)reserved|defect"
 )
+# Besides those: names of a code at which no switch may agree.
+_BROKEN = re.compile(
+    r"short[ _-]*(circuit|to|cut)|open[ _-]*(circuit|load|wire)|broken|break\b|lost\b|bad\b"
+    r"|implausib|damaged?\b|malfunction|kurzschlu|bruch|fehler|st(oe|ö)rung|defekt|kaputt"
+    r"|ung(ue|ü)ltig|unterbrech|virhe|\bvika\b|\bfel\b|erreur|panne",
+    re.IGNORECASE,
+)
 _NEUTRAL = re.compile(r"neutral|neutral position|cent(er|re)|zero|released")
 
 
@@ -134,6 +141,11 @@ def named_fault(name: str) -> Reason | None:
     if _NOT_AVAILABLE.search(words):
         return Reason.JOYSTICK_NOT_AVAILABLE
     return Reason.JOYSTICK_ERROR if _ERROR.search(words) else None
+
+
+def names_broken(name: str) -> bool:
+    """Whether a code is that of a broken switch, sensor or wire by its name in the DBC."""
+    return named_fault(name) is not None or _BROKEN.search(name) is not None
 
 
 def is_neutral(signal: Signal, raw: float, name: str) -> bool:

@@ -114,6 +114,11 @@ class SwingLengthEvent:
         )
 
 
+def _shown(frame: Frame) -> str:
+    """Format a frame for the log."""
+    return f"bus={frame.bus} id={frame.can_id:#x} data={frame.data.hex()}"
+
+
 @dataclass(frozen=True, slots=True)
 class DisagreementEvent:
     """The gate and the codecs have read different things in a frame of a joystick."""
@@ -124,8 +129,7 @@ class DisagreementEvent:
     @property
     def text(self) -> str:
         """For the log."""
-        bus, can_id, _, data = self.frame
-        return f"decoders=disagree axis={self.axis} bus={bus} id={can_id:#x} data={data.hex()}"
+        return f"decoders=disagree axis={self.axis} {_shown(self.frame)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,5 +142,4 @@ class RefusalEvent:
     @property
     def text(self) -> str:
         """For the log."""
-        bus, can_id, _, data = self.frame
-        return f"output=refused bus={bus} id={can_id:#x} data={data.hex()} {self.why}"
+        return f"output=refused {_shown(self.frame)} {self.why}"

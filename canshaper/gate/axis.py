@@ -177,7 +177,7 @@ class AxisState(Pending):
     def dropped(self, made: int) -> float:
         """How much of the velocity may end in one frame: what a partner added, when that stops.
 
-        Of one that is at rest the gate does not know when it has stopped.
+        The gate does not know when a partner that is at rest has stopped.
         """
         partner = self.partner
         if partner is None:

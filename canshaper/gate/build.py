@@ -23,8 +23,8 @@ from canshaper.gate.signals import (
 SPREADING = ("off", "first_order", "s_curve", "zv", "zvd", "ei", "two_mode")
 """Filters that spread the demand over time, and know of no swing."""
 SLACK, SWING_SLACK = 0.4, 1.5
-"""Of those, and of the others. A G_FF damps by 1.04 s of full speed what taps in the time of the
-swing have summed up, a robust shaper by .9 s what a bypass has left (gate/test_distance.py)."""
+"""Slack of those filters, and of the others, s of full speed. Taps in the time of the swing sum up:
+a G_FF needs 1.04 s to damp that, a robust shaper .9 s after a bypass (gate/test_distance.py)."""
 # J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)

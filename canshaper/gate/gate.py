@@ -205,11 +205,11 @@ class Gate:
             data: its bytes.
             of: in a gateway the joystick's frame that it was made from.
         """
-        found = self.valves.get(key)
-        if found is None:
+        known = self.valves.get(key)
+        if known is None:
             self.others[key] = sent = self.others.get(key, 0) + 1
             return rules.other_refused(self.record, key, data, sent)
-        valve, axes = found
+        valve, axes = known
         word, joystick = word_of(data), axes[0].joystick
         if why := rules.bytes_refused(valve, data, word, of, held=not joystick.pressed.released):
             return why

@@ -1,6 +1,5 @@
 """A message that a part of a deployment uses, and its signals while they are bound."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -9,19 +8,11 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.canopen import STATE_BITS
 from canshaper.codec.layout import Chosen
-from canshaper.codec.signals import find_signal, named_fault
+from canshaper.codec.signals import find_signal, names_broken
 from canshaper.config.similar import there_are
 from canshaper.config.source import Place
 from canshaper.machine.database import DbcFile
 from canshaper.machine.diagnostics import Diagnostics
-
-# Names of a code at which no switch agrees, besides those that ``named_fault`` knows.
-_BROKEN = re.compile(
-    r"short[ _-]*(circuit|to|cut)|open[ _-]*(circuit|load|wire)|broken|break\b|lost\b|bad\b"
-    r"|implausib|damaged?\b|malfunction|kurzschlu|bruch|fehler|st(oe|ö)rung|defekt|kaputt"
-    r"|ung(ue|ü)ltig|unterbrech|virhe|\bvika\b|\bfel\b|erreur|panne",
-    re.IGNORECASE,
-)
 
 
 class NamedCode(NamedTuple):
@@ -108,8 +99,7 @@ class UsedMessage:
                 self.message.name, signal.name, raw, str(choice), means.get(raw, other)
             )
             self.codes.append(code)
-            broken = named_fault(code.name) or _BROKEN.search(code.name)
-            if raw in means and broken:
+            if raw in means and names_broken(code.name):
                 text = f"expected a signal whose {raw} is {code.means}, got {signal.name!r}"
                 self.diagnostics.add(place, f'{text}, whose {raw} is "{code.name}" in the DBC')
 

@@ -77,7 +77,7 @@ def test_a_confirmation_may_come_two_ticks_late(line: Line) -> None:
 def test_a_valves_frame_that_waits_for_longer_than_its_cycle_is_counted(
     line: Line, late: int, waited: int
 ) -> None:
-    """What the kernel has sent is known behind the tick; a status message may wait."""
+    """The port learns behind the tick what the kernel has sent; a status message may wait."""
     for tick in range(500):
         line.now_ns += TICK_NS
         for frame in (VALVE, STATUS):

@@ -1,4 +1,4 @@
-"""What leaves in the place of a valve frame that the gate has refused."""
+"""A neutral frame takes the place of a valve frame that the gate has refused."""
 
 from collections.abc import Callable
 

@@ -97,7 +97,7 @@ class Bench:
             assert not why, (why, size)
 
     def restarts(self, steps: int, **joysticks: Any) -> str:
-        """What moves without more than joystick and enable: the first frame that would leave."""
+        """Move by joystick and enable alone; return why the first frame may not leave."""
         for _ in range(60):
             if not self.sends(steps, **joysticks):
                 return "moved"

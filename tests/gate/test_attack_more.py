@@ -86,7 +86,7 @@ def test_what_stands_in_the_place_of_a_refused_frame(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_frames_that_are_of_no_tick(name: str) -> None:
-    """What neither tick nor gateway sends; stick held, so the speed alone is asked for."""
+    """Neither tick nor gateway has sent the frame; the stick is held, so a speed is asked for."""
     world = rested(name)
     world.go(30, **{axis: 0.6 * (-1) ** i for i, axis in enumerate(world.axes)})
     now = world.n * TICK_MS * 1_000_000

@@ -38,7 +38,7 @@ def network(name: str) -> Any:
 
 
 def value(one: Any, raw: bytes, **keys: Any) -> float | None:
-    """Of its first signal, as a part of full deflection."""
+    """Read the first signal of a frame, as a part of full deflection."""
     signal = one.signals[0]
     section = Stick(joystick="left", signal=signal.name, **keys)
     return part_of(field_of(one, signal.name), signal, section).value(word_of(raw))

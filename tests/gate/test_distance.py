@@ -77,7 +77,7 @@ class TestDistance:
 
 
 def refusals(world: World, ticks: int, **stick: float) -> list[RefusalEvent]:
-    """What the gate refuses of the sound controller, the sticks held so."""
+    """Hold the sticks so; return what the gate refuses of the sound controller."""
     world.stick = stick
     refused = []
     for _ in range(ticks):
@@ -88,7 +88,7 @@ def refusals(world: World, ticks: int, **stick: float) -> list[RefusalEvent]:
 
 
 def test_a_stop_forgets_what_may_run_on_and_not_what_was_asked() -> None:
-    """What a motion adds goes by every demand within the tail, each for its own time."""
+    """A motion may add by every demand within the tail, each for its own time."""
     of, asked = bench(tail_s=0.2).axis.of, Asked()
     for period, size in enumerate((1.0, 0.5, 0.3, 0.3)):
         asked.note(size, size * 0.02, period, of)
@@ -134,7 +134,7 @@ class TestSound:
 
     @pytest.mark.parametrize(("wait", "slew", "ticks"), [(20, 0.5, 80), (60, -1.0, 40)])
     def test_what_trips_have_left(self, wait: int, slew: float, ticks: int) -> None:
-        """What was asked before a trip bounds what a motion adds after it."""
+        """A demand of before a trip bounds the velocity that a motion adds after it."""
         world = World("forwarder-robust")
         assert not refusals(world, 25)
         for _ in range(3):
@@ -148,7 +148,7 @@ class TestSound:
 
 
 class TestAdded:
-    """What slew and near-far of forwarder-robust add to each other."""
+    """Slew and near-far of forwarder-robust add velocities to each other."""
 
     def robust(self, axis: str = "near_far") -> Bench:
         free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}

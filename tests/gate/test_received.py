@@ -1,4 +1,4 @@
-"""What the gate believes of a message: sequence, senders, and what a reload carries over."""
+"""The gate judges a message: its sequence, its sender, and its state over a reload."""
 
 import math
 from dataclasses import replace
@@ -152,7 +152,7 @@ class TestSources:
 
 
 class TestReload:
-    """What is latched stays latched; what was good has to come again."""
+    """A latch stays latched; good news has to come again."""
 
     def reloaded(self, one: Bench, *reopened: str, **changed: Any) -> Bench:
         after = Bench(replace(one.deployment, **changed), "near_far")

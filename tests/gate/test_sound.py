@@ -94,7 +94,7 @@ class Random:
 
 
 def refused(seed: int, ticks: int = TICKS) -> str:
-    """What the gate refuses in a drive, and when; empty for nothing."""
+    """Drive; return what the gate refuses and when, empty for nothing."""
     drive, moves = Random(seed), 0
     for number in range(ticks):
         if why := drive.tick(number):

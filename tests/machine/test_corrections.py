@@ -18,7 +18,7 @@ OUT_OF_RANGE = Reason.JOYSTICK_OUT_OF_RANGE
 
 
 def commands(machine: Machine, raws: Sequence[int]) -> list[float | Reason]:
-    """What a joystick with these raw values asks of slew; the gate's own reading is the same."""
+    """Read the demand of slew from raw values of a joystick; the gate reads the same."""
     deployment = machine.load()
     joystick = deployment.joysticks["left"]
     stick = record_of(deployment).axes["slew"].stick

@@ -101,6 +101,13 @@ def swing(page: Page, crane: str) -> float:
     return float(page.inner_text(f"#swing-{crane}").strip("±°"))
 
 
+def ready_again(page: Page) -> None:
+    """Take the seat where it was lost, and wait until every axis is ready."""
+    if page.inner_text("#seat") != "you drive":
+        enabled(page)
+    expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
+
+
 def undisturbed(page: Page, drive: Callable[[], None]) -> None:
     """Drive; where a busy machine held up page or joysticks too long, let go and drive again.
 
@@ -108,9 +115,7 @@ def undisturbed(page: Page, drive: Callable[[], None]) -> None:
     """
     disturbed = page.locator("#events li", has_text=DISTURBED)
     for _ in range(TRIES):
-        if page.inner_text("#seat") != "you drive":
-            enabled(page)
-        expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
+        ready_again(page)
         before = disturbed.count()
         try:
             drive()
@@ -125,9 +130,7 @@ def undisturbed(page: Page, drive: Callable[[], None]) -> None:
             page.keyboard.up(key)
         page.evaluate(NO_GAMEPAD)
         page.wait_for_timeout(4000)  # by then enable is released, or kept
-    if page.inner_text("#seat") != "you drive":
-        enabled(page)
-    expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
+    ready_again(page)
     pytest.skip(f"the machine was too busy in each of {TRIES} drives")
 
 
