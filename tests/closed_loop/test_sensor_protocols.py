@@ -97,7 +97,7 @@ def drive(
     [(J1939, ()), (J1939, SSI), (J1939, ANGULAR_RATE), (CANOPEN, ())],
     ids=["SSI2", "SSI", "ARI", "CiA 410"],
 )
-@pytest.mark.parametrize("length_pct", [-30.0, 30.0])
+@pytest.mark.parametrize("length_pct", [-30.0, pytest.param(30.0, marks=pytest.mark.slow)])
 def test_it_is_trusted_and_damps_with_a_length_that_is_30_percent_wrong(
     tmp_path: Path, file: str, changes: tuple[Change, ...], length_pct: float
 ) -> None:

@@ -49,7 +49,9 @@ def late(drive: Drive) -> float:
 
 @KINDS
 @pytest.mark.parametrize("angle_deg", [3.0, 10.0])
-@pytest.mark.parametrize("from_s", [0.0, 4.0, 6.0, 8.5, 9.5])
+@pytest.mark.parametrize(
+    "from_s", [4.0, 8.5, *(pytest.param(one, marks=pytest.mark.slow) for one in (0.0, 6.0, 9.5))]
+)
 @pytest.mark.parametrize("contact", [still, Dragged])
 def test_a_grapple_that_leans_on_something_hardly_changes_the_travel(
     sensor: Setup,

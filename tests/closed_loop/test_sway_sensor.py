@@ -143,7 +143,9 @@ def test_what_a_wrong_lag_and_a_wrong_length_cost_together(sensor: Setup, lag_s:
 
 
 @KINDS
-@pytest.mark.parametrize("length_m", [0.84, LENGTH_M, 1.56])
+@pytest.mark.parametrize(
+    "length_m", [LENGTH_M, *(pytest.param(one, marks=pytest.mark.slow) for one in (0.84, 1.56))]
+)
 @pytest.mark.parametrize("swing_deg", [0.0, 10.0])
 def test_of_the_wrong_sign_it_is_never_trusted_and_nothing_changes(
     sensor: Setup, length_m: float, swing_deg: float

@@ -32,7 +32,9 @@ def travel_s(recording: Recording, axis: str) -> float:
 
 
 @pytest.mark.parametrize("axis", ["slew", "near_far"])
-@pytest.mark.parametrize("level", [0.1, -0.13, 0.3, 1.0])
+@pytest.mark.parametrize(
+    "level", [0.1, 1.0, *(pytest.param(one, marks=pytest.mark.slow) for one in (-0.13, 0.3))]
+)
 def test_a_tap_moves_the_crane_once_and_as_far_as_asked(axis: str, level: float) -> None:
     for duration_s in DURATIONS:
         recording = tapped("forwarder-robust.yaml", axis, level, duration_s)

@@ -249,7 +249,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
 
 AxisUnderWatch.TestCase.settings = settings(
-    max_examples=5 * settings().max_examples,
+    max_examples=3 * settings().max_examples,
     stateful_step_count=25,
     suppress_health_check=list(HealthCheck),
 )
