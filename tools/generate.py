@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 import canshaper.config.schema  # noqa: F401  (its classes are the sections)
 from canshaper.checksums.kinds import checksum_table
 from canshaper.cli.verbs.config_schema import filter_table
-from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.procedure.step import FILE
 from canshaper.commissioning.procedure.steps import STEPS
@@ -27,6 +26,7 @@ from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
+from tools.frame_faults import FAULT_TEXTS
 from tools.marks import marked, with_sections
 
 Key = TypeVar("Key", bound=IntEnum)

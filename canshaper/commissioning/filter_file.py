@@ -5,11 +5,11 @@ from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
-from canshaper.config.edit import set_values
-from canshaper.config.flow import Value
 from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
+from canshaper.edit.edit import set_values
+from canshaper.edit.flow import Value
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -8,11 +8,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from canshaper.commissioning import control_client as client
 from canshaper.config.adjust import Key, value
-from canshaper.config.edit import edited
 from canshaper.config.load import load_config
-from canshaper.config.numbers import sections_of, write_numbers
-from canshaper.daemon import control_client as client
+from canshaper.edit.edit import edited, sections_of, write_numbers
 from canshaper.errors import CanshaperError, ControlError
 from canshaper.studio.words import said
 

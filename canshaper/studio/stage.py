@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.codec.frame import Frame
-from canshaper.daemon import control_client as client
+from canshaper.commissioning import control_client as client
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.design.lockstep import driven_part
 from canshaper.design.processes import Transport, on_transport

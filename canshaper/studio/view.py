@@ -9,7 +9,7 @@ from cantools.database.can import Message
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, with_source
 from canshaper.codec.status import StatusCodec
-from canshaper.controller.finder import InputFinder
+from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.controller.sets import profile_by_number
 from canshaper.inputs.profile import OWN
 from canshaper.machine.deployment import Deployment

@@ -8,7 +8,7 @@ from cantools.database.can import Signal
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.machine import suggest
+from canshaper.commissioning import suggest
 from canshaper.machine.binding import load_deployment
 from tests.cli.init_script import BARE, DBC, init, of_dbc
 

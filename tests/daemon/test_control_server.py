@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.daemon import control_client as client
+from canshaper.commissioning import control_client as client
 from canshaper.daemon.control_server import (
     LEAST_BETWEEN_NS,
     MOST_BYTES,

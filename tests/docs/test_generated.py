@@ -8,12 +8,12 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
+from tools.frame_faults import FAULT_TEXTS
 
 ROOT = Path(__file__).parents[2]
 generate: dict[str, Any] = runpy.run_path(str(ROOT / "tools/generate.py"))

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from canshaper.daemon import control_client as client
+from canshaper.commissioning import control_client as client
 from tests.studio.conftest import ROOT, Studio, free_groups
 
 PERIOD, A1 = "axes.slew.sway.period_s", "axes.slew.filter.a1"

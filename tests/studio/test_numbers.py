@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.daemon import control_client as client
+from canshaper.commissioning import control_client as client
 from tests.studio.conftest import Page
 from tests.studio.machine import A1, PERIOD, Machine
 

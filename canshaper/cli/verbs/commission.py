@@ -1,12 +1,12 @@
 """``canshaper commission``: the day of commissioning, step by step."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.answers import answered_by, ask, one
 from canshaper.cli.common import (
     CHANNEL,
     FILE,
@@ -18,6 +18,7 @@ from canshaper.cli.common import (
     os_errors,
     refuse_shipped,
 )
+from canshaper.cli.interview.answers import answered_by, ask, one
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from canshaper.commissioning.procedure.procedure import Procedure, Proposal
     from canshaper.commissioning.procedure.step import Step
     from canshaper.machine.deployment import Deployment
+    from canshaper.report.console import OnProgress
 
 EXIT_OPEN = 1
 YES, AGAIN, SKIP, STOP = "yes", "again", "skip", "stop"
@@ -105,7 +107,6 @@ def _words(interface: str | None, channels: list[str] | None, *, network: bool) 
 
 def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: bool) -> "Bench":
     """Where it is measured; a rehearsal goes on with the crane that it was begun with."""
-    from canshaper.cli.person import Terminal
     from canshaper.commissioning.procedure.bench import Simulated
     from canshaper.commissioning.procedure.machine import Machine
     from canshaper.commissioning.procedure.state import read_state
@@ -201,3 +202,24 @@ def _show(procedure: "Procedure", proposal: "Proposal") -> None:
         echo(f"It would write into {procedure.files.deployment}:\n{proposal.diff}")
     elif not proposal.poor:
         echo(f"{procedure.files.deployment} stays as it is.")
+
+
+class Terminal:
+    """Prompts of the steps; with ``--yes`` or ``--answers`` they wait for no one."""
+
+    def ready(self, words: str) -> None:
+        """Say what to do, and wait for Enter."""
+        echo(f"\n  {words}")
+        ask("Enter begins", str, "")
+
+    def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
+        """Ask for a word, until it is one that is allowed."""
+        return ask(question, one(allowed) if allowed else str, default)
+
+    @contextmanager
+    def progress(self, what: str) -> Iterator["OnProgress"]:
+        """A bar on the terminal."""
+        from canshaper.report.console import progress_bar
+
+        with progress_bar(what) as on_progress:
+            yield on_progress

@@ -9,20 +9,19 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.answers import answered_by, confirmed
 from canshaper.cli.common import EXTRAS, echo, install_line, loader, os_errors, print_warnings
-from canshaper.cli.machine_questions import machine_of
-from canshaper.cli.node_questions import Nodes, uses_of
-from canshaper.cli.proposal import accepted
+from canshaper.cli.interview.answers import accepted, answered_by, confirmed
+from canshaper.cli.interview.machine import machine_of
+from canshaper.cli.interview.nodes import Nodes, uses_of
 from canshaper.errors import CanshaperError, ConfigError, UsageError
 from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
+    from canshaper.cli.interview.first import FirstMachine
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.config.bus import Bus
-    from canshaper.config.first import FirstMachine
 
 
 def init(
@@ -71,7 +70,7 @@ def init(
 
       canshaper init  # tries it with the shipped forwarder.dbc
     """
-    from canshaper.config.first_file import first_deployment
+    from canshaper.cli.interview.first_file import first_deployment
 
     draft = file.with_name(f"{file.stem}.draft.yaml")
     own = file.with_name(f"{file.stem}-canopen.dbc")

@@ -116,7 +116,7 @@ def record(
 
 def _last(file: str, control: Path | None) -> None:
     """Let the daemon write what it has."""
-    from canshaper.daemon.control_client import write_black_box
+    from canshaper.commissioning.control_client import write_black_box
 
     try:
         path = control or control_socket(loader(file)())

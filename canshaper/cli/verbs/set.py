@@ -43,8 +43,8 @@ def set(
 
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
-    from canshaper.config.numbers import write_numbers
-    from canshaper.daemon import control_client as client
+    from canshaper.commissioning import control_client as client
+    from canshaper.edit.edit import write_numbers
     from canshaper.report.console import SafeConsole
 
     deployment = loader(file)()

@@ -262,7 +262,7 @@ def _write(
 ) -> list[str]:
     from canshaper.commissioning.filter_file import write_filter
     from canshaper.config.filters import designed
-    from canshaper.config.flow import Value
+    from canshaper.edit.flow import Value
 
     designed_for = designed(task.mode)
     if task.length_range_pct is not None:

@@ -1,8 +1,8 @@
 """A calibration for people, and into the deployment file; and what it is measured with."""
 
 from canshaper.commissioning.calibration.fit import Calibration
-from canshaper.config.edit import set_values
 from canshaper.config.origin import note, written_by
+from canshaper.edit.edit import set_values
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 

@@ -12,7 +12,7 @@ from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.figures import summary
 from canshaper.commissioning.doctor.finding import Finding, Level
-from canshaper.controller.finder import InputFinder
+from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 

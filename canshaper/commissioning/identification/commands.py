@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
+from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.driven_data import STANDS
 from canshaper.commissioning.identification.series import Array, Command
-from canshaper.controller.finder import InputFinder
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick

@@ -5,10 +5,10 @@ from typing import Any
 
 from canshaper.commissioning.identification.recommend import Advice, advise, flow
 from canshaper.commissioning.identification.verdict import Finding
-from canshaper.config.edit import set_values
-from canshaper.config.flow import Value
 from canshaper.config.origin import note
 from canshaper.config.sway import Sway
+from canshaper.edit.edit import set_values
+from canshaper.edit.flow import Value
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault

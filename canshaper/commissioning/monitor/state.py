@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from canshaper.codec.frame import Frame
-from canshaper.controller.finder import InputFinder
+from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key
 from canshaper.recording.history import History, HistoryEvent

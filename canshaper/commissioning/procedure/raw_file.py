@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from canshaper.config.edit import set_values
+from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
 
 

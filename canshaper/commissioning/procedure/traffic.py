@@ -9,10 +9,10 @@ from cantools.database.can import Message
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
+from canshaper.commissioning import suggest
 from canshaper.commissioning.doctor.listen import inputs_of
+from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.commands import Samples, joystick_commands
-from canshaper.controller.finder import InputFinder
-from canshaper.machine import suggest
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick

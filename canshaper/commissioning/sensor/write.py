@@ -6,8 +6,8 @@ from pathlib import Path
 from canshaper.commissioning.filter_file import write_section
 from canshaper.commissioning.identification.simulated_log import is_simulated
 from canshaper.commissioning.sensor.finding import Finding, changes
-from canshaper.config.flow import Value
 from canshaper.config.origin import note, written_by
+from canshaper.edit.flow import Value
 from canshaper.machine.deployment import Deployment
 
 

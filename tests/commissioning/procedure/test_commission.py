@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.cli.person import Terminal
+from canshaper.cli.verbs.commission import Terminal
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure

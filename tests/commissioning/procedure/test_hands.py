@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.cli.person import Terminal
+from canshaper.cli.verbs.commission import Terminal
 from canshaper.commissioning.procedure.bench import Simulated, Task
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure, Proposal

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.cli.person import Terminal
+from canshaper.cli.verbs.commission import Terminal
 from canshaper.commissioning.calibration import run
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.ramp import Ramp
@@ -129,7 +129,7 @@ def test_the_daemon_ends_with_us(deployment: Deployment, tmp_path: Path) -> None
     """We are killed in the middle of a drive: the valves are sent neutral all the same."""
     code = (
         "import os, signal; from pathlib import Path\n"
-        "from canshaper.cli.person import Terminal\n"
+        "from canshaper.cli.verbs.commission import Terminal\n"
         "from canshaper.commissioning.procedure.machine import Machine\n"
         "from canshaper.commissioning.procedure.bench import Mode\n"
         "from canshaper.machine.binding import load_deployment\n"

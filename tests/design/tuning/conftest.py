@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.design.tuning.edited import FILE
+from tests.edit.edited import FILE
 
 
 @pytest.fixture

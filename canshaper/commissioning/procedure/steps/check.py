@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.doubts import doubts
 from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
-from canshaper.config.edit import set_values
 from canshaper.config.source import Source
+from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.origin import rehearsed_valves
 from canshaper.machine.stopping import unstated

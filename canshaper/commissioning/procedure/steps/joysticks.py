@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.procedure.bench import STILL_MOVES, Task
 from canshaper.commissioning.procedure.step import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
-from canshaper.config.edit import set_values
+from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 from canshaper.report.style import (

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.frame import Frame
+from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.commands import Commands
-from canshaper.controller.finder import InputFinder
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput

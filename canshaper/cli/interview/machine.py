@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import (
+from canshaper.cli.interview.answers import (
     MOST_OFFERED,
     NONE,
     ask,
@@ -15,15 +15,15 @@ from canshaper.cli.answers import (
     several,
     whole,
 )
-from canshaper.cli.axis_questions import add_axes
-from canshaper.cli.node_questions import Nodes, uses_of
-from canshaper.cli.swing_questions import motion_of
+from canshaper.cli.interview.axes import add_axes
+from canshaper.cli.interview.nodes import Nodes, uses_of
+from canshaper.cli.interview.swing import motion_of
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from cantools.database.can import Message, Signal
 
-    from canshaper.config.first import FirstAxis, FirstJoystick, FirstMachine
+    from canshaper.cli.interview.first import FirstAxis, FirstJoystick, FirstMachine
 
 FEWEST_CYCLES = 5  # of a joystick's message in its timeout
 FIRST_DATA_BITRATE = 2_000_000  # of most buses of CAN FD
@@ -43,10 +43,10 @@ def machine_of(
     Raises:
         UsageError: no machine can be made of these messages, or of the answers.
     """
+    from canshaper.cli.interview.first import FirstMachine
+    from canshaper.commissioning import suggest
     from canshaper.config.bus import Bus
-    from canshaper.config.first import FirstMachine
     from canshaper.config.load import limits
-    from canshaper.machine import suggest
 
     possible = suggest.joysticks(messages)
     if not messages:
@@ -104,7 +104,7 @@ def _data_bitrate(messages: "list[Message]", uses: Collection[str], bitrate: int
 
 def _chosen(messages: "list[Message]") -> list[str]:
     """Ask for the messages of the joysticks."""
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     possible, likely = suggest.joysticks(messages), suggest.likely_joysticks(messages)
     enabled = [m.name for m in likely if suggest.named(suggest.switches(m), suggest.ENABLE)]
@@ -137,10 +137,10 @@ def _joystick(
     nodes: Nodes,
 ) -> "tuple[FirstJoystick, Message]":
     """A joystick, and its message; ``before`` are those that there are already."""
-    from canshaper.config.first import FirstJoystick
+    from canshaper.cli.interview.first import FirstJoystick
+    from canshaper.commissioning import suggest
     from canshaper.config.load import limits
     from canshaper.config.schema import Joystick
-    from canshaper.machine import suggest
 
     message, page = _page(whole_message)
     left = suggest.switches(message)  # a switch has one meaning
@@ -190,7 +190,7 @@ def _switch_elsewhere(
         message and signal of its enable switch, or None and None and the joystick that shares its;
         of a signal of more than two bits the value that enables.
     """
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     others = [one for one in messages if one.name != message.name]
     joysticks = [joystick.name for joystick in before]
@@ -215,7 +215,7 @@ def _switch_elsewhere(
 
 def _code(signal: "Signal") -> int:
     """Ask for the value of a signal that enables."""
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     choices: Mapping[int, object] = signal.choices or {}
     text = f"{signal.name}: value that enables, of "

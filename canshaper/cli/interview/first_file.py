@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 
-from canshaper.config.first import (
+from canshaper.cli.interview.first import (
     FIRST_MAX_PCT,
     FIRST_TAIL_S,
     PERIOD_RANGE,
@@ -18,7 +18,7 @@ from canshaper.config.first import (
     rounded,
     stop_distance_m,
 )
-from canshaper.config.flow import plain
+from canshaper.edit.flow import plain
 
 
 def first_deployment(machine: FirstMachine) -> str:

@@ -13,11 +13,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from canshaper.config.adjust import Key
 from canshaper.config.bounded import read_bounded
-from canshaper.config.flow import Value, flow, read_back
 from canshaper.config.load import load_config
 from canshaper.config.source import MOST_BYTES, Place, Source
-from canshaper.config.spans import Edit
+from canshaper.edit.flow import Value, flow, read_back
+from canshaper.edit.spans import Edit
 from canshaper.errors import ConfigError, Problem
 
 
@@ -120,6 +121,32 @@ def _replace(path: Path, before: str, text: str, expected: Any) -> None:
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | None]]:
+    """What a file's sections get: numbers by their keys, such as ``axes.slew.sway.period_s``.
+
+    What says where a sway model was measured is taken out: it is no longer what was measured.
+    """
+    sections: dict[Place, dict[str, float | None]] = {}
+    for text, number in values.items():
+        key = Key.parsed(text)
+        assert key is not None  # the daemon took it
+        numbers = sections.setdefault(("axes", key.axis, key.section), {})
+        numbers[key.name] = number
+        if key.section == "sway":
+            numbers["origin"] = None
+    return sections
+
+
+def write_numbers(path: Path, values: Mapping[str, float]) -> None:
+    """Write numbers into a deployment file; see ``set_values``.
+
+    Raises:
+        ConfigError: the file cannot be changed.
+    """
+    for place, numbers in sections_of(values).items():
+        set_values(path, place, numbers)
 
 
 def _check(path: Path, temporary: Path, expected: Any) -> None:

@@ -3,13 +3,13 @@
 import re
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import MOST_OFFERED, NONE, ask, confirmed, number, one
-from canshaper.cli.scaling_questions import code_meanings
+from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, confirmed, number, one
+from canshaper.cli.interview.scaling import code_meanings
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
-    from canshaper.config.first import (
+    from canshaper.cli.interview.first import (
         FirstAxis,
         FirstMotion,
         FirstSensor,
@@ -28,7 +28,7 @@ _FASTEST_M_S = 40.0
 
 def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
-    from canshaper.config.first import Stopwatch
+    from canshaper.cli.interview.first import Stopwatch
     from canshaper.config.load import limits
     from canshaper.config.sway import Sway
 
@@ -47,10 +47,10 @@ def sensor_of(
     axis: str, swing_s: float, others: "list[Message]", bound: "list[FirstAxis]"
 ) -> "FirstSensor | None":
     """What measures the swing of an axis; ``others`` are messages left, ``bound`` axes have one."""
-    from canshaper.config.first import FirstSensor
+    from canshaper.cli.interview.first import FirstSensor
+    from canshaper.commissioning import suggest
     from canshaper.config.load import limits
     from canshaper.config.sway_sensor import SwaySensor
-    from canshaper.machine import suggest
     from canshaper.machine.sway_sensor import LEAST_FUSION
 
     used = {(one.sensor.message, one.sensor.signal) for one in bound if one.sensor}
@@ -84,7 +84,7 @@ def sensor_of(
 
 def slewing_of(axis: str) -> "FirstSlewing | None":
     """How an axis turns the crane; None where it does not."""
-    from canshaper.config.first import FirstSlewing
+    from canshaper.cli.interview.first import FirstSlewing
     from canshaper.config.limits import Slewing
     from canshaper.config.load import limits
 
@@ -102,7 +102,7 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
     And with the shortest period that may then be set on the running machine.
     """
-    from canshaper.config.first import PERIOD_RANGE, Stopwatch, ten_swings_s
+    from canshaper.cli.interview.first import PERIOD_RANGE, Stopwatch, ten_swings_s
     from canshaper.config.limits import Limits
     from canshaper.machine.filters import filter_fault
 
@@ -117,8 +117,8 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
 def motion_of(axes: "list[FirstAxis]", others: "list[Message]") -> "FirstMotion | None":
     """Slew and near-far as one motion, where there are both; ``others`` are messages left over."""
-    from canshaper.config.first import RADIUS_TIMEOUT_MS, FirstMotion
-    from canshaper.machine import suggest
+    from canshaper.cli.interview.first import RADIUS_TIMEOUT_MS, FirstMotion
+    from canshaper.commissioning import suggest
 
     slew = next((axis.name for axis in axes if axis.slewing), None)
     possible = [axis.name for axis in axes if axis.swing and not axis.slewing]

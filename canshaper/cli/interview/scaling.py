@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import ask, confirmed, number, one
+from canshaper.cli.interview.answers import ask, confirmed, number, one
 
 if TYPE_CHECKING:
     from cantools.database.can import Message, Signal
 
-    from canshaper.config.first import FirstScaling
+    from canshaper.cli.interview.first import FirstScaling
 
 _LARGEST = 1e9
 MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
@@ -16,9 +16,9 @@ MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
 
 def command_scaling(signal: "Signal", message: "Message") -> "FirstScaling":
     """What the signal of a joystick means: around a value, with flags, or with a second signal."""
+    from canshaper.cli.interview.first import FirstScaling
     from canshaper.codec.signals import magnitude_range, symmetrical_range
-    from canshaper.config.first import FirstScaling
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     if symmetrical_range(signal) is None:
         return FirstScaling()
@@ -43,9 +43,9 @@ def command_scaling(signal: "Signal", message: "Message") -> "FirstScaling":
 
 def valve_scaling(signal: "Signal") -> "FirstScaling":
     """What the signal of a valve means."""
+    from canshaper.cli.interview.first import FirstScaling
     from canshaper.codec.signals import symmetrical_range
-    from canshaper.config.first import FirstScaling
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     if symmetrical_range(signal) is None:
         return FirstScaling()
@@ -70,14 +70,14 @@ def code_meanings(signal: "Signal", scaling: "FirstScaling | None" = None) -> di
 
 
 def _around_zero(signal: "Signal") -> "FirstScaling":
-    from canshaper.config.first import FirstScaling
+    from canshaper.cli.interview.first import FirstScaling
 
     return FirstScaling(_full(signal, 0.0), invert=_inverted(signal))
 
 
 def _around_middle(signal: "Signal") -> "FirstScaling":
-    from canshaper.config.first import FirstScaling
-    from canshaper.machine import suggest
+    from canshaper.cli.interview.first import FirstScaling
+    from canshaper.commissioning import suggest
 
     low, high = suggest.reach(signal)
     middle = suggest.likely_middle(signal)
@@ -88,7 +88,7 @@ def _around_middle(signal: "Signal") -> "FirstScaling":
 
 def _full(signal: "Signal", zero: float) -> float:
     """From zero to full command."""
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     likely = suggest.likely_full(signal, zero)
     distance = f", from {zero:g}" if zero else ""

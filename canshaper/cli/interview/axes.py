@@ -3,17 +3,17 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import MOST_OFFERED, NONE, ask, name, one, period_ms, whole
 from canshaper.cli.common import echo
-from canshaper.cli.node_questions import Nodes
-from canshaper.cli.scaling_questions import code_meanings, command_scaling, valve_scaling
-from canshaper.cli.swing_questions import sensor_of, slewing_of, swing_of
+from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, name, one, period_ms, whole
+from canshaper.cli.interview.nodes import Nodes
+from canshaper.cli.interview.scaling import code_meanings, command_scaling, valve_scaling
+from canshaper.cli.interview.swing import sensor_of, slewing_of, swing_of
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from cantools.database.can import Message, Signal
 
-    from canshaper.config.first import FirstAxis, FirstJoystick
+    from canshaper.cli.interview.first import FirstAxis, FirstJoystick
 
 
 def add_axes(
@@ -24,8 +24,8 @@ def add_axes(
     nodes: Nodes,
 ) -> None:
     """Add the axes of a joystick; ``others`` are messages that are left."""
-    from canshaper.config.first import FirstAxis
-    from canshaper.machine import suggest
+    from canshaper.cli.interview.first import FirstAxis
+    from canshaper.commissioning import suggest
 
     two_sided = suggest.velocities(message)
     for command in two_sided or suggest.one_sided(message):
@@ -77,7 +77,7 @@ def _valve_of(
     axis: str, command: "Signal", others: "list[Message]"
 ) -> "tuple[Message, Signal] | None":
     """Message and signal of the valve of an axis; it is taken from those that are left."""
-    from canshaper.machine import suggest
+    from canshaper.commissioning import suggest
 
     candidates = suggest.valves(others, command.name)
     possible = [m for m in candidates if _valve_timeouts(m.cycle_time or 0) is not None]

@@ -4,16 +4,16 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import NONE, ask, confirmed, several, whole
 from canshaper.cli.common import echo
+from canshaper.cli.interview.answers import NONE, ask, confirmed, several, whole
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
+    from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
     from canshaper.commissioning.nodes.node import Node, Pdo
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.commissioning.nodes.use import Use
-    from canshaper.config.first import FirstCanopen, FirstCia408, FirstMachine
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
 _NAME_LETTERS = 20  # of a node; its messages' names have 32
@@ -97,8 +97,8 @@ class Nodes:
         """Control and status word, where a message commands a valve of CiA 408."""
         if (name := self.name_of(valve)) is None:
             return None
+        from canshaper.cli.interview.first import FirstCia408
         from canshaper.commissioning.nodes import messages
-        from canshaper.config.first import FirstCia408
         from canshaper.config.load import limits
         from canshaper.config.schema import StatusWord
 
@@ -120,8 +120,8 @@ class Nodes:
 
     def canopen(self, used: Collection[str]) -> "FirstCanopen":
         """Our node, and the others of messages that are used."""
+        from canshaper.cli.interview.first import FirstCanopen
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
-        from canshaper.config.first import FirstCanopen
 
         ids = [node.id for node in self.named.values()]
         ours = ask("Node id of canshaper", _node_id(ids), str(_OURS))

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.edit import set_values
+from canshaper.edit.edit import set_values
 from canshaper.errors import ConfigError
-from tests.design.tuning.edited import NEW, SLEW
+from tests.edit.edited import NEW, SLEW
 
 
 def test_a_directory_that_cannot_be_written(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,7 +19,7 @@ def test_a_directory_that_cannot_be_written(file: Path, monkeypatch: pytest.Monk
         def refuse(**_options: object) -> None:
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr("canshaper.config.edit.tempfile.mkstemp", refuse)
+        monkeypatch.setattr("canshaper.edit.edit.tempfile.mkstemp", refuse)
     try:
         with pytest.raises(ConfigError, match="not written, the file is as it was: Permission"):
             set_values(file, SLEW, NEW)
@@ -37,7 +37,7 @@ def test_a_disk_that_fails_on_the_way(
     def fail(*_arguments: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(f"canshaper.config.edit.{step}", fail)
+    monkeypatch.setattr(f"canshaper.edit.edit.{step}", fail)
     with pytest.raises(ConfigError, match="No space left on device"):
         set_values(file, SLEW, NEW)
     assert file.read_bytes() == before
@@ -53,7 +53,7 @@ def test_a_file_changed_meanwhile_is_left_alone(
         fsync(number)
         file.write_text("tick_ms: 10\n")
 
-    monkeypatch.setattr("canshaper.config.edit.os.fsync", someone_else)
+    monkeypatch.setattr("canshaper.edit.edit.os.fsync", someone_else)
     with pytest.raises(ConfigError, match="changed by someone else"):
         set_values(file, SLEW, NEW)
     assert file.read_text() == "tick_ms: 10\n"

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from canshaper.config.flow import Value
+from canshaper.edit.flow import Value
 
-FILE = Path(__file__).resolve().parents[3] / "config" / "forwarder.yaml"
+FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = ("axes", "slew", "filter")
 NEW: dict[str, Value] = {"a1": 0.7, "a2": 0.12233, "third_pole_rad_s": None, "poles_rad_s": None}
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from canshaper.config.edit import edited, set_values
-from canshaper.config.flow import Value
 from canshaper.config.load import load_config
+from canshaper.edit.edit import edited, set_values
+from canshaper.edit.flow import Value
 from canshaper.errors import ConfigError
-from tests.design.tuning.edited import SLEW, gff_line
+from tests.edit.edited import SLEW, gff_line
 
 
 @pytest.mark.parametrize(

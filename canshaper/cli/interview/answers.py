@@ -1,14 +1,15 @@
 """Answers to questions: each is checked when it is given, and asked again until it is one."""
 
+import re
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
 import typer
 
 from canshaper.cli.common import echo
-from canshaper.errors import ConfigError, Problem
+from canshaper.errors import ConfigError, Problem, UsageError
 
 _T = TypeVar("_T")
 NONE = "-"
@@ -167,7 +168,7 @@ def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
 def name(used: Collection[str]) -> Callable[[str], str]:
     """Takes a word that can be a name in a deployment file and is not in use, or NONE."""
 
-    from canshaper.config.flow import plain
+    from canshaper.edit.flow import plain
 
     def parse(text: str) -> str:
         if text != NONE and not (text.isidentifier() and plain(text) == text):
@@ -249,3 +250,33 @@ def whole(low: float, high: float) -> Callable[[str], int]:
 def period_ms(message: str) -> int:
     """Ask for the period of a message, in ms."""
     return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")
+
+
+# What may be answered, as the end of a question says it.
+_CHOICES = re.compile(r", (of|such as) .*|, - for none")
+
+
+def accepted(ask: Callable[[], _T]) -> _T | None:
+    """Ask for all answers at once: show what Enter would answer, and whether to accept it.
+
+    Args:
+        ask: asks the questions.
+
+    Returns:
+        None where not, or where a question has no proposal: then they have to be asked.
+    """
+    from canshaper.report.console import SafeConsole, new_table
+
+    proposed = Proposed()
+    made = None
+    with suppress(UsageError, ValueError), answered_with(proposed):
+        made = ask()
+    if made is None:
+        return None
+    table = new_table("question", "proposal")
+    for question, proposal in proposed.rows:
+        table.add_row(_CHOICES.sub("", question), "none" if proposal == NONE else proposal)
+    SafeConsole().print(table)
+    echo("What no DBC says, such as swing and speeds, is a guess until it is measured.")
+    question = "Accept all of these (no: answer them one by one)"
+    return made if confirmed(question, default=True) else None

@@ -1,0 +1,1 @@
+"""A deployment file is changed: single values, every other byte as it is."""
