@@ -30,9 +30,11 @@ Those about data (``UsageError``, ``LogError``, ``DesignError``, ``Identificatio
 ``PageMessageError``) are ``ValueError`` too.
 """
 
+import re
 import traceback
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 # Of one file, and of one problem: a person reads no more.
 MOST_PROBLEMS = 100
@@ -196,3 +198,36 @@ def raised(error: BaseException) -> str:
         return text
     frame, line = places[-1]
     return f"{text} ({frame.f_code.co_filename}:{line})"
+
+
+# C0 but tab and line end, DEL, C1; other line ends; what turns the direction of text; surrogates.
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+
+
+def printable(text: str) -> str:
+    """The text with control characters as Python would write them, such as ``\\x1b``."""
+    return _CONTROL.sub(lambda match: ascii(match[0])[1:-1], text)
+
+
+# Of more names than these only the nearest are listed.
+MOST_LISTED = 20
+LISTED = 5
+
+
+def there_are(name: str, names: Collection[str]) -> str:
+    """The end of an error about a name that does not exist: those that do, of many the nearest."""
+    if len(names) <= MOST_LISTED:
+        return f"; there are {', '.join(names) or 'none'}{did_you_mean(name, names)}"
+    folded = {one.casefold(): one for one in names}
+    near = [folded[one] for one in get_close_matches(name.casefold(), folded, LISTED, 0.3)]
+    listed = ", ".join(near or [*names][:LISTED])
+    return f"; there are {len(names)}, such as {listed}{did_you_mean(name, names)}"
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """The end of an error about a name that does not exist; empty where none looks like it."""
+    by_folded = {one.casefold(): one for one in names}
+    similar = get_close_matches(name.casefold(), by_folded, n=1)
+    return f"; did you mean {by_folded[similar[0]]}?" if similar else ""

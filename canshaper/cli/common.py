@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from canshaper.config.printable import printable
 from canshaper.errors import (
     BusError,
     CalibrationError,
@@ -22,6 +21,7 @@ from canshaper.errors import (
     NodeError,
     Problem,
     UsageError,
+    printable,
 )
 from canshaper.shipped import deployment_path
 

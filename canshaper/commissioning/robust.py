@@ -10,7 +10,7 @@ from rich.table import Table
 from canshaper.commissioning.filter_file import write_filter
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import Filter, designed, filter_of
-from canshaper.config.runs import shortened
+from canshaper.config.section import shortened
 from canshaper.design.swinging import swinging_axis
 from canshaper.design.tuning.evaluate import Evaluation, Machine, evaluate
 from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual

@@ -11,8 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from canshaper.config.enable import slowest_ms
-from canshaper.config.filters import Filter
-from canshaper.config.schedule import Profile
+from canshaper.config.filters import Filter, Profile
 from canshaper.config.schema import AxisConfig
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.joystick import JoystickInput

@@ -1,6 +1,7 @@
-"""Schema of the buses of a deployment, and of our node on them."""
+"""Sections of buses: interfaces, protocols, gateway, and the control socket."""
 
-from typing import Annotated, Any, Self
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
@@ -144,3 +145,68 @@ class Bus(Section):
     def __hash__(self) -> int:
         """Of where it is: a bus is a key where it is asked for what is open."""
         return hash((self.interface, self.channel))
+
+
+class Gateway(Section):
+    """Two buses with us between them: the joystick's frames leave with our velocity in them."""
+
+    between: Annotated[list[str], Field(min_length=2, max_length=2, description="the two buses")]
+    forwarding: Literal["kernel", "daemon"] = "kernel"
+    """Who forwards all other frames: the kernel, by rules of can-gw, also while the daemon is away;
+    or the daemon, where the kernel has no can-gw: then nothing passes without the daemon."""
+    fallback: Literal["stop", "neutral", "pass"] = "stop"
+    """Joysticks while the daemon is away. With stop their frames do not pass; with neutral they
+    pass with all rewritten axes in neutral; with pass they pass as they are: **the raw joystick
+    moves the machine**."""
+    blocked: list[str] = Field([], description="messages that are not forwarded, by name")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        first, second = self.between
+        if first == second:
+            raise ValueError(f"between: expected two different buses, got {first} twice")
+        if self.forwarding == "daemon" and self.fallback != "stop":
+            raise ValueError(
+                f"fallback: expected stop with forwarding: daemon, got {self.fallback}:"
+                " without the daemon nothing passes"
+            )
+        return self
+
+    def other(self, bus: str) -> str | None:
+        """The bus on the other side; None for one that is not of the gateway."""
+        if bus not in self.between:
+            return None
+        return self.between[1 - self.between.index(bus)]
+
+
+# Where the service has a directory for each instance (RuntimeDirectory of the unit).
+RUNTIME = Path("/run/canshaper")
+End = Annotated[float, number(-1e6, 1e6, "", "end of the range, in the number's own unit")]
+
+
+class Control(Section):
+    """The control socket of the daemon, and the numbers that ``canshaper set`` may change."""
+
+    socket: str | None = Field(None, description="path of the socket")
+    """Where the daemon listens, by default /run/canshaper/NAME/control.sock, NAME of the file; the
+    option --control PATH of run and set is another place."""
+    mode: str = Field("0600", pattern="^0[0-7]{3}$")
+    """File mode of the socket, octal, in quotes: who may write to it may change the numbers."""
+    adjustable: dict[str, Annotated[list[End], Field(min_length=2, max_length=2)]] = Field(
+        min_length=1
+    )
+    """Least and most of each number of sway and filter in the file, and of max_pct, rise_per_s,
+    fall_per_s of limits, by its keys with dots between. Not on axes with gain_schedule or
+    profiles."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for key, (low, high) in self.adjustable.items():
+            if not low <= high:
+                text = f"{key}: expected the lower end first, got {low:g} to {high:g}"
+                raise ValueError(text)
+        return self
+
+    def path(self, file: Path) -> Path:
+        """Where the socket is, for a deployment file."""
+        return Path(self.socket) if self.socket else RUNTIME / file.stem / "control.sock"

@@ -1,12 +1,14 @@
-"""What bounds an axis: its output, its valve, and how far the tip is out meanwhile."""
+"""Sections of an axis: limits, slewing, its sway, and two axes as one motion."""
 
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from canshaper.config.inputs import Input, NamedCodes
 from canshaper.config.origin import Origin
 from canshaper.config.section import Section, number
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.sway import SwayMode
 from canshaper.shaping.valve_curve import ValveCurve
 
 
@@ -105,4 +107,95 @@ class Limits(Section):
             allow_faster=self.allow_faster,
             allow_reverse=self.allow_reverse,
             brake_shaped=self.reversal == "brake_shaped",
+        )
+
+
+class Radius(NamedCodes, Input):
+    """Radius of the tip, measured."""
+
+    signal: str = Field(description="signal with the radius in m")
+    timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
+    """Age at which it counts as lost. In a motion a lost radius is carried on by the model of
+    near-far, and a jump is followed within a second."""
+
+
+class Motion(Section):
+    """What the axes of a crane add for each other, see ``TwoAxisMotion``.
+
+    Without a radius, or without a near-far axis, slew gets what needs neither.
+    """
+
+    slew: str = Field(description="the axis that turns; it needs sway and slewing")
+    near_far: str | None = None
+    """The axis that moves the tip in and out; it needs sway. Without it slew gets what needs no
+    radius. A single joint of the boom is none."""
+    radius: Radius | None = None
+    """Radius of the tip, where it is measured."""
+    radius_m: Annotated[float, number(0.5, 30, "m", "radius of the grapple")] | None = None
+    """Instead: radius of the grapple, where it hardly changes."""
+    max_pct: Annotated[
+        float,
+        number(1, 50, "% of full speed", "fastest motion of an axis that its operator left alone"),
+    ] = 25.0
+    max_path_m: Annotated[
+        float, number(0.02, 2, "m", "farthest that near-far is moved in or out")
+    ] = 0.3
+    """Farthest that near-far is moved in or out; as far again where its sway sensor damps."""
+    max_s: Annotated[
+        float, number(0.5, 60, "s", "longest motion of an axis that its operator left alone")
+    ] = 6.0
+
+    @model_validator(mode="after")
+    def _one_radius(self) -> Self:
+        if self.radius and self.radius_m:
+            raise ValueError("expected one of radius and radius_m, got both")
+        if self.near_far is None and (self.radius or self.radius_m):
+            raise ValueError("expected near_far with a radius, got none")
+        return self
+
+
+class Sway(Section):
+    """Swing of the tool on one axis.
+
+    Either grapple data (``length_m``, ``damping_nms``, ``mass_kg``), or what a stopwatch shows
+    (``period_s`` with ``damping_ratio`` or ``decay_per_swing``).
+    """
+
+    full_speed_m_s: Annotated[
+        float, number(0.05, 20, "m/s", "speed of the tip at full command, scales the sway shown")
+    ]
+    length_m: Annotated[float, number(0.05, 30, "m", "pendulum length")] | None = None
+    damping_nms: Annotated[float, number(0, 1e6, "N m s/rad", "damping of the joint")] | None = None
+    mass_kg: Annotated[float, number(1, 1e5, "kg", "mass of tool and load")] | None = None
+    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")] | None = None
+    damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")] | None = None
+    decay_per_swing: (
+        Annotated[float, number(0, 0.99, "", "part of the amplitude lost over a full swing")] | None
+    ) = None
+    origin: Origin | None = Field(None, description="where these numbers come from")
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        self.mode()
+        return self
+
+    def mode(self) -> SwayMode:
+        """Sway mode of this data.
+
+        Raises:
+            ValueError: the data is incomplete, given twice, or makes no sense.
+        """
+        given = self.model_dump(exclude={"full_speed_m_s", "origin"}, exclude_none=True).keys()
+        if given == {"length_m", "damping_nms", "mass_kg"}:
+            assert self.length_m and self.mass_kg and self.damping_nms is not None
+            return SwayMode.from_grapple(self.length_m, self.damping_nms, self.mass_kg)
+        if given == {"period_s", "damping_ratio"}:
+            assert self.period_s and self.damping_ratio is not None
+            return SwayMode.from_period(self.period_s, self.damping_ratio)
+        if given == {"period_s", "decay_per_swing"}:
+            assert self.period_s and self.decay_per_swing is not None
+            return SwayMode.from_decay(self.period_s, self.decay_per_swing)
+        raise ValueError(
+            "expected length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
+            f" and decay_per_swing, got {', '.join(sorted(given)) or 'no sway data'}"
         )

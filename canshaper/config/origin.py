@@ -6,9 +6,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from canshaper.config.printable import printable
 from canshaper.config.section import Section, sections
 from canshaper.config.source import Place
+from canshaper.errors import printable
 from canshaper.shipped import version
 
 

@@ -4,22 +4,20 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from canshaper.config.bus import Bus
-from canshaper.config.codes import NamedCodes
-from canshaper.config.control import Control
-from canshaper.config.filters import Filter
-from canshaper.config.gateway import Gateway
-from canshaper.config.input import Input
-from canshaper.config.limits import Limits, Slewing
-from canshaper.config.motion import Motion
+from canshaper.config.bus import Bus, Control, Gateway
+from canshaper.config.filters import (
+    Breakpoint,
+    Filter,
+    LoadState,
+    Profile,
+    ProfileSwitch,
+    schedule_fault,
+)
+from canshaper.config.inputs import Input, NamedCodes, SwaySensor, Switch, SwitchNames
+from canshaper.config.limits import Limits, Motion, Slewing, Sway
 from canshaper.config.protection import Protected
-from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
-from canshaper.config.section import Section, number
-from canshaper.config.sway import Sway
-from canshaper.config.sway_sensor import SwaySensor
-from canshaper.config.switch import Switch, SwitchNames
+from canshaper.config.section import VERSION, Section, number
 from canshaper.config.uncertainty import Accept, Uncertainty
-from canshaper.config.version import VERSION
 from canshaper.shaping.registry import KINDS
 
 

@@ -2,9 +2,10 @@
 
 import ast
 import inspect
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
@@ -12,6 +13,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from canshaper.config.source import Place
+
+VERSION = 1
+"""Of the file's format."""
 
 
 def number(low: float, high: float, unit: str, text: str) -> Any:
@@ -91,3 +95,30 @@ def sections(part: Any, place: Place = ()) -> Iterator[tuple[Place, Section]]:
         below = enumerate(part) if isinstance(part, list) else ()
     for key, one in below:
         yield from sections(one, (*place, key))
+
+
+RUN = r"([1-9][0-9]{0,3}) x ([0-9]+(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?)"
+_RUN = re.compile(RUN)
+_MOST = 10_000  # far above any list's own limit: what a few runs could make is not made
+
+
+def shortened(numbers: Sequence[float]) -> list[float | str]:
+    """The list as it is written; ``expanded`` gives the same numbers back, to the last bit."""
+    runs: list[float | str] = []
+    for number, equal in groupby(numbers):
+        count = len([*equal])
+        runs.append(number if count == 1 else f"{count} x {number!r}".removesuffix(".0"))
+    return runs
+
+
+def expanded(entries: Any) -> Any:
+    """The list as it is meant; what is no run of a number stays for others to judge."""
+    if not isinstance(entries, list):
+        return entries
+    numbers: list[Any] = []
+    for entry in entries:
+        run = _RUN.fullmatch(entry) if isinstance(entry, str) else None
+        numbers += [float(run[2])] * int(run[1]) if run else [entry]
+        if len(numbers) > _MOST:
+            break
+    return numbers

@@ -1,6 +1,9 @@
 """YAML with line numbers, and the problems found in files."""
 
+import errno
+import os
 import re
+import stat
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -8,8 +11,32 @@ from typing import Any
 
 import yaml
 
-from canshaper.config.bounded import read_bounded
 from canshaper.errors import ConfigError, Problem
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """Content of a file.
+
+    Raises:
+        OSError: it cannot be read, is a device, a pipe or a directory, or has more bytes.
+    """
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # no one need write to a pipe
+    try:
+        mode = os.fstat(number).st_mode
+        if stat.S_ISDIR(mode):
+            raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(mode):
+            text = "expected a regular file, got a device or a pipe"
+            raise OSError(errno.EINVAL, text, str(path))
+        with os.fdopen(number, "rb", closefd=False) as file:
+            data = file.read(most_bytes + 1)
+    finally:
+        os.close(number)
+    if len(data) > most_bytes:
+        text = f"expected {most_bytes} bytes at most, got more"
+        raise OSError(errno.EFBIG, text, str(path))
+    return data
+
 
 Place = tuple[str | int, ...]
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.config.sway import Sway
+from canshaper.config.limits import Sway
 from canshaper.inputs.feedback import Following
 from canshaper.shaping.states import Transition
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode

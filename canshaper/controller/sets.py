@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from canshaper.config.schedule import Profile
+from canshaper.config.filters import Profile
 from canshaper.config.schema import AxisConfig
 from canshaper.inputs.profile import ProfileChoice
 from canshaper.inputs.value import ValueInput

@@ -8,7 +8,7 @@ import os
 import select
 from collections import deque
 
-from canshaper.config.printable import printable
+from canshaper.errors import printable
 
 STANDARD_ERROR = 2
 # Lines kept for a reader that is slow for a moment; more are dropped and counted.

@@ -1,6 +1,6 @@
 """Which axes of a machine swing: those with sway data, which every design starts from."""
 
-from canshaper.config.sway import Sway
+from canshaper.config.limits import Sway
 from canshaper.errors import DesignError
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.config.adjust import Key
-from canshaper.config.bounded import read_bounded
 from canshaper.config.load import load_config
-from canshaper.config.source import MOST_BYTES, Place, Source
+from canshaper.config.source import MOST_BYTES, Place, Source, read_bounded
 from canshaper.edit.flow import Value, flow, read_back
 from canshaper.edit.spans import Edit
 from canshaper.errors import ConfigError, Problem

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from canshaper.config.runs import RUN
+from canshaper.config.section import RUN
 
 # Text that is read as itself: a path, a word, several, a run of numbers, a date.
 _PLAIN = re.compile(

@@ -1,6 +1,6 @@
 """Measured radius of the tip."""
 
-from canshaper.config.motion import Radius
+from canshaper.config.limits import Radius
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.inputs import BoundValue
 

@@ -5,8 +5,7 @@ from itertools import takewhile
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.sent import SentMessage
-from canshaper.config.bus import LAST_SPN, Bus, J1939Name
-from canshaper.config.gateway import Gateway
+from canshaper.config.bus import LAST_SPN, Bus, Gateway, J1939Name
 from canshaper.config.schema import DeploymentConfig
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.interface_options import option_faults

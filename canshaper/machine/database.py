@@ -10,9 +10,8 @@ from cantools.database.can import Message
 
 from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.layout import is_j1939, layout_fault
-from canshaper.config.bounded import read_bounded
-from canshaper.config.similar import there_are
-from canshaper.errors import MOST_PROBLEMS, Problem
+from canshaper.config.source import read_bounded
+from canshaper.errors import MOST_PROBLEMS, Problem, there_are
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import (
     MOST_MESSAGES,

@@ -10,7 +10,7 @@ from cantools.database.can import Message
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.status import StatusCodec
-from canshaper.config.input import Input
+from canshaper.config.inputs import Input
 from canshaper.config.schema import DeploymentConfig, EmergencyStop
 from canshaper.config.source import Source
 from canshaper.machine.bound_axis import BoundAxis

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from canshaper.codec.signals import find_signal, raw_limits
 from canshaper.config.enable import conditions, named_by
-from canshaper.config.input import Input
+from canshaper.config.inputs import Input, Switch
 from canshaper.config.source import Place
-from canshaper.config.switch import Switch
 from canshaper.machine.inputs import Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 

@@ -4,11 +4,10 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from canshaper.config.adjust import Key, adjusted, faults
-from canshaper.config.filters import Filter
-from canshaper.config.schedule import Breakpoint, Profile
+from canshaper.config.filters import Breakpoint, Filter, Profile
+from canshaper.config.limits import Sway
 from canshaper.config.schema import AxisConfig, DeploymentConfig
 from canshaper.config.source import Place
-from canshaper.config.sway import Sway
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.lookup import Lookup
 from canshaper.shaping.registry import KINDS, build_shaper

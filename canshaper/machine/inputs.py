@@ -12,9 +12,9 @@ from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.protection import Protection, SequenceChecker
 from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.enable import Condition
-from canshaper.config.input import Input
-from canshaper.config.motion import Radius
-from canshaper.config.schedule import LoadState, ProfileSwitch
+from canshaper.config.filters import LoadState, ProfileSwitch
+from canshaper.config.inputs import Input
+from canshaper.config.limits import Radius
 from canshaper.config.schema import EmergencyStop, Feedback, Joystick, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup

@@ -8,8 +8,8 @@ from typing import Any, get_type_hints
 from pydantic import PydanticSchemaGenerationError, TypeAdapter, ValidationError
 
 from canshaper.config.bus import Bus
-from canshaper.config.similar import did_you_mean
 from canshaper.config.source import Place
+from canshaper.errors import did_you_mean
 
 # They carry CAN FD without being asked to.
 ALWAYS_FD = frozenset(("udp_multicast", "virtual"))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from canshaper.config.motion import Motion, Radius
+from canshaper.config.limits import Motion, Radius
 from canshaper.config.source import Place
 from canshaper.machine.inputs import BoundValue, bind_radius
 from canshaper.machine.lookup import Lookup

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from cantools.database.can import Signal
 
 from canshaper.codec.signals import find_signal, full_scale, in_range, is_neutral, named_fault
-from canshaper.config.codes import Meaning
-from canshaper.config.schedule import Profile
+from canshaper.config.filters import Profile
+from canshaper.config.inputs import Meaning
 from canshaper.config.schema import AxisConfig, DeploymentConfig
-from canshaper.config.similar import there_are
 from canshaper.config.source import Place
+from canshaper.errors import there_are
 from canshaper.machine.used_message import NamedCode, UsedMessage, key_path
 
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
-from canshaper.config.input import Input
+from canshaper.config.inputs import Input, SwaySensor
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
-from canshaper.config.sway_sensor import SwaySensor
 from canshaper.machine.inputs import Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage

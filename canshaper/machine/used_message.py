@@ -9,8 +9,8 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.canopen import STATE_BITS
 from canshaper.codec.layout import Chosen
 from canshaper.codec.signals import find_signal, names_broken
-from canshaper.config.similar import there_are
 from canshaper.config.source import Place
+from canshaper.errors import there_are
 from canshaper.machine.database import DbcFile
 from canshaper.machine.diagnostics import Diagnostics
 

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
 from rich.table import Table
 
-from canshaper.config.printable import printable
+from canshaper.errors import printable
 
 MOST_COLUMNS = 10_000  # of a terminal that takes any table
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 import canshaper
-from canshaper.config.printable import printable
+from canshaper.errors import printable
 
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment

@@ -4,8 +4,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from canshaper.config.printable import printable
-from canshaper.errors import CanshaperError, PageMessageError
+from canshaper.errors import CanshaperError, PageMessageError, printable
 from canshaper.studio.cab import is_number
 from canshaper.studio.numbers import LiveNumbers
 

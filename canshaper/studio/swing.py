@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Iterable
 
-from canshaper.config.sway import Sway
+from canshaper.config.limits import Sway
 
 LEAST_SWING_S = 1.0
 """Shortest time over which the largest sway counts as the swing."""

@@ -4,8 +4,7 @@ import math
 import random
 from collections.abc import Sequence
 
-from canshaper.config.similar import did_you_mean
-from canshaper.errors import DesignError
+from canshaper.errors import DesignError, did_you_mean
 from canshaper_sim.axes import (
     ALL_AXES,
     EXTENSION,

@@ -3,8 +3,7 @@
 import dataclasses
 from typing import Any
 
-from canshaper.config.similar import did_you_mean
-from canshaper.errors import DesignError
+from canshaper.errors import DesignError, did_you_mean
 from canshaper_sim.crane import CraneParameters
 
 

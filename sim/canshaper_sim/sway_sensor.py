@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-from canshaper.config.sway_sensor import Kind
+from canshaper.config.inputs import Kind
 from canshaper_sim.grapple import Sway
 from canshaper_sim.ranges import check_ranges
 

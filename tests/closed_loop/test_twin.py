@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from canshaper.config.sway import Sway
+from canshaper.config.limits import Sway
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.shapers.fir import zv_taps

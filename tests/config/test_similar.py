@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.similar import did_you_mean, there_are
-from canshaper.errors import ConfigError
+from canshaper.errors import ConfigError, did_you_mean, there_are
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]

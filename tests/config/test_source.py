@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config import bounded
+from canshaper.config import source
 from canshaper.config.source import Source
 from canshaper.errors import ConfigError
 
@@ -102,7 +102,7 @@ def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     def refuse(*_args: object, **_options: object) -> str:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(bounded.os, "open", refuse)
+    monkeypatch.setattr(source.os, "open", refuse)
     assert unreadable(tmp_path / "a.yaml") == ": Permission denied"
 
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from canshaper.config.input import Input
+from canshaper.config.inputs import Input
 from canshaper.config.limits import Limits
 from canshaper.config.schema import AxisConfig, DeploymentConfig, Feedback
 from canshaper.config.uncertainty import Accept

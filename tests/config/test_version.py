@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.load import load_config
-from canshaper.config.version import MOVED
+from canshaper.config.load import MOVED, load_config
 from canshaper.errors import ConfigError
 from tests.config.conftest import Load, Problems
 

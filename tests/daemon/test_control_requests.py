@@ -48,7 +48,7 @@ def test_the_control_socket_has_the_mode_of_the_file(bench: Bench, tmp_path: Pat
 def test_the_control_socket_is_named_after_the_deployment(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("canshaper.config.control.RUNTIME", tmp_path / "run")
+    monkeypatch.setattr("canshaper.config.bus.RUNTIME", tmp_path / "run")
     (tmp_path / "run" / "machine").mkdir(parents=True)
     control(bench, tmp_path)
     bench.file.write_text(bench.text.replace(f"  socket: {tmp_path}\n", ""), encoding="utf-8")

@@ -10,8 +10,8 @@ from rich.table import Table
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.config.printable import printable
 from canshaper.daemon.journal import JournalHandler
+from canshaper.errors import printable
 from canshaper.report.console import SafeConsole
 from tests.hostile.inputs import DBC, SHIPPED
 

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from canshaper.config.sway_sensor import Kind
+from canshaper.config.inputs import Kind
 from canshaper.machine.sway_sensor import SECOND_DAMPING
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.free_swing import sensor_gains

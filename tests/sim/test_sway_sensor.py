@@ -5,7 +5,7 @@ import statistics
 
 import pytest
 
-from canshaper.config.sway_sensor import Kind
+from canshaper.config.inputs import Kind
 from canshaper.errors import DesignError
 from canshaper_sim.grapple import Sway
 from canshaper_sim.parameters import changed_parameters

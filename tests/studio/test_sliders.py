@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.schedule import Profile
+from canshaper.config.filters import Profile
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment

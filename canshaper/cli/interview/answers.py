@@ -190,7 +190,7 @@ def channel(text: str) -> str:
 
 def _listed(allowed: Sequence[str], text: str) -> str:
     """Those that are allowed, not more than a person reads, and the one that looks like a text."""
-    from canshaper.config.similar import did_you_mean
+    from canshaper.errors import did_you_mean
 
     names = ", ".join(allowed[:MOST_LISTED])
     more = f" and {len(allowed) - MOST_LISTED} more" if len(allowed) > MOST_LISTED else ""

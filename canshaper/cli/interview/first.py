@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from canshaper.config.filters import Filter, filter_of
+from canshaper.config.limits import Sway
 from canshaper.config.load import limits
-from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.stopping import allowed_s
 

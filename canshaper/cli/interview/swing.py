@@ -29,8 +29,8 @@ _FASTEST_M_S = 40.0
 def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
     from canshaper.cli.interview.first import Stopwatch
+    from canshaper.config.limits import Sway
     from canshaper.config.load import limits
-    from canshaper.config.sway import Sway
 
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
@@ -49,8 +49,8 @@ def sensor_of(
     """What measures the swing of an axis; ``others`` are messages left, ``bound`` axes have one."""
     from canshaper.cli.interview.first import FirstSensor
     from canshaper.commissioning import suggest
+    from canshaper.config.inputs import SwaySensor
     from canshaper.config.load import limits
-    from canshaper.config.sway_sensor import SwaySensor
     from canshaper.machine.sway_sensor import LEAST_FUSION
 
     used = {(one.sensor.message, one.sensor.signal) for one in bound if one.sensor}

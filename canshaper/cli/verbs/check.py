@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from canshaper.config.bus import Bus
-    from canshaper.config.motion import Motion
+    from canshaper.config.limits import Motion
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.used_message import NamedCode
 

@@ -40,7 +40,7 @@ def config_schema(
     from canshaper.checksums.kinds import checksum_table
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
-    from canshaper.config.version import VERSION
+    from canshaper.config.section import VERSION
     from canshaper.shaping.registry import KINDS
 
     try:

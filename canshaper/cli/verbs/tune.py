@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from canshaper.cli.results import Results
-    from canshaper.config.sway import Sway
+    from canshaper.config.limits import Sway
     from canshaper.design.tuning.deploy import Setting
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.formulation import Task

@@ -7,7 +7,7 @@ from canshaper.codec.identifier import NULL, group_of
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
-from canshaper.config.input import Input
+from canshaper.config.inputs import Input
 from canshaper.errors import ConfigError, Problem
 from canshaper.inputs.value import ValueInput, measurable
 from canshaper.machine.deployment import Deployment

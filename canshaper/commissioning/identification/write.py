@@ -5,8 +5,8 @@ from typing import Any
 
 from canshaper.commissioning.identification.recommend import Advice, advise, flow
 from canshaper.commissioning.identification.verdict import Finding
+from canshaper.config.limits import Sway
 from canshaper.config.origin import note
-from canshaper.config.sway import Sway
 from canshaper.edit.edit import set_values
 from canshaper.edit.flow import Value
 from canshaper.errors import UsageError

@@ -13,7 +13,7 @@ from pathlib import Path
 from canopen.objectdictionary import ObjectDictionary
 from canopen.objectdictionary.eds import import_eds
 
-from canshaper.config.bounded import read_bounded
+from canshaper.config.source import read_bounded
 from canshaper.errors import ConfigError, Problem
 
 # What canopen thinks of types that no PDO has is not for the operator's terminal.

@@ -1,14 +1,73 @@
-"""Sway sensor of an axis, as it stands in a deployment file."""
+"""Sections of what a machine is told besides its joysticks: switches, enables, inputs, sensors."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from canshaper.config.codes import NamedCodes
-from canshaper.config.input import Input
 from canshaper.config.origin import Origin
-from canshaper.config.section import number
+from canshaper.config.protection import Protected
+from canshaper.config.section import Section, number
 from canshaper.shaping.sway_sensor import Measured
+
+
+class Input(Protected):
+    """A message that is received, with its age limit and its protection."""
+
+    source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
+        None
+    )
+    """J1939: address of the sender; by default that of the DBC, where FE (254) is any."""
+    timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
+    """Age at which it is lost; of a joystick at least two cycles and two ticks."""
+    alive_max_step: (
+        Annotated[
+            int, number(1, 255, "", "largest step of the alive counter that is still the next one")
+        ]
+        | None
+    ) = None
+    """Largest step that still counts as the next message, at most half of the counter's range; by
+    default 3, 1 and 2 for counters of one and two bits."""
+    qualify: Annotated[int, number(1, 20, "messages", "good ones in a row that are needed")] = 1
+    """Good messages in a row that are needed at the start, after a wrong one and after silence."""
+
+
+class Switch(Input):
+    """A switch in a message of its own: seat or door switch, button, state of another ECU."""
+
+    signal: str = Field(description="signal of the switch")
+    code: Annotated[int, number(0, 2**32, "", "raw value that agrees; no other one does")] = 1
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+SwitchNames = Annotated[
+    list[str],
+    BeforeValidator(_as_list),
+    Field(min_length=1),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string"},
+                {"type": "array", "items": {"type": "string"}, "minItems": 1},
+            ]
+        }
+    ),
+]
+"""One name, or several."""
+
+
+Meaning = Literal["value", "fault"]
+
+
+class NamedCodes(Section):
+    """A signal that is read as a number."""
+
+    codes: dict[str, Meaning] = Field({})
+    """By their names, values that the DBC names (VAL_): value for a measurement like every other
+    number, fault for none, as without an entry."""
+
 
 Kind = Literal["angle", "inclination", "rate"]
 
