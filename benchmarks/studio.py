@@ -34,9 +34,9 @@ from playwright.sync_api import Browser
 from canshaper.studio.access import Access
 from canshaper.studio.commission import Commission
 from canshaper.studio.crane import copied, groups
-from canshaper.studio.events import Events
 from canshaper.studio.server import build_app, listening, server
 from canshaper.studio.stage import SHAPED, Stage
+from canshaper.studio.words import Events
 from canshaper_sim.crane import CraneParameters
 from tests.studio.browser import NoBrowserError, browser, opened
 

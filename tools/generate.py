@@ -15,12 +15,12 @@ import canshaper.config.schema  # noqa: F401  (its classes are the sections)
 from canshaper.checksums.kinds import checksum_table
 from canshaper.cli.verbs.config_schema import filter_table
 from canshaper.codec.frame import FrameFault
-from canshaper.commissioning.procedure.step import FILE
+from canshaper.commissioning.procedure.state import FILE
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.config.protection import PROFILES
 from canshaper.config.section import Section
 from canshaper.config.uncertainty import MEASURES
-from canshaper.controller.counters import Counters
+from canshaper.controller.outputs import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions

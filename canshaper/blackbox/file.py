@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from canshaper.blackbox.records import SIZE
-from canshaper.blackbox.ring import BLOCK, MOST_BLOCKS, Segment
+from canshaper.blackbox.ring import BLOCK, MOST_BLOCKS, SIZE, Segment
 from canshaper.errors import BoxError
 
 SUFFIX = ".blackbox"
@@ -29,7 +28,7 @@ class BoxSegment(NamedTuple):
         begin_ns: by the clock of the daemon, which counts from the start of its PC.
         follows: whether nothing is missing between the one before and this one.
         state: of the controller at its begin.
-        records: what happened then, see ``canshaper.blackbox.records``.
+        records: what happened then, see ``canshaper.blackbox.ring``.
     """
 
     begin_ns: int

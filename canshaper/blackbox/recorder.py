@@ -3,8 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 
-from canshaper.blackbox.records import CHUNK, Kind
-from canshaper.blackbox.ring import Ring
+from canshaper.blackbox.ring import CHUNK, Kind, Ring
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
@@ -12,7 +11,7 @@ from canshaper.controller.guarded import Guarded
 # Members of an enumeration cost a look-up each.
 TICK, RX, TX = int(Kind.TICK), int(Kind.RX), int(Kind.TX)
 
-# kind, frame, number, time in ns; see canshaper.blackbox.records
+# kind, frame, number, time in ns; see canshaper.blackbox.ring
 Call = tuple[int, Frame | None, int, int]
 
 

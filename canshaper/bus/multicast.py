@@ -11,7 +11,7 @@ import struct
 import can
 from can.interfaces.udp_multicast.bus import GeneralPurposeUdpMulticastBus, UdpMulticastBus
 
-from canshaper.bus.arrival import SO_TIMESTAMPNS
+from canshaper.bus.packet import SO_TIMESTAMPNS
 
 LOOPBACK = "lo"
 PORT = 43113  # that of python-can

@@ -1,11 +1,33 @@
-"""What a socket of SocketCAN carries: the structures can_frame and canfd_frame of linux/can.h."""
+"""One received packet: its frame, its arrival, the clock that stamps it, errors that it reports."""
 
+import socket
 import struct
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import NamedTuple, Self
 
-from canshaper.codec.can_id import EFF_FLAG, ERR_FLAG, RTR_FLAG, SFF_MASK, id_of
-from canshaper.codec.frame import Frame, new_frame
+from canshaper.codec.frame import (
+    EFF_FLAG,
+    ERR_FLAG,
+    RTR_FLAG,
+    SFF_MASK,
+    BusState,
+    Frame,
+    FrameFault,
+    id_of,
+    new_frame,
+)
+
+# Time since the machine was booted, ns. No one can set it, and unlike CLOCK_MONOTONIC it goes on
+# while the machine is suspended: an age, and a standstill of the loop, includes that time. Other
+# systems than Linux only simulate a machine, and there any clock that runs forward serves.
+boottime_ns: Callable[[], int] = (
+    partial(time.clock_gettime_ns, time.CLOCK_BOOTTIME)
+    if hasattr(time, "CLOCK_BOOTTIME")
+    else time.monotonic_ns
+)
+
 
 CAN_FRAME = struct.Struct("=IB3x8s")
 SIZE = CAN_FRAME.size
@@ -73,3 +95,87 @@ def frame_of(bus: str, packet: bytes) -> Frame | None:
 def kernel_ids(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
     """The kernel's ids of messages: id, and whether it has 29 bits."""
     return frozenset(i | EFF_FLAG if extended else i for i, extended in messages)
+
+
+SO_TIMESTAMPNS = 35  # asm/socket.h; Python has no name for it
+_STAMP = struct.Struct("@ll")  # struct timespec of this machine
+ANCILLARY_BYTES = 64  # room for one stamp with its header: CMSG_SPACE, which only POSIX has, is 32
+
+
+def stamp_ns(ancillary: Iterable[tuple[int, int, bytes]]) -> int | None:
+    """Arrival of a frame by the wall clock, ns; None where the kernel gave none.
+
+    Args:
+        ancillary: what ``recvmsg`` returned, of a socket with SO_TIMESTAMPNS.
+    """
+    for level, kind, value in ancillary:
+        if kind == SO_TIMESTAMPNS and level == socket.SOL_SOCKET and len(value) == _STAMP.size:
+            seconds, ns = _STAMP.unpack(value)
+            return int(seconds) * 1_000_000_000 + int(ns)
+    return None
+
+
+class Arrivals:
+    """Arrivals of the frames of one port, ns by ``boottime_ns``; never younger than they are.
+
+    A frame arrived after the port was last seen empty, and before it is read. A wall clock that
+    is set in between makes one of two offsets wrong, the one of then or the one of now: the one
+    that makes the frame older is used.
+    """
+
+    def __init__(self) -> None:
+        self._empty_ns = self._empty_offset_ns = 0
+        self.begin()
+        self.emptied()
+
+    def begin(self) -> int:
+        """A read of the port begins.
+
+        Returns:
+            Earliest arrival of what is read: when the port was last seen empty.
+        """
+        # In this order: a standstill between the two makes frames older, not younger.
+        self._now_ns = boottime_ns()
+        self._now_offset_ns = self._now_ns - time.time_ns()
+        self._offset_ns = min(self._now_offset_ns, self._empty_offset_ns)
+        return self._empty_ns
+
+    def of(self, ancillary: Sequence[tuple[int, int, bytes]]) -> int:
+        """Arrival of a frame that this read has found; the earliest where it has no stamp.
+
+        Args:
+            ancillary: what ``recvmsg`` returned, of a socket that carries nothing but stamps.
+        """
+        try:
+            seconds, ns = _STAMP.unpack(ancillary[0][2])
+        except (IndexError, struct.error):
+            return self._empty_ns
+        arrived_ns: int = seconds * 1_000_000_000 + ns + self._offset_ns
+        if arrived_ns > self._now_ns:
+            return self._now_ns
+        return arrived_ns if arrived_ns > self._empty_ns else self._empty_ns
+
+    def emptied(self) -> None:
+        """Nothing waits in the port: what comes later arrived after this read began."""
+        self._empty_ns, self._empty_offset_ns = self._now_ns, self._now_offset_ns
+
+
+CLASS_CONTROLLER, CLASS_BUS_OFF, CLASS_RESTARTED = 0x4, 0x40, 0x100
+OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
+
+
+def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
+    """The fault to count, and the state in which the bus is; None where it says nothing of that.
+
+    Args:
+        word: id of the frame, with its flags.
+        payload: its 8 bytes.
+    """
+    controller = payload[1] if word & CLASS_CONTROLLER else 0
+    if word & CLASS_BUS_OFF:
+        return FrameFault.BUS_OFF, BusState.BUS_OFF
+    if controller & PASSIVE:
+        return FrameFault.BUS_PASSIVE, BusState.PASSIVE
+    if word & CLASS_RESTARTED or controller & (ACTIVE | WARNING):  # less than passive
+        return FrameFault.ERROR_FRAME, BusState.UP
+    return FrameFault.FRAMES_LOST if controller & OVERFLOW else FrameFault.ERROR_FRAME, None

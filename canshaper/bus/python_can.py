@@ -9,12 +9,12 @@ from typing import Any
 
 import can
 
-from canshaper.bus.arrival import Arrivals
 from canshaper.bus.multicast import LocalMulticastBus, receive_one_group
+from canshaper.bus.packet import Arrivals
 from canshaper.bus.raw import MOST_FRAMES
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.machine.interface_options import ALWAYS_FD
+from canshaper.machine.buses import ALWAYS_FD
 from canshaper.machine.routing import BusRoutes
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.

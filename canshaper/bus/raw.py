@@ -10,23 +10,23 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
-from canshaper.bus.error_frame import read_error
 from canshaper.bus.packet import (
+    ANCILLARY_BYTES,
     BRS,
     CAN_FRAME,
     FD_FRAME,
     FD_SIZE,
     FDF,
     SIZE,
+    SO_TIMESTAMPNS,
     WORD,
+    Arrivals,
     frame_of,
     kernel_ids,
+    read_error,
 )
-from canshaper.bus.socketcan import dropped_frames, readable, set_filters
-from canshaper.bus.under_way import UnderWay
-from canshaper.codec.can_id import EFF_FLAG, ERR_FLAG
-from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.bus.socketcan import UnderWay, dropped_frames, readable, set_filters
+from canshaper.codec.frame import EFF_FLAG, ERR_FLAG, BusState, Frame, FrameFault
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 

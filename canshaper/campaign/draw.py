@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from canshaper.campaign.faults import Fault, bus_fault, sensor_fault
-from canshaper.campaign.operators import OPERATORS, Draw
+from canshaper.campaign.operators import OPERATORS, Draw, Fault, bus_fault, sensor_fault
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError

@@ -9,8 +9,7 @@ from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
 from canshaper.design.lockstep import Simulation, driven_part
 from canshaper.machine.deployment import Deployment
-from canshaper.report.crane_metrics import crane_metrics
-from canshaper.report.stroke_metrics import dip
+from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
 from canshaper_sim.axes import LIFT, SLEW
 from canshaper_sim.crane import CraneParameters, CraneState

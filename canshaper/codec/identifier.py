@@ -1,12 +1,8 @@
-"""Identifiers as the protocols read them: 29 bits in J1939, 11 bits in CANopen.
+"""Identifiers of frames: as they are written, of CANopen, of J1939."""
 
-One of J1939 is priority (3 bits), data page and extended data page (2), PDU format PF (8), PDU
-specific PS (8), source address SA (8). Below PF 240 PS is the destination, from 240 on a part of
-the group (SAE J1939-21). Here a *group* is an identifier without priority and source, and without
-destination where there is one.
+from enum import IntEnum
 
-One of CANopen is function code (4 bits) and node id (7), in the predefined set (CiA 301).
-"""
+from canshaper.config.bus import J1939Name
 
 GLOBAL = 0xFF  # as destination: everybody
 NULL = 0xFE  # as source: a node without an address; in DBC files: any
@@ -82,3 +78,86 @@ SERVICES = (
 def service_of(can_id: int) -> str | None:
     """Service that an identifier of 11 bits belongs to; None where that is no such one."""
     return next((name for base, mask, name in SERVICES if can_id & mask == base), None)
+
+
+START = 1  # NMT command: go to operational
+NO_EMERGENCY = 0x0000
+GENERIC_ERROR = 0x1000
+
+STATE_MASK = 0x7F
+"""Of a heartbeat; the bit above is that of node guarding."""
+
+
+class NodeState(IntEnum):
+    """State of a node in its heartbeat."""
+
+    BOOT_UP = 0
+    STOPPED = 4
+    OPERATIONAL = 5
+    PRE_OPERATIONAL = 127
+
+
+class ValveState(IntEnum):
+    """Low four bits of the control word that asks for a state, and of the status word in it."""
+
+    INIT = 0x8
+    DISABLED = 0x9
+    HOLD = 0xB
+    ACTIVE = 0xF
+
+
+STATE_BITS = 4
+"""Of control and status word."""
+READY_BIT = 0x8
+"""Of the status word; a valve that has a fault clears it."""
+RESET_FAULT = 0x3
+"""Control word that resets a fault."""
+
+
+REQUEST = 0xEA00  # PGN 59904
+CLAIMED = 0xEE00  # PGN 60928, address claimed or cannot claim
+ACKNOWLEDGE = 0xE800  # PGN 59392
+TRANSPORT = 0xEC00  # PGN 60416, connection management
+TRANSPORT_DATA = 0xEB00  # PGN 60160
+DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
+
+
+def claims_of(address: int) -> list[int]:
+    """Identifiers of what a node says about its address: that it claims it, or cannot."""
+    return [identifier(CLAIMED, source) for source in (address, NULL)]
+
+
+def sent_by(address: int) -> list[int]:
+    """Identifiers of what a node sends besides its claims, commands and status."""
+    low = LOWEST_PRIORITY
+    return [
+        identifier(ACKNOWLEDGE, address),
+        identifier(DM1, address),
+        identifier(TRANSPORT, address, priority=low),
+        identifier(TRANSPORT_DATA, address, priority=low),
+    ]
+
+
+def name_bytes(name: J1939Name) -> bytes:
+    """The NAME as it is sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
+
+    The bit for a node that may choose another address stays 0: our address is the one that
+    valves are set to listen to.
+    """
+    fields = (
+        (name.identity_number, 21),
+        (name.manufacturer_code, 11),
+        (name.ecu_instance, 3),
+        (name.function_instance, 5),
+        (name.function, 8),
+        (0, 1),
+        (name.vehicle_system, 7),
+        (name.vehicle_system_instance, 4),
+        (name.industry_group, 3),
+        (0, 1),
+    )
+    value = at = 0
+    for number, bits in fields:
+        value |= number << at
+        at += bits
+    return value.to_bytes(8, "little")

@@ -4,8 +4,7 @@ from canshaper.config.source import Source
 from canshaper.errors import Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import unfit
-from canshaper.machine.origin import rehearsed
-from canshaper.machine.stopping import unstated
+from canshaper.machine.stopping import rehearsed, unstated
 
 
 def doubts(deployment: Deployment) -> list[Problem]:

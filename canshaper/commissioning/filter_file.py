@@ -8,15 +8,16 @@ from typing import Any
 from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
-from canshaper.edit.edit import set_values
-from canshaper.edit.flow import Value
+from canshaper.edit.edit import FileValue, set_values
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
 
 
-def write_section(path: Path, place: Place, values: Mapping[str, Value], comment: str) -> list[str]:
+def write_section(
+    path: Path, place: Place, values: Mapping[str, FileValue], comment: str
+) -> list[str]:
     """Write values into a section of the file, and a comment; see ``set_values``.
 
     Returns:
@@ -34,7 +35,7 @@ def write_section(path: Path, place: Place, values: Mapping[str, Value], comment
 def write_filter(
     deployment: Deployment,
     axis: str,
-    filter_values: Mapping[str, Value],
+    filter_values: Mapping[str, FileValue],
     tail_s: float | None,
     verb: str,
 ) -> list[str]:
@@ -78,8 +79,8 @@ def write_filter(
 
 
 def _with_origin(
-    config: AxisConfig, filter_values: Mapping[str, Value], verb: str
-) -> dict[str, Value]:
+    config: AxisConfig, filter_values: Mapping[str, FileValue], verb: str
+) -> dict[str, FileValue]:
     """The same with the origin of the design."""
     designed_for = filter_values["designed_for"]
     assert isinstance(designed_for, Mapping)
@@ -89,7 +90,7 @@ def _with_origin(
     return {**filter_values, "designed_for": {**designed_for, "origin": made}}
 
 
-def _set_checked(path: Path, place: Place, values: Mapping[str, Value], comment: str) -> None:
+def _set_checked(path: Path, place: Place, values: Mapping[str, FileValue], comment: str) -> None:
     """Write values; where the file is no good deployment with them it is as it was."""
     before = path.read_bytes()
     set_values(path, place, values, comment)

@@ -11,13 +11,13 @@ from canshaper.commissioning.filter_file import write_filter
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import Filter, designed, filter_of
 from canshaper.config.section import shortened
-from canshaper.design.swinging import swinging_axis
+from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.evaluate import Evaluation, Machine, evaluate
 from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual
 from canshaper.design.tuning.robust import RobustShaper, least_residual, shortest
 from canshaper.errors import DesignError, UsageError
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
 from canshaper.report.console import new_table
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sway import SwayMode

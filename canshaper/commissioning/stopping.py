@@ -15,9 +15,9 @@ from canshaper.config.filters import Filter, Profile
 from canshaper.config.schema import AxisConfig
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.joystick import JoystickInput
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import FullSpeed, full_speed, stop_fault
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.stopping import Travel, allowed_s, travel
 
 # Of a proportional valve with a first-order lag: that of the simulated crane, typical of pilot

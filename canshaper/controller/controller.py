@@ -6,18 +6,13 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.controller.counters import Counters
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.inputs import MachineInputs, received_by
+from canshaper.controller.inputs import MachineInputs, parts, received_by
 from canshaper.controller.motion import motion_runners
-from canshaper.controller.outputs import ValveOutputs
-from canshaper.controller.overrun import OverrunDetector
-from canshaper.controller.parts import parts
+from canshaper.controller.outputs import Counters, OverrunDetector, ValveOutputs
 from canshaper.controller.runner import AxisRunner
-from canshaper.controller.sensor_report import SensorReport
-from canshaper.controller.status import StatusMessages
-from canshaper.inputs.carry_over import Key, Part, carry_over
-from canshaper.inputs.input import EnableGate
+from canshaper.controller.status import SensorReport, StatusMessages
+from canshaper.inputs.input import EnableGate, Key, Part, carry_over
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols

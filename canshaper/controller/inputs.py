@@ -1,16 +1,23 @@
 """The inputs of a deployment: what receives each of its messages."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 
-from canshaper.inputs.input import EmergencyStopInput, MessageInput, Switch, SwitchInput
+from canshaper.codec.sent import Sender
+from canshaper.controller.runner import AxisRunner
+from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
-from canshaper.inputs.profile import ProfileButtons, ProfileChoice, ProfileSwitch, profile_names
-from canshaper.inputs.radius import radius_input
 from canshaper.inputs.sway_sensor import SwaySensorInput
-from canshaper.inputs.value import ValueInput
+from canshaper.inputs.value import (
+    ProfileButtons,
+    ProfileChoice,
+    ProfileSwitch,
+    ValueInput,
+    profile_names,
+    radius_input,
+)
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundValue, Choosing
-from canshaper.protocols.interface import MessageKey
+from canshaper.protocols.interface import BusProtocol, MessageKey
 
 BoundHandler = tuple[BoundInput, MessageInput]
 
@@ -96,3 +103,41 @@ class MachineInputs:
 def received_by(bound: Iterable[BoundHandler]) -> dict[MessageKey, MessageInput]:
     """What receives each message that is known by its identifier."""
     return {key: one for message, one in bound if not message.any_source for key in message.keys}
+
+
+def parts(
+    deployment: Deployment,
+    senders: Iterable[Sender],
+    inputs: Mapping[tuple[str, int, bool], Part],
+    axes: Mapping[str, AxisRunner],
+    protocols: Iterable[BusProtocol],
+) -> dict[Key, Part]:
+    """Every part by its key.
+
+    A bus is known by interface and channel, a message by its id, whatever the file calls them. An
+    axis that is renamed is still that of its valve.
+
+    Args:
+        deployment: the machine.
+        senders: what sends each message.
+        inputs: what receives a message, by bus and id.
+        axes: the axes by name.
+        protocols: those of the machine.
+    """
+    places = {n: (bus.interface, bus.channel) for n, bus in deployment.config.buses.items()}
+
+    def by_key() -> Iterator[tuple[Key, Part]]:
+        for (bus, *message), entry in inputs.items():
+            yield ("input", *places[bus], *message), entry
+        for sender in senders:
+            bus, *message = sender.key
+            yield ("sender", *places[bus], *message), sender.protector
+        for name, runner in axes.items():
+            bus, *message = runner.valve.key
+            signal = runner.bound.config.valve.signal
+            yield ("valve", *places[bus], *message, signal), runner
+            yield ("axis", name), runner
+        for protocol in protocols:
+            yield from protocol.parts(places)
+
+    return dict(by_key())

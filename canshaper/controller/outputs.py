@@ -1,8 +1,9 @@
 """The valve messages: which axes command each, and what becomes of a frame that does not leave."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Self
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.sent import Sender
 from canshaper.controller.runner import AxisRunner
 from canshaper.protocols.interface import ForwardingRule, MessageKey
@@ -91,3 +92,73 @@ class ValveOutputs:
             except Exception as error:
                 errors.append(error)
         return frames
+
+
+class Counters:
+    """What went wrong so far, by the signal names of the status message."""
+
+    __slots__ = ("last_fault", "values")
+
+    SIGNAL_OF = {  # noqa: RUF012  (a constant table)
+        FrameFault.WRONG_LENGTH: "WrongLength",
+        FrameFault.UNKNOWN_ID: "UnknownId",
+        FrameFault.ERROR_FRAME: "ErrorFrames",
+        FrameFault.INVALID_SIGNAL: "InvalidSignals",
+        FrameFault.SEND_FAILED: "SendFailures",
+        FrameFault.MISSED_DEADLINE: "MissedDeadlines",
+        FrameFault.CHECKSUM: "InvalidSignals",
+        FrameFault.COUNTER_REPEATED: "InvalidSignals",
+        FrameFault.COUNTER_JUMP: "InvalidSignals",
+        FrameFault.BUS_OFF: "ErrorFrames",
+        FrameFault.BUS_PASSIVE: "ErrorFrames",
+        FrameFault.NOT_CONFIRMED: "SendFailures",
+    }
+
+    def __init__(self) -> None:
+        self.values = dict.fromkeys(self.SIGNAL_OF.values(), 0)
+        self.last_fault = FrameFault.NONE
+
+    def add(self, fault: FrameFault, count: int = 1) -> None:
+        """Count a fault and remember it as the last one."""
+        self.last_fault = fault
+        signal = self.SIGNAL_OF.get(fault)
+        if signal is not None:
+            self.values[signal] += count
+
+    def status(self) -> dict[str, int]:
+        """Values of the status message."""
+        return {**self.values, "LastFault": int(self.last_fault)}
+
+
+# A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
+# than one in six for long, are an overrun; it ends with the count at 0, after 50 punctual ticks.
+LATE_WEIGHT = 5
+LATE_LIMIT = 50
+
+
+class OverrunDetector:
+    """Counts late ticks against punctual ones.
+
+    Attributes:
+        late: the count; with 0 a punctual tick changes nothing.
+    """
+
+    __slots__ = ("_overrun", "late")
+
+    def __init__(self) -> None:
+        self.late = 0
+        self._overrun = False
+
+    def copy_state(self, before: Self) -> None:
+        """Continue where another one has ended."""
+        self.late, self._overrun = before.late, before._overrun
+
+    def tick(self, *, late: bool) -> bool:
+        """Whether there is an overrun now; asked of every tick while ``late`` is not 0."""
+        if late:
+            self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
+            self._overrun |= self.late == LATE_LIMIT
+        else:
+            self.late -= 1
+            self._overrun &= self.late > 0
+        return self._overrun

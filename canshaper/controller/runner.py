@@ -12,10 +12,9 @@ from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
-from canshaper.inputs.profile import ProfileChoice
 from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
-from canshaper.inputs.value import ValueInput
-from canshaper.machine.bound_axis import BoundAxis
+from canshaper.inputs.value import ProfileChoice, ValueInput
+from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper

@@ -5,13 +5,17 @@ from collections.abc import Mapping, Sequence
 
 from canshaper.config.filters import Profile
 from canshaper.config.schema import AxisConfig
-from canshaper.inputs.profile import ProfileChoice
-from canshaper.inputs.value import ValueInput
-from canshaper.machine.bound_axis import BoundAxis
+from canshaper.inputs.value import ProfileChoice, ValueInput
 from canshaper.machine.filters import parameter_sets
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
+from canshaper.shaping.registry import (
+    STEPS_BETWEEN,
+    ParameterSet,
+    at_position,
+    build_shaper,
+    position,
+)
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.sway import SwayModel
 

@@ -9,7 +9,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
-from canshaper.bus.clock import boottime_ns
+from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
@@ -19,9 +19,9 @@ from canshaper.controller.guarded import Guarded
 from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.gateway import InlineGateway
-from canshaper.daemon.io_cycle import io_cycle
+from canshaper.daemon.io_cycle import Standstill, io_cycle
 from canshaper.daemon.loop import run_at_deadlines
-from canshaper.daemon.notify import ServiceManager
+from canshaper.daemon.notify import Collector, ServiceManager, lock_memory, refuse_huge_pages
 from canshaper.daemon.ports import (
     close_ports,
     new_ports,
@@ -30,10 +30,8 @@ from canshaper.daemon.ports import (
     send_neutral,
     waiting,
 )
-from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.reloads import Reloads
 from canshaper.daemon.reporter import Reporter, flush
-from canshaper.daemon.standstill import Standstill
 from canshaper.errors import BusError, InternalError, raised
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256

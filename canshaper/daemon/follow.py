@@ -9,7 +9,7 @@ import logging
 
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.following import follow_fault
+from canshaper.machine.joysticks import follow_fault
 
 log = logging.getLogger("canshaper")
 

@@ -15,12 +15,11 @@ from canshaper.bus.raw import GONE, REOPEN_NS
 from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
-from canshaper.daemon.io_cycle import FrameProcessor, receive_waiting
-from canshaper.daemon.standstill import Standstill
+from canshaper.daemon.io_cycle import FrameProcessor, Standstill, receive_waiting
 from canshaper.errors import BusError, GatewayError, WrongDeviceError
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import Rule, between, difference, rules
-from canshaper.protocols.gateway.passing import Pattern
+from canshaper.protocols.gateway.forwarding import Pattern
 from canshaper.protocols.gateway.rules import excluded, passing_rules
 
 log = logging.getLogger("canshaper")

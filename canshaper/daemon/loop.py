@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from canshaper.bus.clock import boottime_ns
+from canshaper.bus.packet import boottime_ns
 
 
 def run_at_deadlines(

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Mapping
 
-from canshaper.bus.clock import boottime_ns
+from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, FrameFault
 from canshaper.controller.controller import Controller

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from threading import current_thread, main_thread
 from typing import Generic, TypeVar
 
-from canshaper.design.children import end_with_parent
+from canshaper.design.processes import end_with_parent
 from canshaper.errors import CampaignError
 
 # A piece whose process dies so often is what kills it.

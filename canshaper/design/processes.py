@@ -1,8 +1,11 @@
 """Operator, daemon and plant as three processes on a bus, with a listener that records."""
 
+import ctypes
 import os
 import select
+import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -10,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from canshaper.bus.port import Port
-from canshaper.design.children import canshaper_command
 from canshaper.errors import BusError, DriveError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.cranes import cranes
@@ -19,6 +21,43 @@ from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.realtime import open_ports
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import Recording
+
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+_CODE = f"""
+import os, signal, sys
+from {__name__} import end_with_parent
+end_with_parent(signal.SIGTERM)
+if os.getppid() != int(sys.argv.pop(1)):
+    sys.exit(1)
+from canshaper.__main__ import main
+main()
+"""
+
+
+def end_with_parent(how: signal.Signals) -> None:
+    """Have the kernel send this process a signal when its parent ends (prctl(2)).
+
+    A parent that ended before the call is not seen: the caller looks for it afterwards.
+    Only Linux has it; elsewhere nothing is done.
+
+    Args:
+        how: the signal.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, how)
+
+
+def canshaper_command(*words: str) -> list[str]:
+    """Command line of ``canshaper`` as a child of this process.
+
+    It gets SIGTERM when this process ends without ending it: a daemon leaves the valves neutral.
+
+    Args:
+        words: the verb, its arguments and options.
+    """
+    return [sys.executable, "-c", _CODE, str(os.getpid()), *words]
+
 
 __all__ = ["BusDrive", "Crew", "DriveError", "Transport", "choose_transport", "drive_on_bus"]
 

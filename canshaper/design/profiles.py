@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from canshaper.config.limits import Sway
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
 from canshaper.errors import DesignError
-from canshaper.inputs.profile import OWN, profile_names
+from canshaper.inputs.value import OWN, profile_names
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
 from canshaper.report.metrics import AxisMetrics, axis_metrics
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import Script, Stroke
@@ -89,3 +91,18 @@ def _press(deployment: Deployment, axis: str, name: str, length_pct: int) -> Axi
     script = Script("press", (Stroke(axis, *_PRESS),), _DRIVE_S)
     recording = drive(deployment, script, parameters=crane, prepare=choose)
     return axis_metrics(recording, axis)
+
+
+def swinging_axis(deployment: Deployment, name: str) -> tuple[BoundAxis, Sway]:
+    """An axis and its sway data.
+
+    Raises:
+        DesignError: there is no such axis, or it has none; names those that have.
+    """
+    bound = deployment.axes.get(name)
+    sway = bound.config.sway if bound else None
+    if bound is None or sway is None:
+        fault = "no sway data" if bound else "no such axis"
+        having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway) or "none here"
+        raise DesignError(f"axis {name}: expected one with sway data, {having}, got {fault}")
+    return bound, sway

@@ -6,22 +6,68 @@ no moment is there a half-written file, and a file that cannot be changed stays 
 """
 
 import copy
+import json
 import os
+import re
 import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from canshaper.config.adjust import Key
 from canshaper.config.load import load_config
+from canshaper.config.section import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source, read_bounded
-from canshaper.edit.flow import Value, flow, read_back
 from canshaper.edit.spans import Edit
 from canshaper.errors import ConfigError, Problem
 
+# Text that is read as itself: a path, a word, several, a run of numbers, a date.
+_PLAIN = re.compile(
+    r"(?!(?i:true|false|null)$)(?:\.*/)*[^\W\d][\w./+-]*( [\w./+-]+)*"
+    rf"|{RUN}|\d{{4}}-\d\d-\d\d"
+)
 
-def set_values(path: Path, place: Place, values: Mapping[str, Value], note: str = "") -> None:
+FileValue = float | str | Sequence[float | str] | Mapping[str, Any] | None
+"""A value to write: a number, a text, a list of numbers and of runs of them (``39 x 0``), or
+such values by their keys; None takes the key away."""
+
+
+def plain(text: str) -> str:
+    """A text as it stands in YAML: in quotes where it could be read as something else."""
+    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)  # YAML too
+
+
+def flow(value: float | str | Sequence[float | str] | Mapping[str, Any]) -> str:
+    """A value on one line; of a number the shortest decimal form that is read back as it is."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key}: {flow(one)}' for key, one in value.items())} }}"
+    if not isinstance(value, str | int | float):
+        return f"[{', '.join(flow(v) for v in value)}]"
+    if isinstance(value, int):
+        return str(value).lower()  # true and false too
+    if isinstance(value, str):
+        return plain(value)
+    text = repr(float(value))
+    if "e" in text:
+        text = f"{value:.12f}".rstrip("0")
+    return text
+
+
+def read_back(value: Any) -> Any:
+    """A value as it is read where it was written by ``flow``."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Mapping):
+        return {key: read_back(one) for key, one in value.items()}
+    if isinstance(value, Sequence):
+        return [read_back(one) for one in value]
+    return yaml.safe_load(flow(value))
+
+
+def set_values(path: Path, place: Place, values: Mapping[str, FileValue], note: str = "") -> None:
     """Write values into a section of a deployment file.
 
     Keys that are there get the new value, keys that are not are put in, keys with None are taken
@@ -49,7 +95,7 @@ def set_values(path: Path, place: Place, values: Mapping[str, Value], note: str 
 
 
 def edited(
-    text: str, place: Place, values: Mapping[str, Value], name: str = "", note: str = ""
+    text: str, place: Place, values: Mapping[str, FileValue], name: str = "", note: str = ""
 ) -> str:
     """Return the text of a YAML file with values of one section changed; see ``set_values``.
 
@@ -71,7 +117,7 @@ def edited(
     return edit.text()
 
 
-def _expected(data: Any, place: Place, values: Mapping[str, Value]) -> Any:
+def _expected(data: Any, place: Place, values: Mapping[str, FileValue]) -> Any:
     """Data of the file as it has to be afterwards."""
     result = copy.deepcopy(data)
     section = result

@@ -6,14 +6,16 @@ from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.enable import slowest_ms
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.filters import check_filters
-from canshaper.machine.inputs import bind_feedback, bind_status_word
+from canshaper.machine.identity import bind_status
+from canshaper.machine.inputs import (
+    bind_feedback,
+    bind_status_word,
+)
 from canshaper.machine.lookup import Lookup
-from canshaper.machine.statuses import bind_status
 from canshaper.machine.stopping import stated_fault
 from canshaper.machine.sway_sensor import bind_sway_sensors
-from canshaper.machine.valves import SharedValves, bind_valve
+from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 
 def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:

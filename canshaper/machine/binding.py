@@ -14,16 +14,18 @@ from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.diagnostics import Diagnostics
-from canshaper.machine.enable import bind_switches, check_conditions
 from canshaper.machine.filters import check_control, check_profiles
-from canshaper.machine.following import check_following
-from canshaper.machine.identity import Identity, filter_lines
+from canshaper.machine.identity import Identity, bind_status, filter_lines
 from canshaper.machine.inputs import BoundValue, Choosing, bind_emergency_stop, bind_switch
-from canshaper.machine.joysticks import bind_joystick
+from canshaper.machine.joysticks import (
+    bind_joystick,
+    bind_switches,
+    check_conditions,
+    check_following,
+)
 from canshaper.machine.lookup import Lookup, load_messages, protected_sections
 from canshaper.machine.motion import bind_motions
 from canshaper.machine.named_codes import values_of_schedules
-from canshaper.machine.statuses import bind_status
 
 
 def load_deployment(path: Path, inside: Path | None = None) -> Deployment:

@@ -8,18 +8,12 @@ from pathlib import Path
 
 from cantools.database.can import Message
 
-from canshaper.codec.can_id import EFF_FLAG
+from canshaper.codec.frame import EFF_FLAG
 from canshaper.codec.layout import is_j1939, layout_fault
 from canshaper.config.source import read_bounded
 from canshaper.errors import MOST_PROBLEMS, Problem, there_are
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
-from canshaper.machine.dbc_text import (
-    MOST_MESSAGES,
-    MOST_STATEMENTS,
-    WIDE_ID,
-    Entry,
-    dbc_text,
-)
+from canshaper.machine.dbc_text import MOST_MESSAGES, MOST_STATEMENTS, WIDE_ID, Entry, dbc_text
 
 # Of all DBC files of a deployment: five times those of a machine.
 MOST_BYTES = 16 << 20

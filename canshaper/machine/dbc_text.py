@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, SFF_MASK
+from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.machine.dbc_signals import signals_fault
 
 # Of all DBC files of a deployment: several times those of a machine.

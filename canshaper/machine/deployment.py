@@ -13,15 +13,15 @@ from canshaper.codec.status import StatusCodec
 from canshaper.config.inputs import Input
 from canshaper.config.schema import DeploymentConfig, EmergencyStop
 from canshaper.config.source import Source
-from canshaper.machine.bound_axis import BoundAxis
-from canshaper.machine.bus_load import BusLoad, bus_load
+from canshaper.machine.buses import BusLoad, bus_load
 from canshaper.machine.database import Messages
-from canshaper.machine.enable import BoundSwitches
 from canshaper.machine.identity import Identity
 from canshaper.machine.inputs import Bound, BoundJoystick, BoundValue, Choosing
+from canshaper.machine.joysticks import BoundSwitches
 from canshaper.machine.motion import BoundMotion
 from canshaper.machine.routing import Key, Routing, build_routing
 from canshaper.machine.used_message import NamedCode
+from canshaper.machine.valves import BoundAxis
 
 
 @dataclass(frozen=True)

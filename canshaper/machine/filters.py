@@ -10,8 +10,7 @@ from canshaper.config.schema import AxisConfig, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.lookup import Lookup
-from canshaper.shaping.registry import KINDS, build_shaper
-from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position
+from canshaper.shaping.registry import KINDS, STEPS_BETWEEN, ParameterSet, at_position, build_shaper
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 

@@ -1,14 +1,111 @@
 """Joysticks of a deployment, bound to the DBC: the velocities that the axes take from them."""
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
-from canshaper.codec.signals import VelocitySignal, magnitude_range, symmetrical_range
-from canshaper.config.enable import conditions
-from canshaper.config.schema import Command, Joystick, Scaling
+from canshaper.codec.signals import (
+    VelocitySignal,
+    find_signal,
+    magnitude_range,
+    raw_limits,
+    symmetrical_range,
+)
+from canshaper.config.enable import conditions, named_by
+from canshaper.config.inputs import Input, Switch
+from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
 from canshaper.config.source import Place
-from canshaper.machine.enable import signals_of
-from canshaper.machine.inputs import BoundJoystick, bind_input
+from canshaper.machine.diagnostics import Diagnostics
+from canshaper.machine.inputs import Bound, BoundJoystick, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
+
+# What of a section is about its message: the same for every switch in it.
+_OF_MESSAGE = tuple(Input.model_fields)
+
+
+@dataclass(frozen=True)
+class BoundSwitches(Bound[Switch]):
+    """A message with switches.
+
+    Attributes:
+        switches: signal and raw value that agrees, by name of the switch.
+    """
+
+    switches: Mapping[str, tuple[str, int]]
+
+
+def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
+    """Signals of the message of a joystick that enable any, each once, with who names it first."""
+    seen: set[str] = set()
+    for owner, section in lookup.config.joysticks.items():
+        for i, condition in enumerate(named_by(lookup.config, owner)):
+            if condition.joystick == joystick and condition.name not in seen:
+                seen.add(condition.name)
+                yield _place(section.enable, owner, i), condition.name
+
+
+def check_conditions(lookup: Lookup) -> None:
+    """Names in the lists that are none."""
+    config, add = lookup.config, lookup.diagnostics.add
+    for name, section in config.joysticks.items():
+        if (of := section.enable_of) is not None:
+            names = [n for n, one in config.joysticks.items() if one.enable is not None]
+            if of not in names:
+                text = f"expected a joystick with enable, got {of!r}; there are {', '.join(names)}"
+                add(("joysticks", name, "enable_of"), text)
+        for i, text in enumerate(section.enable or ()):
+            joystick, dot, _ = text.partition(".")
+            place = _place(section.enable, name, i)
+            if dot and joystick not in config.joysticks:
+                names = list(config.joysticks)
+                add(place, f"expected a joystick, got {joystick!r}; there are {', '.join(names)}")
+            if text in (section.enable or ())[:i]:
+                add(place, f"expected each switch once, got {text!r} again")
+
+
+def bind_switches(lookup: Lookup) -> list[BoundSwitches]:
+    """Every message with switches."""
+    readers: dict[tuple[str, str], dict[str, Switch]] = {}
+    config, add = lookup.config, lookup.diagnostics.add
+    needed = {c for joystick in config.joysticks for c in conditions(config, joystick)}
+    for name, switch in config.switches.items():
+        readers.setdefault((switch.bus, switch.message), {})[name] = switch
+        if (None, name) not in needed:
+            add(("switches", name), f"expected a joystick that {name} enables, got none")
+    return [one for switches in readers.values() if (one := _bind(lookup, switches))]
+
+
+def _bind(lookup: Lookup, switches: dict[str, Switch]) -> BoundSwitches | None:
+    """The switches of one message."""
+    first, *others = switches
+    config = switches[first]
+    for other in others:
+        text = f"switches.{first}, which reads the message too"
+        place = ("switches", other)
+        lookup.diagnostics.check_same(place, switches[other], _OF_MESSAGE, config, text)
+    result = bind_input(lookup, ("switches", first), config, ("signal",))
+    if result is None:
+        return None
+    used, bound = result
+    check_source(used, "a switch")
+    for other in others:
+        used.integer(("switches", other, "signal"), switches[other].signal, f"switch {other}")
+    for name, one in switches.items():
+        agrees, at = {one.code: f"{name} agrees"}, ("switches", name, "signal")
+        used.check_switch(at, one.signal, agrees, f"{name} does not agree")
+        signal = find_signal(bound.message, one.signal)
+        if signal and one.code > (largest := raw_limits(signal)[1]):
+            text = f"expected up to {largest}, of {signal.length} bits of {signal.name}"
+            lookup.diagnostics.add(("switches", name, "code"), f"{text}, got {one.code}")
+    names = {name: (one.signal, one.code) for name, one in switches.items()}
+    return BoundSwitches(**vars(bound), switches=names)
+
+
+def _place(names: list[str] | None, joystick: str, i: int) -> Place:
+    """Where a name stands: in a list of one it may stand alone."""
+    place: Place = ("joysticks", joystick, "enable")
+    return (*place, i) if names and len(names) > 1 else place
 
 
 def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick | None:
@@ -109,3 +206,32 @@ def _bind_rocker(
     used.uses[negative.name] = f"the negative direction of {axis}"
     used.uses[positive.name] = moves[positive.name]
     return RockerVelocity(positive, negative)
+
+
+def check_following(
+    diagnostics: Diagnostics,
+    config: DeploymentConfig,
+    joysticks: Mapping[str, BoundJoystick | None],
+) -> None:
+    """The joystick that ``tick`` names is one that can be followed."""
+    if config.tick is None:
+        return
+    name, place = config.tick.follow, ("tick", "follow")
+    if name not in config.joysticks:
+        names = ", ".join(config.joysticks)
+        diagnostics.add(place, f"expected a joystick, got {name!r}; there are {names}")
+    elif (joystick := joysticks[name]) and (fault := follow_fault(config, joystick)):
+        diagnostics.add(place, f"{fault} of {name}")
+
+
+def follow_fault(config: DeploymentConfig, joystick: BoundJoystick) -> str | None:
+    """Why the ticks cannot follow a joystick; None where they can."""
+    bus = config.buses.get(joystick.config.bus)
+    if bus is not None and bus.interface != "socketcan":
+        return f"expected a bus of socketcan, which stamps frames, got {bus.interface}, the bus"
+    cycle_ms, tick_ms = joystick.message.cycle_time or 0, config.tick_ms
+    if not cycle_ms or (cycle_ms % tick_ms and tick_ms % cycle_ms):
+        got = f"{cycle_ms} ms" if cycle_ms else "none"
+        expected = f"expected a GenMsgCycleTime that is a multiple or a part of {tick_ms} ms"
+        return f"{expected}, got {got}, that"
+    return None

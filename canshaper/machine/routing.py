@@ -7,13 +7,23 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from canshaper.codec.identifier import EMERGENCY, HEARTBEAT, NMT, NULL, group_of, identifier
-from canshaper.codec.j1939 import CLAIMED, REQUEST, claims_of, sent_by
+from canshaper.codec.identifier import (
+    CLAIMED,
+    EMERGENCY,
+    HEARTBEAT,
+    NMT,
+    NULL,
+    REQUEST,
+    claims_of,
+    group_of,
+    identifier,
+    sent_by,
+)
 from canshaper.codec.layout import is_j1939
 from canshaper.config.bus import Bus
 from canshaper.config.schema import DeploymentConfig
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.inputs import BoundInput
+from canshaper.machine.valves import BoundAxis
 
 Key = tuple[str, int, bool]
 """Bus, id, and whether that is extended."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 from canshaper.config.enable import slowest_ms
-from canshaper.config.schema import AxisConfig
+from canshaper.config.origin import simulated
+from canshaper.config.schema import AxisConfig, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.stopping import allowed_s
@@ -122,3 +123,23 @@ def _when(deployment: Deployment, name: str) -> _When:
 def _up(distance_m: float) -> str:
     """Rounded up to the centimetre, so that it can be written as it is shown."""
     return f"{math.ceil(100.0 * distance_m - 1e-9) / 100.0:g}"
+
+
+def rehearsed(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
+    """Sections with numbers of a simulated crane: where, and what to do."""
+    for place in simulated(config.axes, ("axes",)):
+        yield place, "measured on a simulated crane; measure it on the machine"
+
+
+def rehearsed_valves(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
+    """Valve curves of a simulated crane that would move valves on a real bus: where, and why."""
+    for name, axis in config.axes.items():
+        bus = config.buses[axis.valve.bus]
+        if not bus.is_virtual:
+            for place in simulated(axis.limits, ("axes", name, "limits")):
+                text = (
+                    "expected a valve measured on the machine, got one of a simulated crane, on"
+                    f" {bus.interface} {bus.channel}; canshaper calibrate --live measures it,"
+                    " canshaper run --simulated takes it as it is"
+                )
+                yield place, text

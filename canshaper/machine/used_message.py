@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.canopen import STATE_BITS
+from canshaper.codec.identifier import STATE_BITS
 from canshaper.codec.layout import Chosen
 from canshaper.codec.signals import find_signal, names_broken
 from canshaper.config.source import Place

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from cantools.database.can import Signal
+from cantools.database.can import Message, Signal
 
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
@@ -16,12 +16,23 @@ from canshaper.codec.signals import (
     set_point_fault,
     symmetrical_range,
 )
+from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
-from canshaper.config.schema import Command, DeploymentConfig, DirectionCodes, Valve
+from canshaper.config.schema import (
+    AxisConfig,
+    Command,
+    DeploymentConfig,
+    DirectionCodes,
+    Feedback,
+    StatusWord,
+    Valve,
+)
 from canshaper.config.source import Place
+from canshaper.machine.inputs import Bound, BoundValue
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
+from canshaper.machine.sway_sensor import BoundSwaySensor
 from canshaper.machine.used_message import UsedMessage, key_path
 
 # A valve learns of a stop no sooner than with its next frame.
@@ -243,3 +254,24 @@ def _alike(one: Signal, other: Signal) -> bool:
         other.maximum,
         other.length,
     )
+
+
+@dataclass(frozen=True)
+class BoundAxis:
+    """An axis with its valve message and, where it has one, its status message."""
+
+    name: str
+    config: AxisConfig
+    valve_message: Message
+    valve: ValveCodec
+    period_ticks: int
+    status: StatusCodec[ReportedAxis] | None
+    status_ticks: int
+    feedback: BoundValue[Feedback] | None = None
+    status_word: Bound[StatusWord] | None = None
+    sway_sensor: BoundSwaySensor | None = None
+
+    @property
+    def rewrites(self) -> bool:
+        """Whether its command leaves in the frames of its own joystick, through a gateway."""
+        return isinstance(self.valve.message, RewrittenMessage)

@@ -5,11 +5,10 @@ from typing import Protocol
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.sent import Sender
-from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Feedback
-from canshaper.inputs.input import MessageInput
+from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.inputs.sway_sensor import SensorNode
-from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.states import Reason
 

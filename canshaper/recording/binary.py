@@ -8,7 +8,7 @@ from typing import BinaryIO
 import can
 
 from canshaper.codec.layout import CLASSICAL_BYTES
-from canshaper.recording.frames import MOST_BYTES, Place, TimedFrame
+from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 
 # A float of that many seconds still holds nanoseconds; a date holds microseconds.
 FINE_S = 4e6

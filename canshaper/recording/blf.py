@@ -7,7 +7,7 @@ from typing import Any, BinaryIO
 import can
 
 from canshaper.codec.layout import CLASSICAL_BYTES
-from canshaper.recording.frames import MOST_BYTES, Place, TimedFrame
+from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 
 _new = tuple.__new__  # TimedFrame(...) in half the time
 # The start of every object, containers too: LOBJ, size of the header, its version, length, kind.

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import BinaryIO
 
-from canshaper.codec.can_id import ERR_FLAG
-from canshaper.recording.frames import Place, TimedFrame, fits
-from canshaper.recording.text import SECOND_NS, id_text, lines, shown
+from canshaper.codec.frame import ERR_FLAG
+from canshaper.recording.asc import SECOND_NS, id_text, lines, shown
+from canshaper.recording.channels import Place, TimedFrame, fits
 
 _new = tuple.__new__  # TimedFrame(...) in half the time
 

@@ -9,12 +9,19 @@ from typing import Any, NamedTuple
 
 import can
 
-from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.bus.packet import BRS, FD_SIZE, FDF, Packet
+from canshaper.bus.packet import (
+    ANCILLARY_BYTES,
+    BRS,
+    FD_SIZE,
+    FDF,
+    SO_TIMESTAMPNS,
+    Packet,
+    stamp_ns,
+)
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can
 from canshaper.bus.socketcan import dropped_frames, open_sockets
-from canshaper.codec.can_id import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
+from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 from canshaper.errors import CutOffError, LogError
 from canshaper.recording import asc, binary, blf, candump, tables, trc
-from canshaper.recording.frames import LATEST_S, Place, TimedFrame
+from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 

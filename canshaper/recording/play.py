@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 
 from canshaper.blackbox.file import Box
-from canshaper.blackbox.records import Kind, Record, records
+from canshaper.blackbox.ring import Kind, Record, records
 from canshaper.blackbox.state import States
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
@@ -12,7 +12,7 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import BoxError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.frames import TimedFrame
+from canshaper.recording.channels import TimedFrame
 from canshaper.recording.ticks import Difference, Result, Rows, Tick, Timed
 
 # What the daemon may call between two frames of one tick.

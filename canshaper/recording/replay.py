@@ -12,8 +12,7 @@ from canshaper.codec.identifier import group_of
 from canshaper.controller.controller import Controller
 from canshaper.errors import BoxError, CutOffError, LogError, StateError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key, Kind, Sorter, bus_of_channel
-from canshaper.recording.frames import TimedFrame
+from canshaper.recording.channels import Key, Kind, Sorter, TimedFrame, bus_of_channel
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import Player, frames_of, of_same_files
 from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick, clocked

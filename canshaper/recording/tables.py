@@ -3,12 +3,16 @@
 import re
 from base64 import b64decode
 from binascii import unhexlify
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from decimal import Decimal
-from typing import BinaryIO
+from typing import BinaryIO, TextIO
 
-from canshaper.recording.frames import LATEST_S, MOST_BYTES, Place, TimedFrame
-from canshaper.recording.text import SECOND_NS, id_text, lines, shown
+from canshaper.codec.frame import Frame
+from canshaper.codec.layout import CLASSICAL_BYTES
+from canshaper.machine.routing import Key
+from canshaper.recording.asc import SECOND_NS, id_text, lines, shown
+from canshaper.recording.channels import LATEST_S, MOST_BYTES, Place, TimedFrame
+from canshaper.recording.ticks import Result, Tick
 
 _CSV = re.compile(
     rb"([0-9.e+-]+),(0x[0-9a-f]{1,8}),([01]),([01]),([01]),([0-9]{1,2}),([A-Za-z0-9+/]*=*)\s*"
@@ -108,3 +112,39 @@ def _gvret(row: bytes, place: Place) -> TimedFrame | None:
     content = (int(time) * 1000, bus.decode(), can_id, wide, payload)
     frame: TimedFrame = _new(TimedFrame, content)
     return frame
+
+
+class LogWriter:
+    """Writes what was received and what was sent, as ``candump -L`` does.
+
+    Args:
+        file: where to.
+        channel_of: channel by bus.
+        fd: messages of CAN FD; what is longer than classical frames is one, too.
+    """
+
+    def __init__(
+        self, file: TextIO, channel_of: Mapping[str, str], fd: Collection[Key] = ()
+    ) -> None:
+        self._file, self._fd = file, fd
+        # A log without channels gets the names of the buses.
+        self._channel_of = {bus: channel or bus for bus, channel in channel_of.items()}
+        self._last_ns = 0
+
+    def write(self, tick: Tick, result: Result) -> None:
+        """Write one tick; its others are without a time of their own."""
+        for time_ns, frame in tick.received:
+            self._line(time_ns, frame)
+        for frame in tick.others:
+            self._line(self._last_ns, frame)
+        for frame in result.sent:
+            self._line(tick.now_ns, frame)
+
+    def _line(self, time_ns: int, frame: Frame) -> None:
+        self._last_ns = time_ns = max(time_ns, self._last_ns)
+        seconds, ns = divmod(time_ns, 10**9)
+        can_id = f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
+        channel = self._channel_of[frame.bus]
+        fd = "#0" if frame[:3] in self._fd or len(frame.data) > CLASSICAL_BYTES else ""
+        data = f"{fd}{frame.data.hex().upper()}"
+        self._file.write(f"({seconds}.{ns // 1000:06d}) {channel} {can_id}#{data}\n")

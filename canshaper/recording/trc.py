@@ -6,8 +6,8 @@ from typing import BinaryIO
 
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
 from canshaper.errors import LogError
-from canshaper.recording.frames import MOST_BYTES, Place, TimedFrame
-from canshaper.recording.text import id_text, lines, shown
+from canshaper.recording.asc import id_text, lines, shown
+from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 
 # Columns by version: number, offset of time (ms), bus, type, id, reserved, length, data. From 2.0
 # on the file names them.

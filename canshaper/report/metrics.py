@@ -5,8 +5,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from canshaper.report.crane_metrics import crane_metrics
-from canshaper.report.stroke_metrics import dip, re_rise, rms, run_on_s, run_on_travel, time_to_95_s
+from canshaper.report.stroke_metrics import (
+    crane_metrics,
+    dip,
+    re_rise,
+    rms,
+    run_on_s,
+    run_on_travel,
+    time_to_95_s,
+)
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,

@@ -24,7 +24,6 @@ loses the right to add. Once nothing is added and both have met, one computation
 
 from dataclasses import dataclass
 
-from canshaper.shaping.added import range_with_added
 from canshaper.shaping.limits import (
     OutputLimits,
     RecentCommand,
@@ -33,6 +32,7 @@ from canshaper.shaping.limits import (
     rate_limited,
     within,
 )
+from canshaper.shaping.motion import range_with_added
 from canshaper.shaping.small_strokes import SmallStrokes
 
 # Largest quantisation error of an added velocity that is carried, full speed times ticks.

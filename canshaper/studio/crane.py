@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 import re
 import socket
@@ -12,12 +13,15 @@ from pathlib import Path
 
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, LOOP_PRIORITY
 from canshaper.config.load import load_config
-from canshaper.design.children import canshaper_command
-from canshaper.design.processes import Transport, end
+from canshaper.design.processes import Transport, canshaper_command, end
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.sliders import adjustable, sliders
-from canshaper.studio.view import Report
+from canshaper.studio.view import CraneView, Report
+from canshaper_sim.axes import ROTATOR
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.joints import JointBoom
+from canshaper_sim.machines import AXES_OF, build_machine, machine_for
 
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0
@@ -168,3 +172,41 @@ def groups(count: int) -> list[Transport]:
     first = 100 + count * (pid // 65536) % 128
     names = [f"239.{first + i}.{pid // 256 % 256}.{pid % 256}" for i in range(count)]
     return [Transport("udp_multicast", name, "udp_multicast (python-can)") for name in names]
+
+
+class SimulatedPose:
+    """Pose and sway where the buses have none: what the simulated crane does with the valve frames.
+
+    It stands in its start pose at first, wherever the machine stood.
+
+    Args:
+        view: its valve frames are read from here, pose and sway are written into it.
+        deployment: whose axes they are.
+        parameters: the crane.
+    """
+
+    def __init__(
+        self, view: CraneView, deployment: Deployment, parameters: CraneParameters
+    ) -> None:
+        self._view = view
+        self._axes = [name for name in deployment.axes if name != ROTATOR]
+        self._machine = build_machine(machine_for(deployment.axes), parameters)
+
+    @staticmethod
+    def fits(deployment: Deployment) -> bool:
+        """Whether the simulated crane has the axes of a deployment."""
+        axes = deployment.axes.keys() - {ROTATOR}
+        return axes <= {*AXES_OF[machine_for(deployment.axes)]}
+
+    def advance(self, dt_s: float, now_s: float) -> None:
+        """Hold the last valve commands for so long."""
+        view, crane = self._view, self._machine.crane
+        self._machine.step(dt_s, {name: view.axes[name].opening for name in self._axes})
+        state = crane.state
+        heading = math.degrees(math.remainder(state.theta1_rad, 2.0 * math.pi))
+        joints = None
+        if isinstance(crane.boom, JointBoom):
+            _, lift, knuckle, extension = crane.boom.joints
+            joints = (math.degrees(lift), math.degrees(knuckle), extension)
+        sway = (math.degrees(state.theta5_rad), math.degrees(state.theta6_rad))
+        view.simulate((heading, state.radius_m, state.height_m), joints, sway, now_s)

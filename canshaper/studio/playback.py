@@ -12,8 +12,8 @@ from canshaper.errors import CutOffError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogFile
 from canshaper.recording.replay import Drive, Replay, look
-from canshaper.studio.film import CraneFilm
-from canshaper.studio.simulated import SimulatedPose
+from canshaper.studio.crane import SimulatedPose
+from canshaper.studio.in_process import CraneFilm
 from canshaper.studio.stage import RAW
 from canshaper_sim.crane import CraneParameters
 

@@ -1,8 +1,12 @@
 """How often each source on the buses sends, and how old its last frame is. No clock."""
 
+import contextlib
+import os
 from collections import deque
 from collections.abc import Iterable
 from typing import Any
+
+from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY
 
 WINDOW_S = 1.0
 """Frames are counted over the last second."""
@@ -42,3 +46,14 @@ class Sources:
                 "age_s": None if age_s is None else round(age_s, 2),
             }
         return values
+
+
+def before_the_rest() -> None:
+    """Let this thread come after the daemon and before all else, where that is permitted.
+
+    A browser that draws without a graphics card takes every processor, and joysticks that are late
+    are a fault. What is started from here does not inherit it.
+    """
+    with contextlib.suppress(OSError, AttributeError):  # only Linux has it
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(JOYSTICKS_PRIORITY))

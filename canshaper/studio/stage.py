@@ -17,13 +17,13 @@ from canshaper.errors import ControlError
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
-from canshaper.studio.events import Events
 from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.numbers import LiveNumbers
-from canshaper.studio.priority import before_the_rest
 from canshaper.studio.seen import Seen
 from canshaper.studio.sliders import Number, sliders, values
+from canshaper.studio.sources import before_the_rest
 from canshaper.studio.view import CraneView
+from canshaper.studio.words import Events
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.realtime import open_ports
 

@@ -2,9 +2,17 @@
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
+from canshaper.config.adjust import Key, adjusted
 from canshaper.config.limits import Sway
+from canshaper.design.tuning.evaluate import Machine, evaluate
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.sway import SwayModel
 
 LEAST_SWING_S = 1.0
 """Shortest time over which the largest sway counts as the swing."""
@@ -35,3 +43,60 @@ class Swing:
         while self._sways and self._sways[0][0] < now_s - self._lasts_s:
             self._sways.popleft()
         return max((sway for _, sway in self._sways), default=None)
+
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+LENGTHS_PCT = tuple(range(-50, 101, 5))
+"""Of the length in the file."""
+
+
+def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """What is left, by axis; axes without sway data, or with several filters, have none.
+
+    Args:
+        deployment: the machine.
+        values: numbers in force that may differ from the file, by key.
+
+    Returns:
+        By axis ``lengths_m`` of a simple pendulum of the same period, ``left`` as a fraction of the
+        swing without a filter, the length that the filter ``believes``, and that of the ``file``.
+    """
+    by_axis: dict[str, dict[Key, float]] = {}
+    for text, number in values.items():
+        key = Key.parsed(text)
+        if key is not None:
+            by_axis.setdefault(key.axis, {})[key] = number
+    tick_s = deployment.config.tick_ms / 1000.0
+    curves = {}
+    for name, bound in deployment.axes.items():
+        config = bound.config
+        if config.sway and not config.gain_schedule and not config.profiles:
+            curves[name] = _curve(bound, by_axis.get(name, {}), tick_s * bound.period_ticks)
+    return curves
+
+
+def _curve(bound: BoundAxis, values: Mapping[Key, float], period_s: float) -> dict[str, Any]:
+    config = adjusted(bound.config, values, bound.config) if values else bound.config
+    assert config.sway is not None and bound.config.sway is not None
+    mode = config.sway.mode()
+
+    def shaper_for(model: SwayModel) -> Shaper:
+        return build_shaper(
+            config.filter.kind,
+            period_s,
+            model,
+            valve_rate_per_s=config.limits.slowest_per_s,
+            **config.filter.parameters(),
+        )
+
+    believes_m = STANDARD_GRAVITY_M_S2 / mode.omega_rad_s**2
+    file_m = STANDARD_GRAVITY_M_S2 / bound.config.sway.mode().omega_rad_s ** 2
+    lengths_m = [file_m * (1.0 + percent / 100.0) for percent in LENGTHS_PCT]
+    errors_pct = [100.0 * (length / believes_m - 1.0) for length in lengths_m]
+    residuals = evaluate(mode, period_s, shaper_for, Machine.of(bound), errors_pct).residuals
+    return {
+        "lengths_m": [round(length, 4) for length in lengths_m],
+        "left": [round(one.machine, 4) for one in residuals],
+        "believes": round(believes_m, 4),
+        "file": round(file_m, 4),
+    }

@@ -11,7 +11,7 @@ from canshaper.codec.identifier import NULL, with_source
 from canshaper.codec.status import StatusCodec
 from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.controller.sets import profile_by_number
-from canshaper.inputs.profile import OWN
+from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.limits import without_deadband

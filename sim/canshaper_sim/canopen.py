@@ -3,12 +3,11 @@
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.codec.canopen import START, NodeState, ValveState
 from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import HEARTBEAT, NMT
+from canshaper.codec.identifier import HEARTBEAT, NMT, START, NodeState, ValveState
 from canshaper.codec.sent import SentMessage
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
 
 # Heartbeats are sent three times as often as they are asked for.
 HEARTBEATS_IN_TIME = 3

@@ -7,8 +7,8 @@ The crane of an axis is the first part of its name, where what follows is the na
 from dataclasses import replace
 
 from canshaper.errors import DesignError
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
 from canshaper_sim.axes import ALL_AXES, ROTATOR
 
 

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, with_source
 from canshaper.codec.signals import FieldSet
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.limits import OutputLimits, without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW

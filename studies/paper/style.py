@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from canshaper.report.style import (
+from canshaper.report.console import (
     JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,

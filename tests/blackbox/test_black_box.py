@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from canshaper.blackbox import keeper, write
 from canshaper.blackbox.file import HEAD, MAGIC, read_box
-from canshaper.blackbox.records import RECORD, Kind, records
+from canshaper.blackbox.ring import RECORD, Kind, records
 from canshaper.blackbox.state import States
 from canshaper.cli.app import app
 from canshaper.codec.frame import BusState

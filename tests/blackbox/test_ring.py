@@ -6,8 +6,7 @@ from dataclasses import replace
 import pytest
 
 from canshaper.blackbox import keeper, ring
-from canshaper.blackbox.records import RECORD, Kind, records
-from canshaper.blackbox.ring import BLOCK, Ring
+from canshaper.blackbox.ring import BLOCK, RECORD, Kind, Ring, records
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment

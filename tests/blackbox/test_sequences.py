@@ -10,7 +10,7 @@ from unittest.mock import patch
 import pytest
 
 from canshaper.blackbox import keeper, state
-from canshaper.blackbox.records import records
+from canshaper.blackbox.ring import records
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon import daemon

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.bus import arrival
+from canshaper.bus import packet
 from canshaper.bus.port import Port
 
 START_NS = 10**12
@@ -23,8 +23,8 @@ class Clocks:
         return self.now_ns + self.ahead_ns
 
     def replace(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(arrival, "time", self)
-        monkeypatch.setattr(arrival, "boottime_ns", self.boottime_ns)
+        monkeypatch.setattr(packet, "time", self)
+        monkeypatch.setattr(packet, "boottime_ns", self.boottime_ns)
 
 
 def arrivals_of(port: Port) -> list[int]:

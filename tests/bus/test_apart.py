@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from canshaper.bus import apart
-from canshaper.bus.clock import boottime_ns
+from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus

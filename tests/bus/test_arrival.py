@@ -12,9 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.bus import arrival, raw
-from canshaper.bus.arrival import SO_TIMESTAMPNS, Arrivals, stamp_ns
-from canshaper.bus.clock import boottime_ns
+from canshaper.bus import packet, raw
+from canshaper.bus.packet import SO_TIMESTAMPNS, Arrivals, boottime_ns, stamp_ns
 from canshaper.bus.port import ListeningPort
 from canshaper.bus.raw import REOPEN_NS
 from tests.bus.clocks import START_NS, WALL_NS, Clocks, arrivals_of
@@ -49,7 +48,7 @@ def test_the_kernel_stamps_what_a_port_hands_out() -> None:
         sent_ns = boottime_ns()
         assert [line.port.arrived_ns <= sent_ns for _ in line.port.frames()] == [True] * 3
         line.put(message(0x100))
-        data = line.near[RECEIVED].recvmsg(raw.SIZE, arrival.ANCILLARY_BYTES)
+        data = line.near[RECEIVED].recvmsg(raw.SIZE, packet.ANCILLARY_BYTES)
         stamp = stamp_ns(data[1])
         assert stamp is not None
         assert before_ns <= stamp <= time.time_ns()
@@ -132,7 +131,7 @@ def stamped(line: Line, *stamps: int | None) -> None:
     assert receive == near.recvmsg
 
     def recvmsg(*sizes: int) -> Any:
-        assert sizes == (raw.SIZE, arrival.ANCILLARY_BYTES)  # room for a frame and its stamp
+        assert sizes == (raw.SIZE, packet.ANCILLARY_BYTES)  # room for a frame and its stamp
         data, _, flags, sender = receive(*sizes)
         stamp = waiting.pop(0)
         return data, [] if stamp is None else ancillary(stamp), flags, sender

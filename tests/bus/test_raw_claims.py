@@ -7,8 +7,8 @@ import can
 import pytest
 
 from canshaper.bus import raw
-from canshaper.bus.error_frame import CLASS_BUS_OFF
-from canshaper.bus.under_way import MOST_CLAIMS
+from canshaper.bus.packet import CLASS_BUS_OFF
+from canshaper.bus.socketcan import MOST_CLAIMS
 from canshaper.codec.frame import BusState, Frame
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, RECEIVED, Line, message

@@ -11,7 +11,7 @@ from canshaper.config.uncertainty import MEASURES, Uncertainty
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import Simulation, drive
 from canshaper.machine.binding import load_deployment
-from canshaper.report.crane_metrics import crane_metrics
+from canshaper.report.stroke_metrics import crane_metrics
 from canshaper.shaping.axis import Axis
 from canshaper_sim.crane import CraneParameters
 from tests.faults.shipped import NAMES

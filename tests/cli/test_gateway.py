@@ -10,7 +10,7 @@ from canshaper.cli.app import app
 from canshaper.errors import GatewayError
 from canshaper.protocols.gateway import cangw
 from canshaper.protocols.gateway.cangw import Rule, difference
-from canshaper.protocols.gateway.passing import Pattern
+from canshaper.protocols.gateway.forwarding import Pattern
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "config" / "gateway-forwarder.yaml"

@@ -8,17 +8,21 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.can_id import id_of
+from canshaper.codec.frame import id_of
 from canshaper.codec.identifier import (
+    CLAIMED,
+    DM1,
     at_every_priority,
+    claims_of,
     group_mask,
     group_of,
     has_destination,
     identifier,
+    name_bytes,
     pgn_of,
+    sent_by,
     with_source,
 )
-from canshaper.codec.j1939 import CLAIMED, DM1, claims_of, name_bytes, sent_by
 from canshaper.config.bus import J1939Name
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment

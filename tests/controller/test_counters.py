@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.controller.counters import Counters
+from canshaper.controller.outputs import Counters
 
 COUNTED = {
     "WrongLength": {"WRONG_LENGTH"},

@@ -5,10 +5,9 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.controller.sets import SetChooser, profile_by_number, programs
-from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.sets import ParameterSet
+from canshaper.shaping.registry import ParameterSet, build_shaper
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.sway import SwayMode, SwayModel

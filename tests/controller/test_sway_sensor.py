@@ -10,7 +10,7 @@ import pytest
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import SwingLengthEvent
-from canshaper.controller.sensor_report import SensorReport
+from canshaper.controller.status import SensorReport
 from canshaper.design.lockstep import LockStep, drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -11,7 +11,7 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.daemon import daemon as module
-from canshaper.daemon import loop, reloads, reporter, standstill
+from canshaper.daemon import io_cycle, loop, reloads, reporter
 from canshaper.daemon import ports as service_ports
 from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
@@ -96,7 +96,7 @@ class Bench:
         self._handlers: dict[int, Any] = {}
         for one in (loop, service_ports):
             monkeypatch.setattr(one, "time", self)
-        for one in (module, reporter, loop, standstill):
+        for one in (module, reporter, loop, io_cycle):
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
         leave = lambda code: pytest.fail(f"left with {code}")  # noqa: E731

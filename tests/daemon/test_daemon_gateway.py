@@ -7,8 +7,7 @@ import pytest
 
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import daemon as module
-from canshaper.daemon.io_cycle import FramePort, FrameProcessor, receive_waiting
-from canshaper.daemon.standstill import Standstill
+from canshaper.daemon.io_cycle import FramePort, FrameProcessor, Standstill, receive_waiting
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from tests.daemon.bench import Bench, at

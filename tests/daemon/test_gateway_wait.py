@@ -14,7 +14,7 @@ from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import gateway
 from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InlineGateway
-from canshaper.daemon.standstill import Standstill
+from canshaper.daemon.io_cycle import Standstill
 from canshaper.errors import GatewayError
 from canshaper.protocols.gateway.cangw import Rule
 from tests.rigs.gateway import GatewayRig

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from canshaper.daemon import loop
+from canshaper.daemon.io_cycle import Standstill, longest_gap_ns
 from canshaper.daemon.loop import run_at_deadlines
-from canshaper.daemon.standstill import Standstill, longest_gap_ns
 from canshaper.shaping.states import State
 from tests.rigs.emergency import DBC, LAST, STOP
 from tests.rigs.forwarder import PATIENT, ROOT

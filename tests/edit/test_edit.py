@@ -8,8 +8,7 @@ import pytest
 import yaml
 
 from canshaper.config.load import load_config
-from canshaper.edit.edit import edited, set_values
-from canshaper.edit.flow import Value
+from canshaper.edit.edit import FileValue, edited, set_values
 from canshaper.errors import ConfigError
 from tests.edit.edited import NEW, SLEW, gff_line
 
@@ -59,7 +58,7 @@ def test_block_style_poles_become_coefficients(file: Path, newline: str) -> None
 
 
 # section before, values, section after
-CASES: dict[str, tuple[str, Mapping[str, Value], str]] = {
+CASES: dict[str, tuple[str, Mapping[str, FileValue], str]] = {
     "poles in flow style": (
         "{ kind: gff, poles_rad_s: [-3, -2] } # c",
         NEW,

@@ -6,8 +6,7 @@ import pytest
 import yaml
 
 from canshaper.config.load import load_config
-from canshaper.edit.edit import edited, set_values
-from canshaper.edit.flow import Value
+from canshaper.edit.edit import FileValue, edited, set_values
 from canshaper.errors import ConfigError
 from tests.edit.edited import SLEW, gff_line
 
@@ -33,7 +32,7 @@ def test_text_is_quoted_where_it_would_be_read_otherwise(text: str, written: str
 
 
 NOTE = "Written by canshaper identify."
-SWAY: dict[str, Value] = {"period_s": 2.5, "full_speed_m_s": 1.0}
+SWAY: dict[str, FileValue] = {"period_s": 2.5, "full_speed_m_s": 1.0}
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])

@@ -17,10 +17,10 @@ from canshaper.codec.frame import BusState, Frame
 from canshaper.config.bus import Bus
 from canshaper.daemon import daemon as module
 from canshaper.daemon import gateway as gateway_module
+from canshaper.daemon import io_cycle as io_cycle_module
 from canshaper.daemon import loop as loop_module
 from canshaper.daemon import ports as ports_module
 from canshaper.daemon import reloads, reporter
-from canshaper.daemon import standstill as standstill_module
 from canshaper.errors import ConfigError, GatewayError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -227,7 +227,7 @@ class Bench:
 
     def _replaced(self) -> Iterator[tuple[Any, str, Any]]:
         yield time, "monotonic_ns", self.now_ns
-        for one in (module, reporter, loop_module, standstill_module):
+        for one in (module, reporter, loop_module, io_cycle_module):
             yield one, "boottime_ns", self.now_ns
         yield time, "monotonic", lambda: self.now_ns() / 1e9
         yield time, "sleep", self.sleep

@@ -5,8 +5,7 @@ from typing import cast
 import pytest
 
 from canshaper.config.load import load_config
-from canshaper.inputs.profile import ProfileSwitch, profile_names
-from canshaper.inputs.value import ValueInput
+from canshaper.inputs.value import ProfileSwitch, ValueInput, profile_names
 from tests.rigs.j1939 import ROOT
 
 

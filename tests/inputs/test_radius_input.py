@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.radius import radius_input
-from canshaper.inputs.value import ValueInput
+from canshaper.inputs.value import ValueInput, radius_input
 from tests.rigs.forwarder import Rig
 
 STATUS = "status: { bus: crane, message: ShaperStatus }\n"

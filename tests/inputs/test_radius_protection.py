@@ -7,7 +7,7 @@ import pytest
 from crccheck.crc import Crc8SaeJ1850
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.radius import radius_input
+from canshaper.inputs.value import radius_input
 from canshaper.machine.deployment import Deployment
 from tests.machine.protected_machine import load
 

@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.machine.bus_load import longest_fd_bits, longest_frame_bits
+from canshaper.machine.buses import longest_fd_bits, longest_frame_bits
 from tests.rigs.files import Machine
 
 

@@ -3,7 +3,7 @@
 import pytest
 from cantools.database.can import Message
 
-from canshaper.machine.bus_load import BusLoad, bus_load
+from canshaper.machine.buses import BusLoad, bus_load
 
 
 def fd_message(frame_id: int, length: int, cycle_ms: int | None) -> Message:

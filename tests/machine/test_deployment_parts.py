@@ -8,7 +8,7 @@ import pytest
 
 from canshaper.machine import identity
 from canshaper.machine.binding import load_deployment
-from canshaper.machine.bus_load import BusLoad
+from canshaper.machine.buses import BusLoad
 from canshaper.machine.deployment import Deployment
 from tests.controller.set_files import DBC, FAST, FAST_SETS, YAML
 from tests.rigs.files import ROOT, Machine

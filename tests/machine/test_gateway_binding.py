@@ -6,10 +6,9 @@ import cantools
 import pytest
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.can_id import EFF_FLAG
-from canshaper.codec.kernel_check import neutral_fault
+from canshaper.codec.frame import EFF_FLAG
 from canshaper.codec.protection import Protection
-from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.rewrite import RewrittenMessage, neutral_fault
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -6,7 +6,7 @@ import pytest
 from can.interfaces import BACKENDS
 
 from canshaper.config.bus import Bus
-from canshaper.machine.interface_options import option_faults
+from canshaper.machine.buses import option_faults
 
 CLIENT = {"host": "127.0.0.1", "port": 29536}
 

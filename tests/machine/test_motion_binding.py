@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.radius import radius_input
-from canshaper.inputs.value import ValueInput
+from canshaper.inputs.value import ValueInput, radius_input
 from tests.rigs.files import Machine
 
 FIXED = "slew: slew, near_far: near_far, radius_m: 3"

@@ -16,7 +16,7 @@ from pathlib import Path
 import can
 
 from canshaper.errors import LogError
-from canshaper.recording.frames import fits
+from canshaper.recording.channels import fits
 from canshaper.recording.log import READERS, LogFile
 
 Row = tuple[int, bool, bytes]

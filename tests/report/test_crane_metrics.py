@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.report.crane_metrics import CraneMetrics, crane_metrics
 from canshaper.report.metrics import report_dict
+from canshaper.report.stroke_metrics import CraneMetrics, crane_metrics
 from canshaper.report.strokes import aligned, rests
 from canshaper_sim.recording import CraneTrace, Recording
 

@@ -7,8 +7,7 @@ from typing import Any
 import cantools
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import GLOBAL
-from canshaper.codec.j1939 import name_bytes
+from canshaper.codec.identifier import GLOBAL, name_bytes
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.added import AddedTime, range_with_added
 from canshaper.shaping.axis import UNATTENDED_TICKS
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.motion import AddedTime, range_with_added
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off

@@ -9,8 +9,14 @@ from hypothesis import strategies as st
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import KINDS, build_shaper
-from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
+from canshaper.shaping.registry import (
+    KINDS,
+    STEPS_BETWEEN,
+    ParameterSet,
+    at_position,
+    build_shaper,
+    position,
+)
 from canshaper.shaping.shapers.fir import Fir, zv_taps
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper

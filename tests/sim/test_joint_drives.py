@@ -6,8 +6,8 @@ import pytest
 
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
-from canshaper.report.crane_metrics import crane_metrics
 from canshaper.report.metrics import compare
+from canshaper.report.stroke_metrics import crane_metrics
 from canshaper_sim.axes import JOINT_AXES
 from canshaper_sim.grapple import Sway
 from canshaper_sim.machines import build_machine

@@ -16,7 +16,7 @@ from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.cli.playback import opened_drives
 from canshaper.design.parallel import Processes
-from canshaper.studio import film
+from canshaper.studio import in_process
 from canshaper.studio.playback import Playback
 from tests.studio.conftest import WAIT_S, Opened
 from tests.studio.drives import black_box, recorded
@@ -35,7 +35,7 @@ def opened(
     content = json.loads(json.dumps(playback.as_dict()))
     cranes = {
         name: [
-            (number * film.PICTURE_S, picture)
+            (number * in_process.PICTURE_S, picture)
             for number, picture in zip(crane["numbers"], crane["pictures"], strict=True)
         ]
         for name, crane in content["cranes"].items()
@@ -113,7 +113,7 @@ def test_of_a_long_log_the_first_pictures_or_those_of_a_window_are_kept(
     for pictures in cranes.values():
         assert pictures[0][0] == pytest.approx(2.0, abs=0.05)
         assert pictures[-1][0] == pytest.approx(5.0, abs=0.05)
-    monkeypatch.setattr(film, "MOST_PICTURES", 100)
+    monkeypatch.setattr(in_process, "MOST_PICTURES", 100)
     playback, cranes = opened(log, "forwarder.yaml")
     assert {len(pictures) for pictures in cranes.values()} == {100}
     assert any("only the first ten minutes" in note for note in playback.notes)

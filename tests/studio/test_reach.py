@@ -12,7 +12,7 @@ from urllib.request import HTTPCookieProcessor, build_opener
 
 import pytest
 
-from canshaper.cli.reach import qr_code, reachable
+from canshaper.studio.access import qr_code, reachable
 from tests.studio.conftest import ROOT, WAIT_S
 
 

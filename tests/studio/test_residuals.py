@@ -7,7 +7,7 @@ from urllib.request import urlopen
 import pytest
 
 from canshaper.cli.common import loader
-from canshaper.studio.residuals import residuals
+from canshaper.studio.swing import residuals
 from tests.studio.conftest import WAIT_S, Studio
 
 PERIOD = "axes.slew.sway.period_s"

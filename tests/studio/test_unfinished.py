@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from starlette.responses import PlainTextResponse
 
-from canshaper.studio import unfinished
+from canshaper.studio import server as server_module
 from canshaper.studio.server import listening, server
 
 WAIT_S = 60.0  # only to end a test that hangs
@@ -17,7 +17,7 @@ WHOLE = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
 @pytest.fixture
 def address(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, int]]:
     """A server that gives any request the same answer, and waits half a second for it."""
-    monkeypatch.setattr(unfinished, "REQUEST_S", 0.5)
+    monkeypatch.setattr(server_module, "REQUEST_S", 0.5)
     one = listening("127.0.0.1", 0)
     web = server(PlainTextResponse("here"))
     thread = threading.Thread(target=web.run, kwargs={"sockets": [one]})

@@ -168,7 +168,7 @@ def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
 def name(used: Collection[str]) -> Callable[[str], str]:
     """Takes a word that can be a name in a deployment file and is not in use, or NONE."""
 
-    from canshaper.edit.flow import plain
+    from canshaper.edit.edit import plain
 
     def parse(text: str) -> str:
         if text != NONE and not (text.isidentifier() and plain(text) == text):

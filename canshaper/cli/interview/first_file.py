@@ -18,7 +18,7 @@ from canshaper.cli.interview.first import (
     rounded,
     stop_distance_m,
 )
-from canshaper.edit.flow import plain
+from canshaper.edit.edit import plain
 
 
 def first_deployment(machine: FirstMachine) -> str:

@@ -101,7 +101,7 @@ def calibrate(
         if live:
             run_live(drive, deployment, show)
         else:
-            from canshaper.commissioning.calibration.simulated import run_simulated
+            from canshaper.commissioning.calibration.run import run_simulated
             from canshaper_sim.parameters import changed_parameters
 
             run_simulated(drive, deployment, changed_parameters(changes or []), show)
@@ -112,7 +112,7 @@ def calibrate(
     results.print("\n".join(curve_lines(deployment, axis, result, top_pct)), soft_wrap=True)
 
     def figure() -> "Figure":
-        from canshaper.commissioning.calibration.plot import figure as of_valve
+        from canshaper.commissioning.calibration.write import figure as of_valve
 
         return of_valve(axis, deployment.axes[axis].config.limits.output_limits(), result, top_pct)
 

@@ -133,8 +133,7 @@ def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "li
 
 def _report(files: "list[Deployment]", stores: "list[Store]", results: "Results") -> bool:
     """Print and write what was found; whether all is accepted by the first file's limits."""
-    from canshaper.campaign.summary import differences, summarise
-    from canshaper.campaign.table import difference_table, lines, tables
+    from canshaper.campaign.summary import difference_table, differences, lines, summarise, tables
 
     accept = files[0].config.accept.model_dump(exclude_none=True)
     columns, accepted = [store.columns() for store in stores], True

@@ -200,7 +200,7 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
 
 def _load(deployment: "Deployment", bus: str) -> str:
     """What its messages make of a bus, in words."""
-    from canshaper.machine.bus_load import BUSY
+    from canshaper.machine.buses import BUSY
 
     load = deployment.load(bus)
     if load is None:

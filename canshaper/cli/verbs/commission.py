@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from canshaper.commissioning.procedure.bench import Bench
     from canshaper.commissioning.procedure.files import Files
     from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-    from canshaper.commissioning.procedure.step import Step
+    from canshaper.commissioning.procedure.state import Step
     from canshaper.machine.deployment import Deployment
     from canshaper.report.console import OnProgress
 
@@ -187,7 +187,7 @@ def _one(procedure: "Procedure", step: "Step") -> None:
 
 def _show(procedure: "Procedure", proposal: "Proposal") -> None:
     """The results of a step, and what it would write."""
-    from canshaper.commissioning.procedure.sheet import shown
+    from canshaper.commissioning.procedure.files import shown
     from canshaper.report.console import SafeConsole
 
     console = SafeConsole(soft_wrap=True)

@@ -68,7 +68,7 @@ def compare(
     from canshaper.design.comparison.manoeuvres import manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
-    from canshaper.design.swinging import swinging_axis
+    from canshaper.design.profiles import swinging_axis
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)()

@@ -12,7 +12,7 @@ from canshaper.errors import UsageError, WrongDeviceError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from canshaper.commissioning.doctor.finding import Finding
+    from canshaper.commissioning.doctor.verdict import Finding
     from canshaper.machine.deployment import Deployment
 
 EXIT_NOT_FIT = 1
@@ -58,12 +58,11 @@ def doctor(
       canshaper doctor config/forwarder-robust.yaml --no-load --listen 10
     """
     from canshaper.cli.results import Results
-    from canshaper.commissioning.doctor.finding import fit
     from canshaper.commissioning.doctor.interfaces import bus_findings
     from canshaper.commissioning.doctor.machine import machine_findings
     from canshaper.commissioning.doctor.measure import measure
     from canshaper.commissioning.doctor.report import as_dict, print_report
-    from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings
+    from canshaper.commissioning.doctor.verdict import IDLE, LOADED, fit, measured_findings
     from canshaper.report.console import progress_bar
 
     try:
@@ -88,7 +87,7 @@ def doctor(
     print_report(deployment, seconds, runs, findings, results)
 
     def figure() -> "Figure":
-        from canshaper.commissioning.doctor.plot import figure as of_runs
+        from canshaper.commissioning.doctor.report import figure as of_runs
 
         return of_runs(runs, deployment.config.tick_ms)
 
@@ -100,8 +99,8 @@ def doctor(
 
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
-    from canshaper.commissioning.doctor.finding import Finding, Level
     from canshaper.commissioning.doctor.listen import arrival_findings, listen
+    from canshaper.commissioning.doctor.verdict import Finding, Level
     from canshaper.report.console import progress_bar
 
     try:

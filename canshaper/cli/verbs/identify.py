@@ -111,8 +111,7 @@ def identify(
         signals_named,
         timed_by_hand,
     )
-    from canshaper.commissioning.identification.report import as_dict
-    from canshaper.commissioning.identification.write import advice_on, write_sway
+    from canshaper.commissioning.identification.report import advice_on, as_dict, write_sway
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)() if file else None

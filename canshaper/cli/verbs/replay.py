@@ -190,8 +190,8 @@ def _one(
     """Replay one deployment, and write its log and its events."""
     from canshaper.recording.replay import Replay
     from canshaper.recording.report import Replayed
+    from canshaper.recording.tables import LogWriter
     from canshaper.recording.trace import Trace
-    from canshaper.recording.write import LogWriter
 
     replay = Replay(deployment, drive)
     done = Replayed(name, deployment, replay, Trace(deployment, *window))

@@ -64,7 +64,7 @@ def robust(
         print_design,
         write_design,
     )
-    from canshaper.edit.flow import flow
+    from canshaper.edit.edit import flow
 
     deployment = loader(file)()
     results = Results(f"Robust shaper for {axis}", deployment, report, picture, quiet=as_json)

@@ -97,8 +97,7 @@ def _changed(
     """The same with these options put in."""
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError, Problem
-    from canshaper.machine.origin import rehearsed_valves
-    from canshaper.machine.stopping import unstated
+    from canshaper.machine.stopping import rehearsed_valves, unstated
 
     def changed() -> "Deployment":
         deployment = load()

@@ -73,8 +73,8 @@ def sensor(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.results import Results
     from canshaper.commissioning.sensor.finding import examine
-    from canshaper.commissioning.sensor.read import read_sensors
-    from canshaper.commissioning.sensor.write import write_sensors
+    from canshaper.commissioning.sensor.fit import read_sensors
+    from canshaper.commissioning.sensor.report import write_sensors
 
     if live and log:
         raise UsageError(f"expected a log or --live, got {log} and --live")
@@ -105,7 +105,7 @@ def sensor(
     if any(finding.fit for finding in findings):
 
         def figure() -> "Figure":
-            from canshaper.commissioning.sensor.plot import figure as of_sensors
+            from canshaper.commissioning.sensor.report import figure as of_sensors
 
             return of_sensors(findings)
 
@@ -149,7 +149,7 @@ def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
 
 def _simulate(deployment: "Deployment", axes: Sequence[str], log: Path, changes: list[str]) -> None:
     """Drive the simulated crane."""
-    from canshaper.commissioning.sensor.simulated import hand_driven
+    from canshaper.commissioning.sensor.fit import hand_driven
     from canshaper.commissioning.simulated import log_simulated
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters

@@ -163,8 +163,8 @@ def _machine(
     file: str, interface: str | None, channel: list[str] | None, adjust: tuple[Path | None] | None
 ) -> "Stage":
     """A machine to listen to; with ``adjust``, a control socket or the file's, to change."""
-    from canshaper.studio.events import Events
     from canshaper.studio.stage import Stage
+    from canshaper.studio.words import Events
 
     deployment = loader(file, interface, channel)()
     if adjust:
@@ -184,8 +184,8 @@ def _cranes(
 ) -> "Stage":
     """Simulated cranes to drive; of several the first one."""
     from canshaper.studio.crane import copied
-    from canshaper.studio.events import Events
     from canshaper.studio.stage import Stage
+    from canshaper.studio.words import Events
     from canshaper_sim.cranes import cranes
 
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -210,10 +210,9 @@ def _serve(
     stage: "Stage | None" = None,
 ) -> None:
     """Serve a page until Ctrl-C; ``make`` gets who may see it."""
-    from canshaper.cli.reach import qr_code, reachable
-    from canshaper.studio.access import Access
-    from canshaper.studio.priority import before_the_rest
+    from canshaper.studio.access import Access, qr_code, reachable
     from canshaper.studio.server import address, listening, server
+    from canshaper.studio.sources import before_the_rest
 
     try:
         one = stack.enter_context(listening(host, port))

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.formulation import Task
     from canshaper.design.tuning.optimal import Tuning
-    from canshaper.machine.bound_axis import BoundAxis
     from canshaper.machine.deployment import Deployment
+    from canshaper.machine.valves import BoundAxis
 
 
 def tune(
@@ -88,7 +88,7 @@ def tune(
       canshaper tune config/forwarder.yaml --axis slew --method manual
     """
     from canshaper.cli.results import Results
-    from canshaper.design.swinging import swinging_axis
+    from canshaper.design.profiles import swinging_axis
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)()
@@ -159,7 +159,7 @@ def _task(
 def _solve(
     task: "Task", method: str, starts: int, report: Callable[[float, str], None], *, beyond: bool
 ) -> "Tuning":
-    from canshaper.design.tuning.manual import manual
+    from canshaper.design.tuning.optimal import manual
 
     if method == "manual":
         if beyond:
@@ -190,8 +190,8 @@ def _report(
     """Measure, draw, write, print."""
     from canshaper.commissioning.stopping import consequences
     from canshaper.design.tuning import deploy
+    from canshaper.design.tuning.deploy import table
     from canshaper.design.tuning.evaluate import Machine
-    from canshaper.design.tuning.table import table
 
     machine = Machine.of(bound)
     setting = deploy.deployed(tuning, task.mode, task.tick_s, machine)
@@ -262,7 +262,7 @@ def _write(
 ) -> list[str]:
     from canshaper.commissioning.filter_file import write_filter
     from canshaper.config.filters import designed
-    from canshaper.edit.flow import Value
+    from canshaper.edit.edit import FileValue
 
     designed_for = designed(task.mode)
     if task.length_range_pct is not None:
@@ -272,7 +272,7 @@ def _write(
         designed_for["duration_s"] = tail_s
     if task.require.max_rate_per_s is not None:
         designed_for["valve_rate_per_s"] = task.require.max_rate_per_s
-    values: dict[str, Value] = {
+    values: dict[str, FileValue] = {
         "kind": "gff",
         **setting.values(),
         "designed_for": designed_for,

@@ -10,10 +10,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.calibration.at_end import EndWatch
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
-from canshaper.commissioning.calibration.ramp import Ramp
-from canshaper.commissioning.calibration.speed import SpeedFeedback
+from canshaper.commissioning.calibration.ramp import EndWatch, Ramp, SpeedFeedback
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import CalibrationError, ConfigError

@@ -1,8 +1,22 @@
-"""The command of a measurement: slowly up, held, slowly down, once in each direction."""
+"""A ramp of the valve: where motion begins, its speed, and whether it ended at a stop."""
 
+import math
+from bisect import bisect_left
 from dataclasses import dataclass
 
+from cantools.database.can import Message, Signal
+
+from canshaper.codec.frame import Frame
+from canshaper.codec.identifier import NULL, group_of
+from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
+from canshaper.codec.protection import UNPROTECTED
+from canshaper.codec.signals import find_signal
+from canshaper.config.inputs import Input
 from canshaper.config.limits import Limits
+from canshaper.errors import ConfigError, Problem
+from canshaper.inputs.value import ValueInput, measurable
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
 
 # Slow enough for a lag of 0.3 s, quick enough for a joint that has room for 2 s of full speed.
 RATE_PER_S, TOP = 0.1, 0.4
@@ -73,3 +87,135 @@ class Ramp:
 def usual_top(limits: Limits) -> float:
     """Top of the ramp of an axis, part of full command: as fast as the file allows at most."""
     return min(TOP, limits.max_pct / 100.0)
+
+
+# So much farther from the middle of its tremble than that goes is motion.
+LEAST = 5.0
+# At its end the speed is below this part of what it was, for so long.
+PART, LASTING_S = 0.5, 0.5
+
+
+class EndWatch:
+    """Watches the speed of an axis on its ramp."""
+
+    def __init__(self) -> None:
+        self._low, self._high = math.inf, -math.inf  # at rest
+        # Commands of the way up and the largest speed until each, in order.
+        self._commands: list[float] = []
+        self._speeds: list[float] = []
+        self._moved_s = 0.0
+
+    def reached(self, part: str, time_s: float, command: float, speed: float) -> bool:
+        """Take a speed; whether the axis is at its end.
+
+        Args:
+            part: of the ramp, as ``Ramp.part`` names it.
+            time_s: of the measurement.
+            command: of the ramp, part of full.
+            speed: of the feedback, in its own unit.
+        """
+        if part in ("settling", "rest"):
+            if part == "rest":
+                self._low, self._high = min(self._low, speed), max(self._high, speed)
+            self._commands, self._speeds = [], []
+            return False
+        away = abs(speed - 0.5 * (self._low + self._high))
+        if not part.startswith("down"):
+            self._commands.append(abs(command))
+            self._speeds.append(max(away, self._speeds[-1] if self._speeds else 0.0))
+        number = min(bisect_left(self._commands, abs(command)), len(self._speeds) - 1)
+        before = self._speeds[number]
+        if before <= LEAST * 0.5 * (self._high - self._low) or away >= PART * before:
+            self._moved_s = time_s
+        return time_s - self._moved_s >= LASTING_S
+
+
+# Feedback older than that says nothing of the axis, which must not go on unseen.
+SILENT_MS = 500
+
+
+class SpeedFeedback:
+    """Feedback of the speed of one axis.
+
+    Where it is the ``feedback`` of the axis in the deployment, all that stands there holds: bus,
+    source, counter, checksum. Any other message has to come on the bus of the valve.
+
+    Args:
+        deployment: the machine.
+        axis: name of the axis.
+        message: name of the message.
+        signal: its signal.
+
+    Raises:
+        ConfigError: no such message or signal, or one that cannot be measured with.
+    """
+
+    def __init__(self, deployment: Deployment, axis: str, message: str, signal: str) -> None:
+        bus = deployment.config.buses[deployment.axes[axis].config.valve.bus]
+        feedback = _find(deployment, message, signal, fd=bus.fd)
+        self._bound = bound = _bound(deployment, axis, message, feedback[0], signal)
+        self._input = ValueInput(bound, feedback[1], *measurable(feedback[1]))
+        self._keys = frozenset(bound.keys)
+        _, can_id, _ = bound.key
+        self._source = None if can_id & 0xFF == NULL else can_id & 0xFF
+
+    @property
+    def value(self) -> float:
+        """The last speed that counted, in the unit of the DBC."""
+        return self._input.value
+
+    def valid(self, now_ns: int) -> bool:
+        """Whether there is a speed now: neither silence nor an error nor what is no number."""
+        measured_ns = self._input.measured_ns
+        return measured_ns is not None and now_ns - measured_ns <= SILENT_MS * 1_000_000
+
+    def receive(self, frame: Frame, arrived_ns: int) -> None:
+        """Take a frame, where it is one of this message."""
+        if self._mine(frame):
+            self._input.receive(frame.data, arrived_ns)
+
+    def _mine(self, frame: Frame) -> bool:
+        if not self._bound.by_group:
+            return frame[:3] in self._keys
+        bus, can_id, _ = self._bound.key
+        if frame.bus != bus or not frame.extended or group_of(frame.can_id) != group_of(can_id):
+            return False
+        source = frame.can_id & 0xFF
+        if self._source is None:
+            self._source = source  # the first that is received, and no other any more
+        return source == self._source
+
+
+def _find(deployment: Deployment, message: str, signal: str, *, fd: bool) -> tuple[Message, Signal]:
+    match = deployment.messages.find(message)
+    if isinstance(match, str):
+        raise ConfigError([Problem("command line", None, "--speed", match)])
+    definition = find_signal(match[1], signal)
+    if definition is None:
+        names = ", ".join(s.name for s in match[1].signals)
+        raise _problem(
+            deployment, f"expected a signal of {message}, got {signal!r}; there are {names}"
+        )
+    if match[1].is_multiplexed():
+        raise _problem(deployment, f"{message} is multiplexed; nothing can be read from it")
+    lengths = FD_LENGTHS if fd else range(CLASSICAL_BYTES + 1)
+    if match[1].length not in lengths:
+        text = f"{message}: expected the length of a frame, {lengths[-1]} bytes at most"
+        text += f", got {match[1].length}"
+        raise _problem(deployment, text)
+    return match[1], definition
+
+
+def _bound(
+    deployment: Deployment, axis: str, name: str, message: Message, signal: str
+) -> BoundInput:
+    of_axis = deployment.axes[axis].feedback
+    if of_axis and (of_axis.config.message, of_axis.config.signal) == (name, signal):
+        return of_axis
+    bus = deployment.axes[axis].config.valve.bus
+    config = Input(bus=bus, message=name, timeout_ms=SILENT_MS)
+    return BoundInput(config, message, Layout(message), UNPROTECTED, None)
+
+
+def _problem(deployment: Deployment, text: str) -> ConfigError:
+    return ConfigError([Problem(str(deployment.path), None, "--speed", text)])

@@ -14,7 +14,7 @@ from canshaper.bus.device import (
     read_device,
     whereabouts,
 )
-from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus
 
 LONGEST_NAME = 15  # IFNAMSIZ of linux/if.h, without its end

@@ -3,15 +3,54 @@
 import errno
 import os
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
+from canshaper.bus.apart import LOOK_S
 from canshaper.bus.device import FD_MTU
 from canshaper.bus.port import not_opened
-from canshaper.commissioning.doctor.adapters import adapter_findings
+from canshaper.bus.python_can import NEVER_BLOCK
 from canshaper.commissioning.doctor.devices import device_findings
-from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.link import Link, read_link
+from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus
+
+# Interfaces that hand out the error frames of their controller (python-can 4.6; by its source).
+ERROR_FRAMES = frozenset(("etas", "gs_usb", "ixxat", "kvaser", "neovi", "nican", "nixnet", "pcan"))
+ERROR_FRAMES |= {"serial", "socketcand", "usb2can", "vector"}
+
+
+def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
+    """One finding for each thing that SocketCAN reports and this interface may not.
+
+    Args:
+        name: of the bus in the deployment file.
+        bus: its section.
+        tick_ms: period of the loop.
+    """
+    subject = f"bus {name} {bus.interface}"
+    yield Finding(
+        subject, Level.NOTE, f"python-can on {bus.channel}: cannot be checked without opening it"
+    )
+    older_ms = tick_ms if bus.interface in NEVER_BLOCK else LOOK_S * 1000
+    yield Finding(
+        f"{subject} time stamps",
+        Level.NOTE,
+        f"none that can be trusted: a frame counts as up to {older_ms:g} ms older than it is",
+        f"give the timeout_ms of inputs {older_ms:g} ms more",
+    )
+    if bus.interface in ERROR_FRAMES:
+        yield Finding(f"{subject} error frames", Level.OK, "handed out, and counted")
+    else:
+        text = "none: a disturbed bus is noticed when the frames of the joysticks stay away"
+        yield Finding(f"{subject} error frames", Level.NOTE, text)
+    yield Finding(
+        f"{subject} send confirmation",
+        Level.WARNING,
+        "none: a frame that no node acknowledges counts as sent, so a cut line to a valve trips no"
+        " axis",
+        "an interface of SocketCAN (for slcan: slcand), or feedback of the valve",
+    )
+
 
 # Frames that may wait in the queue: less, and the frames of one tick do not fit; more, and commands
 # go out that are long out of date (20 of 8 bytes are 13 ms at 250 kbit/s).

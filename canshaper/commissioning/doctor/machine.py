@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.verdict import Finding, Level
 
 # Clock sources that are read without leaving the processor.
 QUICK_CLOCKS = frozenset(

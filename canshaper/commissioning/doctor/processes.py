@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from canshaper.design.children import end_with_parent
+from canshaper.design.processes import end_with_parent
 from canshaper.errors import MeasurementError
 
 # The loop has the priority that the service's unit gives it; the joysticks come after it, so that

@@ -17,7 +17,7 @@ from canshaper.errors import CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.frames import TimedFrame
+from canshaper.recording.channels import TimedFrame
 from canshaper.recording.log import LogFile
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.commissioning.identification.canlog import read_can
+from canshaper.commissioning.identification.commands import is_simulated
 from canshaper.commissioning.identification.phone import series_of
+from canshaper.commissioning.identification.recommend import stopwatch
 from canshaper.commissioning.identification.series import Series
-from canshaper.commissioning.identification.simulated_log import is_simulated
-from canshaper.commissioning.identification.stopwatch import stopwatch
 from canshaper.commissioning.identification.table import is_table, read_table
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.commissioning.identification.verdict import identify as identified

@@ -21,8 +21,13 @@ from canshaper.commissioning.identification.decay import (
     swing_values,
 )
 from canshaper.commissioning.identification.decay_problem import density
-from canshaper.commissioning.identification.driven_data import Driven, stretches
-from canshaper.commissioning.identification.driven_model import bases_of, free_columns, responses
+from canshaper.commissioning.identification.driven_data import (
+    Driven,
+    bases_of,
+    free_columns,
+    responses,
+    stretches,
+)
 from canshaper.commissioning.identification.series import Array, Kind, Series
 
 # Longest delay and lag of a valve that are looked for, s.

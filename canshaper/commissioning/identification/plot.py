@@ -18,7 +18,7 @@ from canshaper.commissioning.identification.driven import DrivenFit
 from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
 from canshaper.commissioning.identification.verdict import Finding
-from canshaper.report.style import (
+from canshaper.report.console import (
     JOYSTICK_COLOUR,
     PRINT_DPI,
     RAW_COLOUR,

@@ -13,14 +13,15 @@ import numpy as np
 
 from canshaper.commissioning.identification.decay_problem import Segment
 from canshaper.commissioning.identification.series import Array, Series, binned, pieces
-from canshaper.commissioning.identification.spectrum import candidates, smoothed
 from canshaper.commissioning.identification.swing import (
     SAMPLES,
     SHORTEST_SWINGS,
     Run,
     Swing,
+    candidates,
     cut,
     refined,
+    smoothed,
 )
 
 # Windows a period; a segment's end is known to this part of a period.

@@ -6,9 +6,15 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.live import Live
 
-from canshaper.commissioning.monitor.keys import Keys, pressed_keys, waiting
 from canshaper.commissioning.monitor.state import Monitor
-from canshaper.commissioning.monitor.view import clock, screen, status_line
+from canshaper.commissioning.monitor.view import (
+    Keys,
+    clock,
+    pressed_keys,
+    screen,
+    status_line,
+    waiting,
+)
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Listener

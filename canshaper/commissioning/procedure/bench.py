@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.commissioning.calibration.run import run_simulated
 from canshaper.commissioning.simulated import log_simulated
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment

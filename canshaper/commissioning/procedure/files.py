@@ -1,14 +1,22 @@
 """Where the procedure keeps what it makes, and who may work on it."""
 
 import fcntl
+import io
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from rich.console import Group
+from rich.table import Table
+
+from canshaper.edit.edit import set_values
 from canshaper.errors import UsageError
+from canshaper.machine.deployment import Deployment
+from canshaper.report.console import SafeConsole, new_table
 
 
 @dataclass(frozen=True)
@@ -75,3 +83,73 @@ def copy_for_rehearsal(path: Path) -> Path:
     if not copy.exists():
         shutil.copyfile(path, copy)
     return copy
+
+
+def write_without_filters(deployment: Deployment, path: Path) -> None:
+    """Write a copy of the deployment file whose joysticks go to the valves through limits alone.
+
+    Args:
+        deployment: the machine.
+        path: the copy, in the same folder.
+
+    Raises:
+        ConfigError: it is no good deployment without them.
+    """
+    shutil.copyfile(deployment.path, path)
+    if deployment.config.motion:
+        set_values(path, (), {"motion": None})
+    for name, joystick in deployment.config.joysticks.items():
+        if joystick.next_profile:
+            set_values(path, ("joysticks", name), {"next_profile": None})
+    for name, axis in deployment.config.axes.items():
+        if axis.sway_sensor and axis.sway_sensor.use != "watch":
+            set_values(path, ("axes", name, "sway_sensor"), {"use": "watch"})
+        added = [key for key in ("profiles", "gain_schedule") if getattr(axis, key)]
+        if added:
+            set_values(path, ("axes", name), dict.fromkeys(added))
+        if axis.filter.kind != "off":
+            gone: dict[str, Any] = dict.fromkeys(axis.filter.model_dump(exclude_none=True))
+            set_values(path, ("axes", name, "filter"), gone | {"kind": "off"})
+
+
+Part = dict[str, Any]
+"""``{"text": lines}``, or ``{"title": words, "columns": heads, "rows": cells}``."""
+
+
+class Sheet(SafeConsole):
+    """A console that shows nothing and keeps what is printed.
+
+    Attributes:
+        parts: what was printed, in order.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(file=io.StringIO(), width=100)
+        self.parts: list[Part] = []
+
+    def print(self, *objects: Any, **_options: Any) -> None:
+        """Keep lines and tables."""
+        for one in objects:
+            if isinstance(one, Group):
+                self.print(*one.renderables)
+            elif isinstance(one, Table):
+                rows = zip(*(column.cells for column in one.columns), strict=True)
+                self.parts.append(
+                    {
+                        "title": str(one.title) if one.title else "",
+                        "columns": [str(column.header) for column in one.columns],
+                        "rows": [[str(cell) for cell in row] for row in rows],
+                    }
+                )
+            else:
+                self.parts.append({"text": str(one)})
+
+
+def shown(part: Part) -> str | Table:
+    """A part as it is printed again."""
+    if "text" in part:
+        return str(part["text"])
+    table = new_table(*part["columns"], title=part["title"] or None)
+    for row in part["rows"]:
+        table.add_row(*row)
+    return table

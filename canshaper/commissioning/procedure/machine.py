@@ -9,9 +9,8 @@ from pathlib import Path
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.run import run_live
 from canshaper.commissioning.procedure.bench import Mode, Person, Task
-from canshaper.commissioning.procedure.raw_file import write_without_filters
-from canshaper.design.children import canshaper_command
-from canshaper.design.processes import end
+from canshaper.commissioning.procedure.files import write_without_filters
+from canshaper.design.processes import canshaper_command, end
 from canshaper.errors import BusError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.record import Recording

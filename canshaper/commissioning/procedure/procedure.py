@@ -7,19 +7,21 @@ from difflib import unified_diff
 from pathlib import Path
 
 from canshaper.commissioning.procedure.bench import Bench
-from canshaper.commissioning.procedure.files import Files
-from canshaper.commissioning.procedure.pictures import draw
-from canshaper.commissioning.procedure.sheet import Part
+from canshaper.commissioning.procedure.files import Files, Part
+from canshaper.commissioning.procedure.recorded import draw
 from canshaper.commissioning.procedure.state import (
+    FILE,
+    Context,
+    Outcome,
     Record,
     State,
     Status,
+    Step,
     hash_of,
     read_state,
     stamped,
     write_state,
 )
-from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment
 

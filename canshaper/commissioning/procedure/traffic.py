@@ -13,9 +13,9 @@ from canshaper.commissioning import suggest
 from canshaper.commissioning.doctor.listen import inputs_of
 from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.commands import Samples, joystick_commands
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.machine.valves import BoundAxis
 from canshaper.recording.channels import Key
 from canshaper.recording.history import History
 from canshaper.recording.listen import ReceivedFrame

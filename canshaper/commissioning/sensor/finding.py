@@ -11,8 +11,8 @@ from canshaper.commissioning.identification.decay import Value
 from canshaper.commissioning.identification.driven_data import Driven, driven_s, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
-from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, MOST_DELAY
+from canshaper.machine.valves import BoundAxis
 
 # Seconds in which the axis has to be driven, at least.
 LEAST_DRIVEN_S = 2.0

@@ -8,21 +8,25 @@ own. Each stretch of driving has a free swing and an offset of its own too.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.decay_problem import density
-from canshaper.commissioning.identification.driven_data import Driven
-from canshaper.commissioning.identification.driven_model import (
+from canshaper.commissioning.identification.driven_data import (
     SHORTEST_LAG_S,
+    Driven,
     free_columns,
     swing_filter,
 )
-from canshaper.commissioning.identification.series import Array
+from canshaper.commissioning.identification.series import Array, Series
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.sway import SwayMode
+from canshaper_sim.strokes import Script, Stroke
 
 # Delays that are looked for; a valve that is quicker than the deployment says makes it negative.
 LEAST_DELAY_S, MOST_DELAY_S = -0.2, 0.7
@@ -192,3 +196,35 @@ def _held(one: Driven) -> tuple[Array, Array]:
     grid = np.arange(first, float(one.time_s[-1]) - LEAST_DELAY_S + GRID_S, GRID_S)
     at = np.searchsorted(command.time_s - one.start_s, grid + 1e-6, side="right") - 1
     return grid, command.speed[np.maximum(at, 0)]
+
+
+def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dict[str, Series]:
+    """What the sensors of some axes measured.
+
+    Raises:
+        IdentificationError: a sensor is not in the log, or from two senders.
+        LogError: the log cannot be read.
+    """
+    sensors = {name: s for name in axes if (s := deployment.axes[name].sway_sensor)}
+    return read_can(
+        path,
+        "",
+        {name: one.name for name, one in sensors.items()},
+        deployment.messages,
+        deployment=deployment,
+        sources={name: one.config.source for name, one in sensors.items()},
+    )
+
+
+# As a person drives who is asked to: a slow stroke, a pause of two swings, and back.
+FIRST_S, STROKE_S, PAUSE_S, LEVEL, STROKES = 2.0, 1.0, 4.0, 0.4, 4
+
+
+def hand_driven(axes: Sequence[str]) -> Script:
+    """Slow strokes of one axis after the other."""
+    strokes, start_s = [], FIRST_S
+    for axis in axes:
+        for number in range(STROKES):
+            strokes.append(Stroke(axis, start_s, STROKE_S, -LEVEL if number % 2 else LEVEL))
+            start_s += STROKE_S + PAUSE_S
+    return Script("sensor", tuple(strokes), start_s + PAUSE_S)

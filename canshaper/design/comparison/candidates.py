@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from canshaper.config.filters import Filter, filter_of
-from canshaper.design.swinging import swinging_axis
+from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from canshaper.design.comparison.candidates import tick_s
 from canshaper.design.comparison.measure import Outcome
-from canshaper.design.swinging import swinging_axis
+from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.modes import responses_of
 from canshaper.design.tuning.robust import LEAST_TAP, least_residual, time_optimal_s
 from canshaper.machine.deployment import Deployment

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from canshaper.design.tuning.formulation import SETTLED, at_length
-from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff

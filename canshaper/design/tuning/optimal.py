@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from canshaper.design.tuning.conflict import box_conflict, explain, feasible_point
-from canshaper.design.tuning.formulation import Task
+from canshaper.design.tuning.formulation import FASTEST_RAD_S, POLE_DISTANCE, SLOWEST_RAD_S, Task
 from canshaper.design.tuning.program import Program, Solution, Vector
 from canshaper.errors import DesignError, InfeasibleError
 from canshaper.shaping.shapers.gff import denominator_from_poles
+from canshaper.shaping.sway import SwayMode
 
 # "As good": what the poles may do within so much of the optimal cost.
 FLAT = 0.01
@@ -174,3 +175,27 @@ def _settled(program: Program, best: Solution) -> list[float]:
         if group[-1] / group[0] < 1.01:
             return [math.prod(group) ** (1.0 / together)] * together + q[together:]
     return q
+
+
+# "Slightly less than two times the first pole."
+SECOND_TO_FIRST = 1.9
+
+
+def manual(mode: SwayMode) -> Tuning:
+    """Setting by the rule: first pole at five times the real part of the sway pole.
+
+    Raises:
+        DesignError: the sway is damped so little or so much that the poles are outside what a
+            deployment may have.
+    """
+    first = POLE_DISTANCE * mode.pole.real
+    poles = first, SECOND_TO_FIRST * first
+    if -first < SLOWEST_RAD_S or -poles[1] > FASTEST_RAD_S:
+        ratio = SLOWEST_RAD_S / POLE_DISTANCE / mode.omega_rad_s
+        raise DesignError(
+            f"poles of the manual rule: expected {SLOWEST_RAD_S:g} to {FASTEST_RAD_S:g} rad/s"
+            f" (damping ratio {ratio:.3g} or more), got {-first:.3g} and {-poles[1]:.3g} rad/s from"
+            f" a damping ratio of {mode.damping_ratio:.3g}; the optimal method needs no damping"
+        )
+    a1, a2 = denominator_from_poles(poles)
+    return Tuning(poles, None, a1, a2, "manual")

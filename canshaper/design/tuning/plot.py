@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
-from canshaper.report.style import (
+from canshaper.report.console import (
     JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,

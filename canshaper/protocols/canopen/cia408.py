@@ -6,8 +6,8 @@ because the axis is neutral until then. A fault is reset by an edge of the ready
 tripped until the operator resets it.
 """
 
-from canshaper.codec.canopen import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
 from canshaper.codec.frame import FrameFault
+from canshaper.codec.identifier import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
 from canshaper.codec.sent import Sender
 from canshaper.config.schema import StatusWord
 from canshaper.inputs.input import GOOD, Input, Raw

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.identifier import service_of
-from canshaper.inputs.carry_over import Key, Part
-from canshaper.inputs.input import MessageInput
+from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.protocols.canopen.cia408 import ValveControl

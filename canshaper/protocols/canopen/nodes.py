@@ -4,9 +4,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
-from canshaper.codec.canopen import GENERIC_ERROR, NO_EMERGENCY, START, STATE_MASK, NodeState
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import EMERGENCY, HEARTBEAT, NMT
+from canshaper.codec.identifier import (
+    EMERGENCY,
+    GENERIC_ERROR,
+    HEARTBEAT,
+    NMT,
+    NO_EMERGENCY,
+    START,
+    STATE_MASK,
+    NodeState,
+)
 from canshaper.config.bus import Canopen, CanopenNode
 from canshaper.protocols.canopen.cia408 import ValveControl
 from canshaper.shaping.states import Reason

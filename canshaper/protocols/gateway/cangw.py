@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from canshaper.bus.netlink import ACKNOWLEDGE, DUMP, attribute, attributes, request
-from canshaper.codec.kernel_check import CS_CRC8, CS_XOR
+from canshaper.codec.rewrite import CS_CRC8, CS_XOR
 from canshaper.errors import GatewayError
-from canshaper.protocols.gateway.passing import Pattern
+from canshaper.protocols.gateway.forwarding import Pattern
 
 # linux/can/gw.h, linux/rtnetlink.h; Python has no names for most of these.
 NEW, DELETE, GET = 24, 25, 26  # RTM_NEWROUTE, RTM_DELROUTE, RTM_GETROUTE

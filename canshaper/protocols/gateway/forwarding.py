@@ -1,8 +1,9 @@
 """The frames of joysticks on their way through a gateway, and what is sent when none come."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK, Frame
 from canshaper.codec.rewrite import RewritingSender
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
@@ -117,3 +118,53 @@ class Gateway(BusProtocol):
     def usual(self, frame: Frame) -> bool:
         """What no one knows there is what is passed on."""
         return frame.bus in self._buses
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Pattern:
+    """Ids that are ``value`` in the bits of ``mask``: the words of ``struct can_filter``.
+
+    The flag of 29 bits is in the mask; that of remote frames is not, so a pattern fits them too.
+    """
+
+    value: int
+    mask: int
+
+    def fits(self, word: int) -> bool:
+        """Whether a frame with this id of the kernel (29 bits with their flag) is one of them."""
+        return word & self.mask == self.value
+
+
+EVERYTHING = (Pattern(0, EFF_FLAG), Pattern(EFF_FLAG, EFF_FLAG))
+"""Ids of 11 bits, and ids of 29 bits."""
+
+
+def exactly(can_id: int, extended: bool) -> Pattern:
+    """The one id."""
+    return (
+        Pattern(can_id | EFF_FLAG, EFF_MASK | EFF_FLAG)
+        if extended
+        else Pattern(can_id, SFF_MASK | EFF_FLAG)
+    )
+
+
+def all_but(excluded: Iterable[Pattern]) -> list[Pattern]:
+    """Patterns that fit every id but those that one of ``excluded`` fits; no two of them meet."""
+    left = list(EVERYTHING)
+    for pattern in sorted(set(excluded)):
+        left = [part for whole in left for part in _without(whole, pattern)]
+    return sorted(left)
+
+
+def _without(whole: Pattern, hole: Pattern) -> list[Pattern]:
+    """What of ``whole`` is left: for each bit that only ``hole`` cares about, the other value."""
+    if (whole.value ^ hole.value) & whole.mask & hole.mask:
+        return [whole]  # they do not meet
+    left = []
+    value, mask = whole.value, whole.mask
+    for bit in (1 << n for n in reversed(range(EFF_MASK.bit_length()))):
+        if hole.mask & ~mask & bit:
+            mask |= bit
+            left.append(Pattern(value | ~hole.value & bit, mask))
+            value |= hole.value & bit
+    return left

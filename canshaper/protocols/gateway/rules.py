@@ -2,15 +2,14 @@
 
 from collections.abc import Iterator
 
-from canshaper.codec.can_id import EFF_FLAG
+from canshaper.codec.frame import EFF_FLAG
 from canshaper.codec.identifier import NULL, WITHOUT_PRIORITY, group_mask, group_of
-from canshaper.codec.kernel_check import kernel_check
 from canshaper.codec.layout import is_j1939
-from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.rewrite import RewrittenMessage, kernel_check
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.protocols.gateway.cangw import Rule, changed_bytes
-from canshaper.protocols.gateway.passing import Pattern, all_but, exactly
+from canshaper.protocols.gateway.forwarding import Pattern, all_but, exactly
 
 
 def excluded(deployment: Deployment) -> frozenset[Pattern]:

@@ -7,8 +7,14 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Self
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import DEFAULT_PRIORITY, LOWEST_PRIORITY, identifier
-from canshaper.codec.j1939 import DM1, TRANSPORT, TRANSPORT_DATA
+from canshaper.codec.identifier import (
+    DEFAULT_PRIORITY,
+    DM1,
+    LOWEST_PRIORITY,
+    TRANSPORT,
+    TRANSPORT_DATA,
+    identifier,
+)
 from canshaper.inputs.feedback import Following
 from canshaper.shaping.reasons import REASON_TEXTS
 

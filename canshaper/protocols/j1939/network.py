@@ -4,16 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import group_of, pgn_of
-from canshaper.codec.j1939 import CLAIMED, name_bytes
+from canshaper.codec.identifier import CLAIMED, group_of, name_bytes, pgn_of
 from canshaper.config.bus import J1939
-from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Following
-from canshaper.inputs.input import MessageInput
+from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
 from canshaper.protocols.interface import BusProtocol, DrivenAxis, FrameHandler
-from canshaper.protocols.j1939.claim import ClaimState
+from canshaper.protocols.j1939.claim import ClaimState, Node
 from canshaper.protocols.j1939.dm1 import FMI_OF, FMI_OF_FOLLOWING
 from canshaper.protocols.j1939.groups import (
     AnySource,
@@ -21,7 +19,6 @@ from canshaper.protocols.j1939.groups import (
     ReceivedGroup,
     SourceEvent,
 )
-from canshaper.protocols.j1939.node import Node
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.calibration.at_end import EndWatch
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, Ramp
-from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, EndWatch, Ramp
+from canshaper.commissioning.calibration.run import run_simulated
 from canshaper.commissioning.calibration.write import speed_signal
 from canshaper.errors import CalibrationError
 from canshaper.machine.binding import load_deployment

@@ -10,7 +10,7 @@ from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.ramp import Ramp
-from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.commissioning.calibration.run import run_simulated
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -9,7 +9,7 @@ import yaml
 
 from canshaper.commissioning.doctor import interfaces
 from canshaper.commissioning.doctor.devices import device_findings
-from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus, Match
 from tests.bus.fake_devices import HUB, PCI, USB, FakeDevices
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.commissioning.doctor.figures import ENDS_US, histogram, quantile, summary
+from canshaper.commissioning.doctor.verdict import ENDS_US, histogram, quantile, summary
 
 TIMES = st.lists(st.integers(0, ENDS_US[-1] * 1000), min_size=1, max_size=200)
 

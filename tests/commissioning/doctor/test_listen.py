@@ -11,13 +11,12 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus.arrival import SO_TIMESTAMPNS
-from canshaper.bus.packet import CAN_FRAME
+from canshaper.bus.packet import CAN_FRAME, SO_TIMESTAMPNS
 from canshaper.cli.verbs.doctor import _listened
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor import listen as listening
-from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.listen import arrival_findings
+from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.doctor.conftest import ROOT, SHIPPED

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.commissioning.doctor import machine
-from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.verdict import Finding, Level
 
 DYNAMIC = "#1 SMP PREEMPT_DYNAMIC Debian 6.1.176-1 (2026-07-02)"
 REAL_TIME = "#1 SMP PREEMPT_RT Debian 6.1.192-2 (2026-11-16)"

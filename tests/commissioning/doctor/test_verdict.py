@@ -6,9 +6,16 @@ from typing import Any
 
 import pytest
 
-from canshaper.commissioning.doctor.finding import Finding, Level, fit
 from canshaper.commissioning.doctor.measure import Run
-from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings, waiting
+from canshaper.commissioning.doctor.verdict import (
+    IDLE,
+    LOADED,
+    Finding,
+    Level,
+    fit,
+    measured_findings,
+    waiting,
+)
 from canshaper.config.schema import Tick
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.doctor.conftest import SHIPPED, TICK_NS

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.identification.recommend import stopwatch
 from canshaper.commissioning.identification.series import (
     Array,
     Kind,
@@ -14,7 +15,6 @@ from canshaper.commissioning.identification.series import (
     ordered,
     unit_of,
 )
-from canshaper.commissioning.identification.stopwatch import stopwatch
 from canshaper.commissioning.identification.verdict import Finding, identify
 from canshaper.errors import IdentificationError
 from tests.commissioning.identification.machine import Coloured

@@ -9,10 +9,8 @@ from rich.console import Console
 
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.monitor.axes import bar, line_over_time
-from canshaper.commissioning.monitor.keys import HELP, Keys
-from canshaper.commissioning.monitor.state import Monitor
-from canshaper.commissioning.monitor.view import screen, status_line
+from canshaper.commissioning.monitor.state import Monitor, bar, line_over_time
+from canshaper.commissioning.monitor.view import HELP, Keys, screen, status_line
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping.states import Reason, State

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from canshaper.commissioning.identification.series import Series
 from canshaper.commissioning.sensor.finding import Finding, examine
-from canshaper.commissioning.sensor.read import read_sensors
-from canshaper.commissioning.sensor.simulated import hand_driven
+from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
 from canshaper.commissioning.simulated import log_simulated
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

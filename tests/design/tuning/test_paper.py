@@ -11,8 +11,7 @@ from canshaper.design.tuning.formulation import (
     Task,
     Weights,
 )
-from canshaper.design.tuning.manual import manual
-from canshaper.design.tuning.optimal import Tuning, tune
+from canshaper.design.tuning.optimal import Tuning, manual, tune
 from canshaper.shaping.shapers.gff import denominator_from_poles
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 

@@ -21,7 +21,7 @@ from canshaper.design.tuning.evaluate import Machine
 from canshaper.design.tuning.modes import second_mode
 from canshaper.design.tuning.robust import least_residual, shortest
 from canshaper.machine.binding import load_deployment
-from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import CommandInput

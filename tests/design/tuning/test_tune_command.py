@@ -15,9 +15,8 @@ from canshaper.config.load import load_config
 from canshaper.config.origin import written_by
 from canshaper.design.tuning.deploy import deployed, setting
 from canshaper.design.tuning.evaluate import Machine
-from canshaper.design.tuning.manual import manual
-from canshaper.design.tuning.optimal import Tuning
-from canshaper.edit.flow import flow
+from canshaper.design.tuning.optimal import Tuning, manual
+from canshaper.edit.edit import flow
 from canshaper.shaping.sway import SwayMode
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -5,8 +5,8 @@ import socket
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.can_id import EFF_FLAG
-from canshaper.protocols.gateway.passing import EVERYTHING, Pattern, all_but, exactly
+from canshaper.codec.frame import EFF_FLAG
+from canshaper.protocols.gateway.forwarding import EVERYTHING, Pattern, all_but, exactly
 
 narrow = st.integers(0, 0x7FF)
 wide = st.integers(0, 0x1FFFFFFF).map(lambda i: i | EFF_FLAG)

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.codec.can_id import EFF_FLAG
+from canshaper.codec.frame import EFF_FLAG
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.gateway.passing import Pattern
+from canshaper.protocols.gateway.forwarding import Pattern
 from canshaper.protocols.gateway.rules import excluded
 from tests.machine.gateway_files import ROOT, j1939_gateway, load
 

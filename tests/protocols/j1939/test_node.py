@@ -2,8 +2,7 @@
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import J1939, J1939Name
-from canshaper.protocols.j1939.claim import ClaimState
-from canshaper.protocols.j1939.node import Node
+from canshaper.protocols.j1939.claim import ClaimState, Node
 from tests.rigs.j1939 import CLAIM, DM1, NACK, OTHER, OWN, WHO_HAS_IT, request
 
 MS = 1_000_000

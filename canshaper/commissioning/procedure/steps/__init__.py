@@ -1,6 +1,6 @@
 """The steps of a day of commissioning, in order."""
 
-from canshaper.commissioning.procedure.step import Step
+from canshaper.commissioning.procedure.state import Step
 from canshaper.commissioning.procedure.steps.buses import BUSES
 from canshaper.commissioning.procedure.steps.check import CHECK
 from canshaper.commissioning.procedure.steps.drive import DRIVE

@@ -5,15 +5,14 @@ from statistics import median
 
 from matplotlib.figure import Figure
 
-from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.interfaces import bus_findings
 from canshaper.commissioning.doctor.listen import arrival_findings
+from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.commissioning.procedure.bench import Task
-from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import Traffic, read_traffic
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import new_table
-from canshaper.report.style import (
+from canshaper.report.console import (
     HEAD_PT,
     PRINT_DPI,
     SHAPED_COLOUR,
@@ -21,6 +20,7 @@ from canshaper.report.style import (
     TEXT_PT,
     WIDTH_PX,
     new_figure,
+    new_table,
     plain,
 )
 from canshaper_sim.strokes import Script

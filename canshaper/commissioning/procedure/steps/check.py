@@ -5,14 +5,13 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from canshaper.commissioning.doubts import doubts
-from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
 from canshaper.config.source import Source
 from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.origin import rehearsed_valves
-from canshaper.machine.stopping import unstated
-from canshaper.report.style import (
+from canshaper.machine.stopping import rehearsed_valves, unstated
+from canshaper.report.console import (
     HEAD_PT,
     PRINT_DPI,
     RAW_COLOUR,

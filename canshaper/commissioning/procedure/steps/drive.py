@@ -8,7 +8,7 @@ from canshaper.commissioning.identification.canlog import bind
 from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.recorded import machine_recording, simulated_recording
-from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.dry import figure as joysticks_figure
 from canshaper.commissioning.procedure.steps.motion import LEAST_MOVED
 from canshaper.commissioning.procedure.steps.swing import swinging

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging, swings
 from canshaper.commissioning.robust import (
     RobustDesign,

@@ -5,12 +5,11 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from canshaper.commissioning.procedure.bench import STILL_MOVES, Task
-from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
 from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import new_table
-from canshaper.report.style import (
+from canshaper.report.console import (
     HEAD_PT,
     PRINT_DPI,
     SHAPED_COLOUR,
@@ -19,6 +18,7 @@ from canshaper.report.style import (
     TITLE_PT,
     WIDTH_PX,
     new_figure,
+    new_table,
     plain,
     titled,
     zero_line,

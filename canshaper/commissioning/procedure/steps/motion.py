@@ -7,7 +7,7 @@ from statistics import fmean
 
 from canshaper.commissioning.identification.commands import Samples
 from canshaper.commissioning.procedure.bench import Mode, Task
-from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.check import FIRST_PCT, MOTION
 from canshaper.commissioning.procedure.steps.dry import PAUSE_S, ends, figure, show_states
 from canshaper.commissioning.procedure.traffic import AxisTraffic, read_traffic

@@ -3,10 +3,17 @@
 from datetime import datetime
 from pathlib import Path
 
-from canshaper.commissioning.procedure.pictures import embedded
-from canshaper.commissioning.procedure.sheet import shown
-from canshaper.commissioning.procedure.state import Record, State, Status
-from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.commissioning.procedure.files import shown
+from canshaper.commissioning.procedure.recorded import embedded
+from canshaper.commissioning.procedure.state import (
+    FILE,
+    Context,
+    Outcome,
+    Record,
+    State,
+    Status,
+    Step,
+)
 from canshaper.commissioning.procedure.steps.drive import DRIVE
 from canshaper.machine.deployment import Deployment
 from canshaper.report import html

@@ -16,12 +16,11 @@ from canshaper.commissioning.identification.data import (
 )
 from canshaper.commissioning.identification.plot import figure
 from canshaper.commissioning.identification.recommend import Advice, headlines
-from canshaper.commissioning.identification.report import lines
+from canshaper.commissioning.identification.report import advice_on, lines, write_sway
 from canshaper.commissioning.identification.table import is_table
 from canshaper.commissioning.identification.verdict import Finding
-from canshaper.commissioning.identification.write import advice_on, write_sway
 from canshaper.commissioning.procedure.bench import Bench, Mode, Task
-from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.strokes import Script, Stroke

@@ -4,16 +4,16 @@ from functools import partial
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration
-from canshaper.commissioning.calibration.plot import figure
 from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, usual_top
 from canshaper.commissioning.calibration.write import (
     SIMULATED,
     curve_lines,
+    figure,
     speed_signal,
     write_curve,
 )
 from canshaper.commissioning.procedure.bench import Bench
-from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging, swings
 from canshaper.errors import CalibrationError
 from canshaper.machine.deployment import Deployment
