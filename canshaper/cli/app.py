@@ -18,6 +18,14 @@ from canshaper.errors import CanshaperError, UsageError
 
 EXAMPLE_WIDTH = 70  # of an example, which is indented, in 80 columns
 SENTENCE = 200  # longer than any
+# Each verb's module names its GROUP.
+GROUPS = {
+    "setup": "Set up a machine",
+    "drive": "Drive it",
+    "measure": "Measure it",
+    "design": "Design its filters",
+    "look": "Look, without a machine",
+}
 # They need a scheduler, sockets and signals that only Linux has.
 LINUX_ONLY = {"commission", "doctor", "gateway", "run", "set"}
 
@@ -47,17 +55,21 @@ class Verbs(TyperGroup):
             rich_markup_mode=None,
             context_settings={"help_option_names": ["-h", "--help"]},
         )
-        verb = getattr(import_module(f"{verbs.__name__}.{word}"), word)
+        verb = getattr(_module(name), word)
         checked = _linux_only(verb) if name in LINUX_ONLY else verb
         one.command(name, help=pasteable(verb.__doc__ or ""))(checked)
         self.commands[name] = typer.main.get_command(one)
         return self.commands[name]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List them, each with its whole first sentence; click would cut it off."""
-        every = [(name, self.get_command(ctx, name)) for name in self.commands]
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, verb.get_short_help_str(SENTENCE)) for name, verb in every])
+        """List them by group, each with its whole first sentence; click would cut it off."""
+        rows: dict[str, list[tuple[str, str]]] = {group: [] for group in GROUPS}
+        for name in self.commands:
+            text = self.get_command(ctx, name).get_short_help_str(SENTENCE)
+            rows[_module(name).GROUP].append((name, text))
+        for group, title in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl(rows[group])
 
     def invoke(self, ctx: Any) -> Any:
         """Run the verb that is named."""
@@ -72,6 +84,10 @@ class Verbs(TyperGroup):
         except KeyboardInterrupt:
             echo("interrupted", err=True)
             raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _module(name: str) -> Any:
+    return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
 
 
 def pasteable(text: str) -> str:

@@ -14,6 +14,9 @@ from canshaper.cli.app import app
 NEW = '''
 from canshaper import errors
 
+GROUP = "look"
+
+
 def greet_crane(kind: str) -> None:
     """Greet the crane, or fail."""
     if kind == "interrupted":
@@ -40,6 +43,15 @@ def test_a_new_verb_is_one_file() -> None:
     assert "  greet-crane    Greet the crane, or fail." in runner.invoke(app, "--help").stdout
     assert runner.invoke(app, "greet-crane there").stdout == "hello there\n"
     assert "Greet the crane" in runner.invoke(app, "greet-crane -h").stdout
+
+
+def test_help_has_the_verbs_of_a_group_together() -> None:
+    *_, setup, drive, measure, design, look = CliRunner().invoke(app, "--help").stdout.split(":\n")
+    assert all(verb in setup for verb in ("  check ", "  commission ", "  init "))
+    assert "  run " in drive
+    assert "  identify " in measure
+    assert "  tune " in design
+    assert "  demo " in look
 
 
 def test_help_cuts_no_sentence_off() -> None:

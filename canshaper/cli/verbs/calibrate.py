@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from canshaper.commissioning.calibration.drive import CalibrationDrive
 
+GROUP = "setup"
+
 
 def calibrate(
     file: str = FILE,

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from canshaper.cli.results import Results
     from canshaper.machine.deployment import Deployment
 
+GROUP = "design"
+
 EXIT_NOT_ACCEPTED = 1
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.used_message import NamedCode
 
+GROUP = "setup"
+
 # What joysticks do while the daemon is away.
 FALLBACKS = {
     "stop": "no joystick does without us",

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
     from canshaper.report.console import OnProgress
 
+GROUP = "setup"
+
 EXIT_OPEN = 1
 YES, AGAIN, SKIP, STOP = "yes", "again", "skip", "stop"
 

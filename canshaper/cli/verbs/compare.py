@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from canshaper.design.comparison.limits import Least
     from canshaper.design.comparison.summary import Row
 
+GROUP = "design"
+
 # Columns of the first table: head and kind of work.
 _WORKS = {
     "pulse": "pulse",

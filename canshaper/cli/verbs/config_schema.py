@@ -12,6 +12,8 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 
+GROUP = "look"
+
 
 def config_schema(
     filters: bool = typer.Option(

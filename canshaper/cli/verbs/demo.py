@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from canshaper_sim.recording import Recording
     from canshaper_sim.strokes import Script
 
+GROUP = "look"
+
 # What `report.json` says of a drive without a bus.
 EXIT_NOT_DRIVEN = 1
 DEFAULT = "forwarder-robust.yaml"

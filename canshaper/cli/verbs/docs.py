@@ -9,6 +9,8 @@ from canshaper.cli.common import echo, fail
 from canshaper.errors import UsageError
 from canshaper.shipped import data_directory, site_directory
 
+GROUP = "look"
+
 EXIT_NO_ADDRESS = 1
 # A browser shows what it would else save.
 TEXTS = dict.fromkeys((".md", ".py", ".toml", ".yaml", "", ".link", ".network"), "text/plain")

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from canshaper.commissioning.doctor.verdict import Finding
     from canshaper.machine.deployment import Deployment
 
+GROUP = "setup"
+
 EXIT_NOT_FIT = 1
 REFRESH_HZ = 1  # of the bar, which is load too
 

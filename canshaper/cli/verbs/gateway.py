@@ -10,6 +10,8 @@ from canshaper.errors import BusError, UsageError
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
 
+GROUP = "setup"
+
 EXIT_OTHER_RULES = 1
 
 

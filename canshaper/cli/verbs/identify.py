@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from canshaper.commissioning.identification.verdict import Finding
     from canshaper.machine.deployment import Deployment
 
+GROUP = "measure"
+
 EXIT_TOO_POOR = 1
 
 

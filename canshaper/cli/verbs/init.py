@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.config.bus import Bus
 
+GROUP = "setup"
+
 
 def init(
     file: Path = typer.Argument(Path("machine.yaml"), help="Deployment file to write."),

@@ -4,6 +4,8 @@ import typer
 
 from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, Stop, echo, loader
 
+GROUP = "drive"
+
 
 def monitor(
     file: str = FILE,

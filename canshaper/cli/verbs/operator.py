@@ -14,6 +14,8 @@ from canshaper.cli.common import (
     loader,
 )
 
+GROUP = "look"
+
 
 def operator(
     file: str = FILE,

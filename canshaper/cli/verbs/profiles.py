@@ -8,6 +8,8 @@ import typer
 from canshaper.cli.common import echo, loader
 from canshaper.errors import DesignError, UsageError
 
+GROUP = "measure"
+
 
 def profiles(
     file: str = typer.Argument(

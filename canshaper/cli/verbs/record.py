@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
     from canshaper.recording.record import Recording
 
+GROUP = "measure"
+
 EXIT_NOT_WRITTEN = 1
 ASK_AGAIN_S = 0.2
 

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from canshaper.recording.replay import Drive
     from canshaper.recording.report import Replayed
 
+GROUP = "measure"
+
 EXIT_DIFFERENT = 1
 # Lines on standard output; all of them are in the folder.
 MOST_EVENTS = 12

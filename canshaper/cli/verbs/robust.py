@@ -12,6 +12,8 @@ from canshaper.cli.common import FILE, PICTURE, REPORT, echo, loader, refuse_shi
 if TYPE_CHECKING:
     from canshaper.commissioning.robust import RobustDesign
 
+GROUP = "design"
+
 
 def robust(
     file: str = FILE,

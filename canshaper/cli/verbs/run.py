@@ -14,6 +14,8 @@ from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, loader
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
 
+GROUP = "drive"
+
 
 def run(
     file: str = FILE,

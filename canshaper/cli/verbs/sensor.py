@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from canshaper.commissioning.sensor.finding import Finding
     from canshaper.machine.deployment import Deployment
 
+GROUP = "measure"
+
 EXIT_TOO_POOR = 1
 
 

@@ -12,6 +12,8 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from rich.table import Table
 
+GROUP = "drive"
+
 
 def set(
     file: str = FILE,

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from canshaper.studio.access import Access
     from canshaper.studio.stage import Stage
 
+GROUP = "look"
+
 EXIT_NO_ADDRESS = 1
 DEFAULT = "forwarder.yaml"
 LINUX = sys.platform == "linux"

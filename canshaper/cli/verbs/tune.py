@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.valves import BoundAxis
 
+GROUP = "design"
+
 
 def tune(
     file: str = FILE,
