@@ -6,7 +6,7 @@ import signal
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.bus.packet import boottime_ns
@@ -18,7 +18,6 @@ from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import tick_follower
-from canshaper.daemon.gateway import InlineGateway
 from canshaper.daemon.io_cycle import Standstill, io_cycle
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.notify import Collector, ServiceManager, lock_memory, refuse_huge_pages
@@ -35,6 +34,9 @@ from canshaper.daemon.reporter import Reporter, flush
 from canshaper.errors import BusError, InternalError, raised
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
+
+if TYPE_CHECKING:
+    from canshaper.daemon.gateway import InlineGateway
 
 log = logging.getLogger("canshaper")
 
@@ -206,10 +208,13 @@ class Daemon:
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._follower = tick_follower(deployment, self._controller)
 
-    def _in_line(self, deployment: Deployment) -> InlineGateway | None:
+    def _in_line(self, deployment: Deployment) -> "InlineGateway | None":
         """What passes frames on, where we stand in a line."""
-        in_line = deployment.config.gateway and not deployment.listen_only
-        return InlineGateway(deployment, self._on_fault) if in_line else None
+        if not deployment.config.gateway or deployment.listen_only:
+            return None
+        from canshaper.daemon.gateway import InlineGateway
+
+        return InlineGateway(deployment, self._on_fault)
 
     def _open_control(self, deployment: Deployment) -> ControlServer | None:
         """The control socket, where there shall be one; a machine works without it too."""

@@ -1,4 +1,4 @@
-"""Every protocol that a machine may speak."""
+"""Every protocol that a machine may speak; the daemon loads those of its file only."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,10 +6,7 @@ from canshaper.inputs.input import MessageInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
-from canshaper.protocols.canopen.network import CanopenNetwork
-from canshaper.protocols.gateway.forwarding import Gateway
 from canshaper.protocols.interface import BusProtocol, DrivenAxis
-from canshaper.protocols.j1939.network import J1939Network
 
 
 def protocols(
@@ -26,12 +23,24 @@ def protocols(
         joysticks: its joysticks.
         inputs: its inputs with their messages.
     """
+    config = deployment.config
+    canopen, bound = None, [*inputs]
+    if any(bus.canopen for bus in config.buses.values()) or any(
+        axis.valve.cia408 for axis in config.axes.values()
+    ):
+        from canshaper.protocols.canopen.network import CanopenNetwork
+
+        canopen = CanopenNetwork(deployment, axes)  # its interlocks are asked first
+        bound += canopen.bound
     spoken: list[BusProtocol] = []
-    canopen = CanopenNetwork(deployment, axes)  # its interlocks are asked first
     if any(routes.j1939 for routes in deployment.routing.buses.values()):
-        spoken.append(J1939Network(deployment, axes, [*inputs, *canopen.bound]))
-    if canopen.inputs or canopen.nodes:
+        from canshaper.protocols.j1939.network import J1939Network
+
+        spoken.append(J1939Network(deployment, axes, bound))
+    if canopen and (canopen.inputs or canopen.nodes):
         spoken.append(canopen)
-    if deployment.config.gateway:
+    if config.gateway:
+        from canshaper.protocols.gateway.forwarding import Gateway
+
         spoken.append(Gateway(deployment, axes, joysticks))
     return spoken
