@@ -87,7 +87,7 @@ class Results(SafeConsole):
         if not (path or self._report):
             return None
         try:
-            from canshaper.report.console import save, stamp
+            from canshaper.report.style import save, stamp
         except ImportError:
             self._parts.append(html.text(_no_picture()))
             return None

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from canshaper.recording.report import Replayed
-from canshaper.report.console import (
+from canshaper.report.style import (
     DASHED,
     JOYSTICK_COLOUR,
     PRINT_DPI,

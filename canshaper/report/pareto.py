@@ -10,7 +10,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from canshaper.report.console import (
+from canshaper.report.style import (
     HEAD_PT,
     PRINT_DPI,
     RAW_COLOUR,

@@ -11,7 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
-from canshaper.report.console import (
+from canshaper.report.strokes import (
+    RESIDUAL_DWELL_S,
+    Stroke,
+    aligned,
+    find_strokes,
+    residual_window,
+    residual_windows,
+    rests,
+)
+from canshaper.report.style import (
     DASHED,
     HEAD_PT,
     JOYSTICK_COLOUR,
@@ -29,15 +38,6 @@ from canshaper.report.console import (
     plain,
     titled,
     zero_line,
-)
-from canshaper.report.strokes import (
-    RESIDUAL_DWELL_S,
-    Stroke,
-    aligned,
-    find_strokes,
-    residual_window,
-    residual_windows,
-    rests,
 )
 from canshaper.report.table import NOTHING, axis_title, change_text
 from canshaper.report.top_view import draw_top_views

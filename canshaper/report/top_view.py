@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from canshaper.report.console import (
+from canshaper.report.style import (
     JOYSTICK_COLOUR,
     RAW_COLOUR,
     SHAPED_COLOUR,

@@ -96,7 +96,7 @@ def _reproduce(out: Path, chosen: list[int], console: Console) -> None:
             _write(out / f"figure-{n}.json", numbers[n] | {"finding": picture[0]})
             path = out / f"figure-{n}.png"
             if picture[1] is not None:
-                from canshaper.report.console import save
+                from canshaper.report.style import save
 
                 save(picture[1], path)
                 drawn.append((picture[0], path))

@@ -6,7 +6,7 @@ from typing import Any, Final, Protocol
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from canshaper.report.console import new_figure
+from canshaper.report.style import new_figure
 from studies.paper.style import (
     LEFT,
     PLANT_COLOUR,

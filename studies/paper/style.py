@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from canshaper.report.console import (
+from canshaper.report.style import (
     JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,

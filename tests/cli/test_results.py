@@ -16,14 +16,14 @@ from canshaper import __version__
 from canshaper.cli.app import app
 from canshaper.cli.results import Results
 from canshaper.commissioning.calibration.fit import Calibration, Direction
-from canshaper.commissioning.calibration.write import in_file
+from canshaper.commissioning.calibration.plot import in_file
 from canshaper.commissioning.doctor.measure import Run
-from canshaper.commissioning.doctor.report import figure as doctor_figure
+from canshaper.commissioning.doctor.plot import figure as doctor_figure
 from canshaper.config.limits import Limits
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.report import html
-from canshaper.report.console import new_figure
+from canshaper.report.style import new_figure
 
 ROOT = Path(__file__).parents[2]
 FORWARDER = ROOT / "config" / "forwarder.yaml"
@@ -163,7 +163,7 @@ def test_the_curve_of_the_file_is_the_one_that_the_controller_uses() -> None:
 
 
 def test_picture_of_a_calibration_has_both_curves_and_where_the_valve_opens() -> None:
-    from canshaper.commissioning.calibration.write import figure
+    from canshaper.commissioning.calibration.plot import figure
 
     one = Direction(0.08, ((0.2, 0.1), (0.4, 0.3)), 0.01, 1.0)
     limits, measured = Limits().output_limits(), Calibration(one, one)

@@ -123,7 +123,7 @@ def test_a_monitor_compares_it_with_its_own_files() -> None:
 def test_a_filter_of_another_package_is_named_with_its_module(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    point = EntryPoint("mine", "canshaper.shaping.shapers.kind:Off", "canshaper.shapers")
+    point = EntryPoint("mine", "canshaper.shaping.shapers.off:Off", "canshaper.shapers")
     monkeypatch.setitem(ADDED, "mine", point)
     (line,) = module.filter_lines(["off", "mine"])
     digest = sha256(Path(str(off.__file__)).read_bytes()).hexdigest()
@@ -132,7 +132,7 @@ def test_a_filter_of_another_package_is_named_with_its_module(
 
 def test_a_filter_is_named_with_package_and_version(monkeypatch: pytest.MonkeyPatch) -> None:
     owner = distribution("pytest")
-    point = EntryPoint("mine", "canshaper.shaping.shapers.kind:Off", "canshaper.shapers")
+    point = EntryPoint("mine", "canshaper.shaping.shapers.off:Off", "canshaper.shapers")
     vars(point)["dist"] = owner
     monkeypatch.setitem(ADDED, "mine", point)
     (line,) = module.filter_lines(["mine"])

@@ -13,9 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from canshaper.report.console import RAW_COLOUR, SHAPED_COLOUR, save, stamp
 from canshaper.report.metrics import report_dict
 from canshaper.report.plot import figure, gain_and_price
+from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, save, stamp
 from canshaper_sim.recording import CraneTrace, Recording
 
 Pair = tuple[Recording, Recording]

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from cantools.database.can import Message
 
     from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
-    from canshaper.commissioning.nodes.node import Node, Pdo, Use
+    from canshaper.commissioning.nodes.node import Node, Pdo
     from canshaper.commissioning.nodes.parameters import Parameter
+    from canshaper.commissioning.nodes.use import Use
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
 _NAME_LETTERS = 20  # of a node; its messages' names have 32
@@ -164,7 +165,7 @@ class Nodes:
 
 def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, Use]":
     """How a machine uses messages: how often they come, and when they are lost."""
-    from canshaper.commissioning.nodes.node import Use
+    from canshaper.commissioning.nodes.use import Use
 
     cycles = {message.name: message.cycle_time for message in messages}
     uses: dict[str, Use] = {}

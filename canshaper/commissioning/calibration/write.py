@@ -1,30 +1,10 @@
-"""A measured valve curve: its picture, and its lines in the file."""
+"""A measured valve curve in the file."""
 
-from collections.abc import Sequence
-
-from matplotlib.figure import Figure
-
-from canshaper.commissioning.calibration.fit import FULL, Calibration
+from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.config.origin import note, written_by
 from canshaper.edit.edit import set_values
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import (
-    DASHED,
-    HEAD_PT,
-    MINUS,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-    zero_line,
-)
-from canshaper.report.table import axis_title
-from canshaper.shaping.limits import OutputLimits, without_deadband
 
 # Speed of each axis as `canshaper sim` sends it.
 SIMULATED = {
@@ -94,77 +74,3 @@ def write_curve(deployment: Deployment, axis: str, result: Calibration, *, simul
         "curve_origin": written_by("calibrate", simulated=simulated),
     }
     set_values(deployment.path, ("axes", axis, "limits"), values, note("calibrate"))
-
-
-_HEIGHT_PX = 1250
-
-
-def in_file(limits: OutputLimits, commands_pct: Sequence[float]) -> list[float]:
-    """Speed in % of full that the file expects at commands in %."""
-    curve = limits.curve
-    return [
-        100.0
-        * (curve.velocity(c / 100.0) if curve else without_deadband(c / 100.0, limits.deadband))
-        for c in commands_pct
-    ]
-
-
-def figure(axis: str, limits: OutputLimits, measured: Calibration, top_pct: float) -> Figure:
-    """Speed over command.
-
-    Args:
-        axis: its name.
-        limits: those of the file.
-        measured: what was measured.
-        top_pct: largest command that was driven.
-    """
-    commands, speeds = measured.curve()
-    fine = [0.1 * k for k in range(-1000, 1001)]
-    fig = new_figure(WIDTH_PX, _HEIGHT_PX, dpi=PRINT_DPI)
-    panel = fig.add_axes((0.1, 0.115, 0.87, 0.775))
-    plain(panel, size=TEXT_PT)
-    zero_line(panel)
-    panel.axvspan(-top_pct, top_pct, color="#EFEFEF", linewidth=0, zorder=0, label="driven")
-    panel.plot(
-        fine,
-        in_file(limits, fine),
-        color=RAW_COLOUR,
-        linewidth=1.2,
-        linestyle=DASHED,
-        label="file",
-        zorder=3,
-    )
-    driven = slice(None)
-    if top_pct < 100.0 * FULL:  # what was not driven is a straight line
-        driven = slice(1, -1)
-        panel.plot(commands, speeds, ":", color=SHAPED_COLOUR, linewidth=1.8, label="not measured")
-    panel.plot(
-        commands[driven],
-        speeds[driven],
-        "-o",
-        color=SHAPED_COLOUR,
-        linewidth=1.8,
-        markersize=4,
-        label="measured",
-    )
-    for one, sign, place in ((measured.negative, -1, "right"), (measured.positive, 1, "left")):
-        side = MINUS if sign < 0 else ""
-        panel.annotate(
-            f"opens at {side}{100.0 * one.opens:.1f} %",
-            (sign * 100.0 * one.opens, 0.0),
-            xytext=(sign * 10, -sign * 22),
-            textcoords="offset points",
-            ha=place,
-            va="center",
-            fontsize=TEXT_PT,
-            color=SHAPED_COLOUR,
-            arrowprops={"arrowstyle": "-", "color": SHAPED_COLOUR, "linewidth": 0.7},
-        )
-    panel.set_xlim(-100.0, 100.0)
-    panel.set_ylim(-108.0, 108.0)
-    panel.set_xlabel("command to the valve, % of full", fontsize=TEXT_PT, color=TEXT_COLOUR)
-    panel.set_ylabel("speed, % of full", fontsize=TEXT_PT, color=TEXT_COLOUR)
-    panel.legend(loc="upper left", fontsize=TEXT_PT, frameon=False)
-    title = f"{axis_title(axis)}: the valve as the file has it, and as measured"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
-    return fig

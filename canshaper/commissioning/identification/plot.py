@@ -18,7 +18,7 @@ from canshaper.commissioning.identification.driven import DrivenFit
 from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
 from canshaper.commissioning.identification.verdict import Finding
-from canshaper.report.console import (
+from canshaper.report.style import (
     JOYSTICK_COLOUR,
     PRINT_DPI,
     RAW_COLOUR,

@@ -19,8 +19,8 @@ from canshaper.commissioning.nodes.node import (
     TRANSMISSION,
     Node,
     Pdo,
-    Use,
 )
+from canshaper.commissioning.nodes.use import Use
 from canshaper.config.bus import Bus
 from canshaper.errors import NodeError
 

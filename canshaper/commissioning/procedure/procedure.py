@@ -8,7 +8,7 @@ from pathlib import Path
 
 from canshaper.commissioning.procedure.bench import Bench
 from canshaper.commissioning.procedure.files import Files, Part
-from canshaper.commissioning.procedure.recorded import draw
+from canshaper.commissioning.procedure.pictures import draw
 from canshaper.commissioning.procedure.state import (
     FILE,
     Context,

@@ -1,16 +1,11 @@
 """The log of a drive as a recording: what was asked and sent, and how the grapple swung."""
 
 import math
-from collections.abc import Callable, Mapping
-from datetime import datetime
-from io import BytesIO
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
-from PIL import Image
 
-import canshaper
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.series import Array, Kind, Series
@@ -18,8 +13,6 @@ from canshaper.commissioning.procedure.traffic import read_traffic
 from canshaper.errors import IdentificationError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogFile
-from canshaper.report import html
-from canshaper.report.console import save, stamp
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
@@ -115,42 +108,3 @@ def _angle_deg(deployment: Deployment, name: str, series: Series, at_s: Array) -
     if series.unit.kind is Kind.RATE and sway:
         value = value * sway.mode().period_s / (2.0 * math.pi)
     return [math.degrees(v) for v in np.interp(at_s, series.time_s, value)]
-
-
-# All of a report are to stay below 2 MB; a drawing that takes more is a picture of dots there.
-MOST_SVG_BYTES = 90_000
-COLOURS = 64  # of such a picture
-
-
-def draw(figure: Callable[[], Figure], path: Path, deployment: Deployment) -> list[Path]:
-    """Draw, stamp and write a picture.
-
-    Args:
-        figure: draws it.
-        path: without its suffix.
-        deployment: what it is of.
-
-    Returns:
-        The picture (PNG), and where that is small the drawing (SVG).
-    """
-    drawn = figure()
-    date = f"{datetime.now().astimezone():%Y-%m-%d}"
-    stamp(drawn, f"{deployment.path.name}, canshaper {canshaper.__version__}, {date}")
-    picture, drawing = (path.with_name(f"{path.name}{suffix}") for suffix in (".png", ".svg"))
-    save(drawn, picture)
-    save(drawn, drawing)
-    if drawing.stat().st_size > MOST_SVG_BYTES:
-        drawing.unlink()
-        return [picture]
-    return [picture, drawing]
-
-
-def embedded(path: Path) -> str:
-    """A picture inside the report: a drawing as it is, dots with fewer colours."""
-    if path.suffix == ".svg":
-        return html.picture(path.read_bytes(), "svg+xml", path.stem)
-    file = BytesIO()
-    with Image.open(path) as dots:
-        few = dots.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-        few.save(file, "png", optimize=True)
-    return html.picture(file.getvalue(), "png", path.stem)

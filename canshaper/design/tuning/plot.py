@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
-from canshaper.report.console import (
+from canshaper.report.style import (
     JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,

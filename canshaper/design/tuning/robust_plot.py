@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from canshaper.design.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, step_response
-from canshaper.report.console import (
+from canshaper.report.style import (
     DASHED,
     HEAD_PT,
     MINUS,

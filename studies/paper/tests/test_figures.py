@@ -7,7 +7,7 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 
-from canshaper.report.console import save
+from canshaper.report.style import save
 from studies.paper.draw import optimum_figure, pole_figure
 from studies.paper.draw_bode import bode_figure
 from studies.paper.runs import METRICS

@@ -12,7 +12,8 @@ from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import Traffic, read_traffic
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import (
+from canshaper.report.console import new_table
+from canshaper.report.style import (
     HEAD_PT,
     PRINT_DPI,
     SHAPED_COLOUR,
@@ -20,7 +21,6 @@ from canshaper.report.console import (
     TEXT_PT,
     WIDTH_PX,
     new_figure,
-    new_table,
     plain,
 )
 from canshaper_sim.strokes import Script

@@ -11,7 +11,7 @@ from canshaper.config.source import Source
 from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import rehearsed_valves, unstated
-from canshaper.report.console import (
+from canshaper.report.style import (
     HEAD_PT,
     PRINT_DPI,
     RAW_COLOUR,

@@ -8,7 +8,8 @@ from canshaper.commissioning.procedure.bench import STILL_MOVES, Mode, Task
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.joysticks import LEAST
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
-from canshaper.report.console import (
+from canshaper.report.console import new_table
+from canshaper.report.style import (
     DASHED,
     HEAD_PT,
     JOYSTICK_COLOUR,
@@ -20,7 +21,6 @@ from canshaper.report.console import (
     TITLE_PT,
     WIDTH_PX,
     new_figure,
-    new_table,
     plain,
     titled,
     zero_line,

@@ -9,7 +9,8 @@ from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
 from canshaper.edit.edit import set_values
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import (
+from canshaper.report.console import new_table
+from canshaper.report.style import (
     HEAD_PT,
     PRINT_DPI,
     SHAPED_COLOUR,
@@ -18,7 +19,6 @@ from canshaper.report.console import (
     TITLE_PT,
     WIDTH_PX,
     new_figure,
-    new_table,
     plain,
     titled,
     zero_line,

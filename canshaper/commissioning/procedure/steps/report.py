@@ -4,7 +4,7 @@ from datetime import datetime
 from pathlib import Path
 
 from canshaper.commissioning.procedure.files import shown
-from canshaper.commissioning.procedure.recorded import embedded
+from canshaper.commissioning.procedure.pictures import embedded
 from canshaper.commissioning.procedure.state import (
     FILE,
     Context,

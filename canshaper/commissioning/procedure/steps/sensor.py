@@ -7,7 +7,8 @@ from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.sensor.finding import DRIVE_IT, Finding, examine
 from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
-from canshaper.commissioning.sensor.report import figure, heading, table, write_sensors
+from canshaper.commissioning.sensor.plot import figure
+from canshaper.commissioning.sensor.report import heading, table, write_sensors
 from canshaper.machine.deployment import Deployment
 
 

@@ -4,11 +4,11 @@ from functools import partial
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration
+from canshaper.commissioning.calibration.plot import figure
 from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, usual_top
 from canshaper.commissioning.calibration.write import (
     SIMULATED,
     curve_lines,
-    figure,
     speed_signal,
     write_curve,
 )
