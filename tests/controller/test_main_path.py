@@ -1,0 +1,42 @@
+"""The way of a frame: from a joystick's to the valves', behind the gate, in motion.
+
+A way that grows needs its numbers changed here, and a reason.
+"""
+
+import sys
+from types import FrameType
+
+import pytest
+
+from tests.rigs.forwarder import ROOT, Rig
+
+SLEW = 600
+
+
+@pytest.mark.parametrize(
+    ("file", "functions", "files"), [("forwarder", 37, 19), ("forwarder-robust", 59, 24)]
+)
+def test_the_way_of_a_frame_grows_no_longer(file: str, functions: int, files: int) -> None:
+    rig = Rig(ROOT / "config" / f"{file}.yaml")
+    rig.run(3)
+    rig.run(30, Slew=SLEW)
+    frame = rig.joystick(Slew=SLEW)
+    called: set[tuple[str, str]] = set()
+
+    def on_event(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and "/canshaper/" in frame.f_code.co_filename:
+            called.add((frame.f_code.co_filename, frame.f_code.co_qualname))
+
+    sys.setprofile(on_event)
+    try:
+        rig.receive(frame)
+        sent = list(rig.controller.tick(rig.now_ns))
+    finally:
+        sys.setprofile(None)
+    print(
+        *(f"{place.rpartition('/canshaper/')[2]} {name}" for place, name in sorted(called)),
+        sep="\n",
+    )
+    assert any(any(frame.data[:2]) for frame in sent)  # in motion
+    assert len(called) <= functions
+    assert len({place for place, _ in called}) <= files
