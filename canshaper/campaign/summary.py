@@ -1,4 +1,4 @@
-"""What a campaign says: quantiles, broken promises, what drives the worst, and the verdict."""
+"""Summary of a campaign as numbers and tables: quantiles, broken promises, the worst, the verdict."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""The inputs of a deployment: what receives each of its messages."""
+"""The inputs of a deployment by their messages, and what a reload carries over."""
 
 from collections.abc import Iterable, Iterator, Mapping
 

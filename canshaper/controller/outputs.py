@@ -1,4 +1,4 @@
-"""The valve messages: which axes command each, and what becomes of a frame that does not leave."""
+"""Valve messages: their axes, counters of faults, and frames that come too late."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Self

@@ -1,4 +1,4 @@
-"""Operator, daemon and plant as three processes on a bus, with a listener that records."""
+"""Operator, daemon and plant as processes on a bus: they end with their parent."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""One number out of a message, while it is fresh: a radius, a weight, a choice, a flow."""
+"""One number out of a message, while it is fresh: a radius, a weight, a profile."""
 
 import sys
 from collections.abc import Mapping, Sequence

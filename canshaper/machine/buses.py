@@ -1,4 +1,4 @@
-"""What the buses and the gateway of a deployment file say against each other."""
+"""Buses and gateway of a deployment file: options, contradictions, load."""
 
 from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass

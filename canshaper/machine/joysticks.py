@@ -1,4 +1,4 @@
-"""Joysticks of a deployment, bound to the DBC: the velocities that the axes take from them."""
+"""Joysticks of a deployment, bound to the DBC: velocities, enabling switches, ticks that follow."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Stopping distance of an axis in metres at the tip, against the bound that its file states."""
+"""Stopping distance of an axis at the tip, against its bound; measured or rehearsed numbers."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Vector's ASC."""
+"""Vector's ASC, and what text logs share: identifiers, data, line by line."""
 
 import re
 from collections.abc import Iterator

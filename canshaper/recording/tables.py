@@ -1,4 +1,4 @@
-"""Logs that are tables with commas: python-can's, and GVRET's of SavvyCAN."""
+"""Logs that are tables with commas, python-can's and GVRET's, and the writer of logs."""
 
 import re
 from base64 import b64decode

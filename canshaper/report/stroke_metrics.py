@@ -1,4 +1,4 @@
-"""What one stroke of the joystick shows: rise, run-on, dip, and how the output rose again."""
+"""Figures of one stroke of the joystick and of the crane: rise, run-on, dip, swing."""
 
 import math
 from collections.abc import Mapping, Sequence

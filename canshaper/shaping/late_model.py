@@ -1,4 +1,4 @@
-"""The sway model as it was at the time of a measurement: behind the valve and the sensor."""
+"""The sway model as it was when a measurement was made, and transfers without a jump."""
 
 import math
 from collections import deque

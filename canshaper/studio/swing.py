@@ -1,4 +1,4 @@
-"""How far a grapple swings: the largest sway of the last full swing. No clock."""
+"""How far a grapple swings: the largest sway of the last full swing, and its residual. No clock."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""Answers to questions: each is checked when it is given, and asked again until it is one."""
+"""Answers to questions: checked when given, asked again until valid, or all accepted at once."""
 
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence

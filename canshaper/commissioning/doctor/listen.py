@@ -1,4 +1,4 @@
-"""The joysticks on the real bus, only listened to: are they there, and how regular are they?"""
+"""The joysticks on the real bus, only listened to: are they there, regular, and deflected?"""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Where the procedure keeps what it makes, and who may work on it."""
+"""Where the procedure keeps what it makes, the sheet to sign, and who may work on it."""
 
 import fcntl
 import io

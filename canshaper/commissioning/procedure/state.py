@@ -1,4 +1,4 @@
-"""How far the procedure has come, in one JSON file next to the deployment."""
+"""How far the procedure has come, in one JSON file; the interface of its steps."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The frames of joysticks on their way through a gateway, and what is sent when none come."""
+"""The frames of joysticks on their way through a gateway, and which others the kernel passes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
