@@ -1,4 +1,4 @@
-"""Summary of a campaign as numbers and tables: quantiles, broken promises, the worst, the verdict."""
+"""Summary of a campaign: quantiles, broken promises, the worst drives, the verdict."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""One tick between the buses and a frame processor, and what a standstill of the loop takes back."""
+"""One tick between the buses and a frame processor, and what a standstill takes back."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Protocol
