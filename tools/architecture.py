@@ -31,9 +31,10 @@ RINGS = {
     ),
     "on the machine": (
         "a maintainer; tests of what moves a valve or writes a file",
-        tuple(
-            f"commissioning/{name}"
-            for name in ("calibration", "doctor", "monitor", "nodes", "procedure", "sensor")
+        (
+            "edit",
+            *("commissioning/calibration", "commissioning/doctor", "commissioning/monitor"),
+            *("commissioning/nodes", "commissioning/procedure", "commissioning/sensor"),
         ),
     ),
     "desk": (
