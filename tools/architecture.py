@@ -1,12 +1,14 @@
 """Draw docs/architecture.svg: the rooms in their layers, from the import contracts and the code.
 
 What each room is for is the docstring of its package; the way of one joystick frame to its valve is
-marked. ``tools/architecture.py --check`` says whether the drawing is that of the tree.
+marked. ``tools/architecture.py --check`` says whether the drawing is that of the tree. The table of
+rings, which ``make generate`` writes into docs/architecture.md, is made here too.
 """
 
 import ast
 import sys
 import tomllib
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
@@ -16,6 +18,30 @@ FILE = ROOT / "docs" / "architecture.svg"
 PATH = ("bus", "daemon", "controller", "inputs", "shaping", "codec")
 DESK = ("cli", "studio", "campaign", "commissioning", "recording", "design", "report")
 WIDTH, ROW, LEFT = 960, 46, 24
+# Rings by what an error can do: who reviews a change, and rooms below canshaper/. A room within
+# another one belongs to the ring that names it.
+RINGS = {
+    "gate": ("someone who did not write it, every line, against safety.md", ("gate",)),
+    "runtime": (
+        "a maintainer; golden drives equal to the bit",
+        (
+            *("errors", "shipped", "checksums", "shaping", "config", "codec", "machine", "inputs"),
+            *("bus", "protocols", "controller", "blackbox", "daemon"),
+        ),
+    ),
+    "on the machine": (
+        "a maintainer; tests of what moves a valve or writes a file",
+        (
+            "edit",
+            *("commissioning/calibration", "commissioning/doctor", "commissioning/monitor"),
+            *("commissioning/nodes", "commissioning/procedure", "commissioning/sensor"),
+        ),
+    ),
+    "desk": (
+        "its tests",
+        ("api", "report", "design", "recording", "commissioning", "campaign", "studio", "cli"),
+    ),
+}
 STYLE = """
   text { font: 13px sans-serif; fill: #1c2733 } .name { font-weight: bold }
   .note { font-size: 11px; fill: #51606e } rect { stroke: #8195a8; rx: 5 }
@@ -37,6 +63,30 @@ def layers() -> list[list[str]]:
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
     rows = contracts["contracts"][0]["layers"]
     return [[name.strip().removeprefix("canshaper.") for name in row.split("|")] for row in rows]
+
+
+def ring_rows() -> Iterator[str]:
+    """Table of the rings, with their lines of Python to the nearest thousand.
+
+    Raises:
+        ValueError: a module of the package is in no ring.
+    """
+    package = ROOT / "canshaper"
+    lines = dict.fromkeys(RINGS, 0)
+    rings = {room: ring for ring, (_, rooms) in RINGS.items() for room in rooms}
+    for file in sorted(package.rglob("*.py")):
+        name = file.relative_to(package).with_suffix("")
+        places = [place.as_posix() for place in (name, *name.parents)]
+        ring = next((rings[place] for place in places if place in rings), None)
+        if ring is None and name.stem not in ("__init__", "__main__"):
+            raise ValueError(f"expected {name} in RINGS of tools/architecture.py, got no ring")
+        if ring is not None:
+            lines[ring] += len(file.read_text(encoding="utf-8").splitlines())
+    yield "| ring | rooms | lines | reviewed by |"
+    yield "|---|---|---|---|"
+    for ring, (review, rooms) in RINGS.items():
+        thousands = max(1, round(lines[ring] / 1000))
+        yield f"| {ring} | {', '.join(rooms)} | {thousands} 000 | {review} |"
 
 
 def box(room: str, left: float, top: float, width: float) -> list[str]:

@@ -26,6 +26,7 @@ from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
+from tools.architecture import ring_rows
 from tools.frame_faults import FAULT_TEXTS
 from tools.marks import marked, with_sections
 
@@ -214,6 +215,7 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "e2e profiles": profile_rows,
     "measures": measure_rows,
     "steps": step_rows,
+    "rings": ring_rows,
 }
 
 

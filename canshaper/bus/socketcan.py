@@ -1,6 +1,6 @@
 """SocketCAN sockets: ids to filters, and the options that a control loop needs.
 
-Why not python-can: docs/decisions/0006-raw-sockets.md.
+Why not python-can: docs/decisions.md#raw-sockets.
 """
 
 import select

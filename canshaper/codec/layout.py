@@ -1,6 +1,6 @@
 """Raw values of a message from and to bytes, compiled once for the control loop.
 
-bitstruct is called directly: docs/decisions/0009-cantools-at-the-desk.md.
+bitstruct is called directly: docs/decisions.md#cantools-at-the-desk.
 """
 
 import math

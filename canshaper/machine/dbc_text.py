@@ -1,6 +1,6 @@
 """Which text of a DBC file belongs to which message: one pass over its statements, no parser.
 
-cantools gets the text of the messages that are used (docs/decisions/0009-cantools-at-the-desk.md).
+cantools gets the text of the messages that are used (docs/decisions.md#cantools-at-the-desk).
 Strings and comments end where they end for cantools: nothing within one is taken for a statement.
 """
 

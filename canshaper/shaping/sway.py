@@ -135,7 +135,7 @@ class SwayModel:
         angle = theta / (k V)            s
         rate  = theta' / (k V) - v       1        v: velocity in [-1, 1], held over the tick
 
-    One step is x += F (angle, rate + v) with F = Ad - I: docs/decisions/0002-sway-in-increments.md.
+    One step is x += F (angle, rate + v) with F = Ad - I: docs/decisions.md#sway-in-increments.
 
     Attributes:
         free_angle: swing that the velocity does not explain, as a sensor shows it; 0 without one.

@@ -13,6 +13,7 @@ from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
+from tools import architecture
 from tools.frame_faults import FAULT_TEXTS
 
 ROOT = Path(__file__).parents[2]
@@ -95,3 +96,18 @@ def test_a_list_of_keys_has_default_range_unit_and_the_place_of_what_is_below() 
 def test_a_list_of_keys_has_those_of_the_section_itself() -> None:
     rows = list(generate["key_rows"](generate["section_names"]()["EmergencyStop"], {}))
     assert [row.partition("`")[2].partition("`")[0] for row in rows] == ["signal"]
+
+
+def test_a_room_without_a_ring_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    rings = {name: ring for name, ring in architecture.RINGS.items() if name != "gate"}
+    monkeypatch.setattr(architecture, "RINGS", rings)
+    with pytest.raises(ValueError, match=r"expected gate/\w+ in RINGS .*, got no ring"):
+        list(architecture.ring_rows())
+
+
+def test_lines_of_a_ring_are_those_of_its_rooms() -> None:
+    gate = sum(
+        len(f.read_text("utf-8").splitlines()) for f in (ROOT / "canshaper/gate").glob("*.py")
+    )
+    row = next(row for row in architecture.ring_rows() if row.startswith("| gate |"))
+    assert f"| {round(gate / 1000)} 000 |" in row

@@ -2,7 +2,7 @@
 
 The unknowns are z = [ln q1, ln(q2/q1), (ln(q3/q2))] with the poles -q_i, slowest first. Eq. 14d is
 z_2, z_3 >= 0, and 14e becomes a bound on z_1 (or on the sum of z):
-docs/decisions/0010-poles-as-logarithms.md.
+docs/decisions.md#poles-as-logarithms.
 
 The cost watches Eq. 13 sampled exactly: u is held, so a chain of first-order lags gives v of
 v = u / (a2 s^2 + a1 s + 1) by a matrix exponential that also holds for a double pole, and

@@ -5,7 +5,7 @@
     output           v* = u - K1 angle - K2 (rate + u)       u: operator's command
     model update     x += F (angle, rate + v)                v: v* after all limits and rounding
 
-Why: docs/decisions/0001-feedback-from-what-was-sent.md.
+Why: docs/decisions.md#feedback-on-what-was-sent.
 """
 
 import math

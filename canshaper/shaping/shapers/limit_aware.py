@@ -3,7 +3,7 @@
     v* = y - K1 (angle - angle_twin) - K2 (rate - rate_twin)
 
 The axis' sway model is driven by what was sent, its twin by what the shaper asked for. Why:
-docs/decisions/0003-limit-aware-by-a-twin.md.
+docs/decisions.md#limits-by-a-twin.
 """
 
 import math

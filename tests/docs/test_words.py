@@ -1,0 +1,87 @@
+"""Budgets of words, so that each page can be read once, from top to bottom.
+
+A fact that is added takes the place of another one, or moves to the page that it belongs to: a
+reader of a page that only grows finds nothing on it, and two pages with one fact soon contradict
+each other. What a command writes into a page (tables between marks, output of ``canshaper``) is
+not counted: it grows with the program.
+"""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import EVERY_PAGE, ROOT
+
+MORE = 1.05  # a page may exceed its budget by so much before it has to be shortened
+TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
+OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
+BUDGET = {
+    "CHANGELOG.md": 630,
+    "CONTRIBUTING.md": 500,
+    "README.md": 590,
+    "SECURITY.md": 430,
+    "docs/api.md": 150,
+    "docs/architecture.md": 310,
+    "docs/calibration.md": 370,
+    "docs/campaign.md": 760,
+    "docs/canopen.md": 780,
+    "docs/checksums.md": 230,
+    "docs/commission.md": 610,
+    "docs/comparison.md": 650,
+    "docs/decisions.md": 880,
+    "docs/deployment.md": 1760,
+    "docs/devices.md": 540,
+    "docs/doctor.md": 420,
+    "docs/glossary.md": 400,
+    "docs/guide.md": 1030,
+    "docs/identification.md": 580,
+    "docs/j1939.md": 660,
+    "docs/machine-manual.md": 890,
+    "docs/monitor.md": 230,
+    "docs/realtime.md": 400,
+    "docs/replay.md": 690,
+    "docs/safety.md": 3310,
+    "docs/sensor.md": 1170,
+    "docs/service.md": 790,
+    "docs/states.md": 230,
+    "docs/studio.md": 690,
+    "docs/testing.md": 500,
+    "docs/topologies.md": 790,
+    "docs/troubleshooting.md": 600,
+    "docs/tuning.md": 580,
+    "studies/README.md": 720,
+}
+
+
+def words(text: str) -> int:
+    """Words of a page that someone wrote by hand, as ``wc -w`` counts them."""
+    return len(OUTPUT.sub("", TABLES.sub("", text)).split())
+
+
+def excess(page: str, text: str) -> str | None:
+    """What is wrong with the number of words of a page."""
+    count, budget = words(text), BUDGET[page]
+    if count <= MORE * budget:
+        return None
+    return f"{page}: expected {budget} words, at most 5 % more, got {count}"
+
+
+def test_every_page_has_a_budget() -> None:
+    assert {str(page.relative_to(ROOT)) for page in EVERY_PAGE} == BUDGET.keys()
+
+
+@pytest.mark.parametrize("page", BUDGET)
+def test_a_page_keeps_its_budget(page: str) -> None:
+    assert excess(page, Path(ROOT, page).read_text(encoding="utf-8")) is None
+
+
+def test_a_page_that_grows_is_refused_and_its_tables_do_not_count() -> None:
+    page = "docs/api.md"
+    budget = BUDGET[page]
+    table = "<!-- generated: filters -->\n" + "| a " * 500 + "\n<!-- end: filters -->\n"
+    output = "<!-- canshaper demo -->\n```text\n" + "1 " * 500 + "\n```\n"
+    assert excess(page, "word " * int(MORE * budget) + "\n" + table + output) is None
+    wrong = excess(page, "word " * (int(MORE * budget) + 1) + "\n" + table + output)
+    assert wrong is not None
+    assert wrong.startswith("docs/api.md: expected")
