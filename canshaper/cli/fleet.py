@@ -187,7 +187,7 @@ def _start_ns(path: Path) -> int:
         return 0
 
 
-def drifts(logs: Sequence[Log]) -> Iterator[str]:
+def period_drifts(logs: Sequence[Log]) -> Iterator[str]:
     """Where the period of a machine has changed by more than its intervals, from first to last."""
     by_axis: dict[tuple[str, str], list[Row]] = {}
     for log in logs:
@@ -252,7 +252,7 @@ def show_periods(logs: Sequence[Log], results: SafeConsole) -> None:
         usable = "yes" if row["usable"] else "no"
         table.add_row(f"{_name(log)} {row['axis']}", row["day"], *cells, usable)
     results.print(table)
-    for line in drifts(logs):
+    for line in period_drifts(logs):
         results.print(f"DRIFT: {line}", soft_wrap=True)
 
 

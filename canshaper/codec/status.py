@@ -16,7 +16,7 @@ from cantools.database.can import Message
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.states import Reason, State
 from canshaper.shaping.trust import Trust
 
@@ -71,7 +71,7 @@ class ReportedAxis(Protocol):
     """An axis, as its status sees it."""
 
     @property
-    def axis(self) -> Axis:
+    def axis(self) -> ShapedAxis:
         """State, reason, commands."""
 
     @property

@@ -7,7 +7,7 @@ from canshaper.machine.filters import unfit
 from canshaper.machine.stopping import rehearsed, unstated
 
 
-def doubts(deployment: Deployment) -> list[Problem]:
+def warnings_of(deployment: Deployment) -> list[Problem]:
     """Filters that do not fit, travel that no one has stated, numbers of a simulated crane."""
     source = Source(deployment.path)
     config = deployment.config

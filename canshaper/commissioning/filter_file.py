@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.config.origin import note, written_by
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.edit.edit import FileValue, set_values
 from canshaper.errors import ConfigError
@@ -79,7 +79,7 @@ def write_filter(
 
 
 def _with_origin(
-    config: AxisConfig, filter_values: Mapping[str, FileValue], verb: str
+    config: AxisSection, filter_values: Mapping[str, FileValue], verb: str
 ) -> dict[str, FileValue]:
     """The same with the origin of the design."""
     designed_for = filter_values["designed_for"]

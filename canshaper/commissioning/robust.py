@@ -112,7 +112,7 @@ def design_robust(
     )
 
 
-def outline(one: RobustDesign) -> str:
+def summary_line(one: RobustDesign) -> str:
     """How long it takes, and what it leaves."""
     shaper = one.shaper
     return (
@@ -125,7 +125,7 @@ def outline(one: RobustDesign) -> str:
 def print_design(deployment: Deployment, one: RobustDesign, console: Console) -> None:
     """What it does, what it costs, how far the tip travels with it."""
     axis = one.bound.name
-    console.print(outline(one))
+    console.print(summary_line(one))
     console.print(_table(one.measured))
     if one.second:
         console.print(_second_table(one))

@@ -12,8 +12,8 @@ from rich.text import Text
 
 from canshaper.config.enable import slowest_ms
 from canshaper.config.filters import Filter, Profile
-from canshaper.config.schema import AxisConfig
-from canshaper.controller.runner import AxisRunner
+from canshaper.config.schema import AxisSection
+from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import FullSpeed, full_speed, stop_fault
@@ -78,7 +78,7 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
     travels = [
         travel(
             lambda one=one: (
-                AxisRunner(  # type: ignore[misc]
+                AxisControl(  # type: ignore[misc]
                     one, tick_s, JoystickInput(joystick), senders
                 ).axis
             ),
@@ -103,7 +103,7 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
 def _variants(bound: BoundAxis) -> Iterator[BoundAxis]:
     """The axis with each sway and filter that its file names."""
     config = bound.config
-    parts: list[AxisConfig | Profile] = [config, *config.profiles.values()]
+    parts: list[AxisSection | Profile] = [config, *config.profiles.values()]
     for part in parts:
         pairs = [
             (config.sway, part.filter),

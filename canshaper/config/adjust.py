@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 from pydantic import ValidationError
 
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.config.section import Section
 from canshaper.shaping.registry import KINDS
 
@@ -35,14 +35,14 @@ class Key(NamedTuple):
         return f"axes.{self.axis}.{self.section}.{self.name}"
 
 
-def value(config: AxisConfig, key: Key) -> float | None:
+def value(config: AxisSection, key: Key) -> float | None:
     """The number at a key; None where none stands."""
     section = getattr(config, key.section, None) if key.section in _SECTIONS else None
     number = getattr(section, key.name, None)
     return number if isinstance(number, float) else None
 
 
-def adjusted(config: AxisConfig, values: Mapping[Key, float], file: AxisConfig) -> AxisConfig:
+def adjusted(config: AxisSection, values: Mapping[Key, float], file: AxisSection) -> AxisSection:
     """The configuration of an axis with other numbers.
 
     A filter that is made for one period is drawn out to another one, always from that of the file.
@@ -81,7 +81,7 @@ def _with(section: S, name: str, new: Mapping[str, Any]) -> S:
         raise ValueError(f"{where}: {first.get('ctx', {}).get('error', first['msg'])}") from None
 
 
-def faults(key: Key, config: AxisConfig, low: float, high: float) -> Iterator[str]:
+def faults(key: Key, config: AxisSection, low: float, high: float) -> Iterator[str]:
     """Why a number of an axis cannot be adjustable within a range."""
     now = value(config, key)
     if now is None:

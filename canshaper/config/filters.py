@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from canshaper.config.inputs import Input, NamedCodes
+from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.limits import Sway
 from canshaper.config.origin import Origin
 from canshaper.config.section import RUN, Section, expanded, number
@@ -240,14 +240,14 @@ class Profile(Section):
         return self
 
 
-class LoadState(NamedCodes, Input):
+class LoadState(NamedCodes, InputSection):
     """A signal that says what hangs on the crane: closed or open, weight of the load, period."""
 
     signal: str = Field(description="signal with the value that the breakpoints name")
     timeout_ms: Annotated[int, number(10, 60_000, "ms", "age at which it counts as lost")]
 
 
-class ProfileSwitch(Input):
+class ProfileSwitch(InputSection):
     """A switch or display with which the operator chooses how the crane responds."""
 
     signal: str = Field(description="signal with the code of the choice")

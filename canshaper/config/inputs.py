@@ -10,7 +10,7 @@ from canshaper.config.section import Section, number
 from canshaper.shaping.sway_sensor import Measured
 
 
-class Input(Protected):
+class InputSection(Protected):
     """A message that is received, with its age limit and its protection."""
 
     source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
@@ -31,7 +31,7 @@ class Input(Protected):
     """Good messages in a row that are needed at the start, after a wrong one and after silence."""
 
 
-class Switch(Input):
+class SwitchSection(InputSection):
     """A switch in a message of its own: seat or door switch, button, state of another ECU."""
 
     signal: str = Field(description="signal of the switch")
@@ -72,7 +72,7 @@ class NamedCodes(Section):
 Kind = Literal["angle", "inclination", "rate"]
 
 
-class SwaySensor(NamedCodes, Input):
+class SwaySensorSection(NamedCodes, InputSection):
     """Measures the swing of the tool in the plane of the axis.
 
     An angle is that of a joint, an inclination that of the tool against the vertical, a rate that

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from canshaper.config.inputs import Input, NamedCodes
+from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.origin import Origin
 from canshaper.config.section import Section, number
 from canshaper.shaping.limits import OutputLimits
@@ -110,7 +110,7 @@ class Limits(Section):
         )
 
 
-class Radius(NamedCodes, Input):
+class Radius(NamedCodes, InputSection):
     """Radius of the tip, measured."""
 
     signal: str = Field(description="signal with the radius in m")

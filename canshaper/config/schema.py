@@ -13,7 +13,13 @@ from canshaper.config.filters import (
     ProfileSwitch,
     schedule_fault,
 )
-from canshaper.config.inputs import Input, NamedCodes, SwaySensor, Switch, SwitchNames
+from canshaper.config.inputs import (
+    InputSection,
+    NamedCodes,
+    SwaySensorSection,
+    SwitchNames,
+    SwitchSection,
+)
 from canshaper.config.limits import Limits, Motion, Slewing, Sway
 from canshaper.config.protection import Protected
 from canshaper.config.section import VERSION, Section, number
@@ -21,7 +27,7 @@ from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.shaping.registry import KINDS
 
 
-class Joystick(Input):
+class Joystick(InputSection):
     """A joystick message and the switches in it."""
 
     enable: SwitchNames | None = None
@@ -52,7 +58,7 @@ class Joystick(Input):
         return self
 
 
-class StatusWord(Input):
+class StatusWord(InputSection):
     """Status word of a valve of CiA 408."""
 
     signal: str = Field(description="signal with object 6041h, its low four bits the state")
@@ -66,7 +72,7 @@ class Cia408(Section):
     node: str | None = Field(None, description="name of the valve's node on its bus")
 
 
-class EmergencyStop(Input):
+class EmergencyStop(InputSection):
     """An emergency stop that comes on the bus. It is no replacement for the one that is wired."""
 
     signal: str = Field(description="signal of the stop: raw 0 is free, every other value stops")
@@ -172,7 +178,7 @@ class Valve(Scaling, Protected):
         return self
 
 
-class Feedback(NamedCodes, Input):
+class FeedbackSection(NamedCodes, InputSection):
     """What a valve says of itself: estimated flow, or position of the spool."""
 
     signal: str = Field(
@@ -193,12 +199,12 @@ class Status(Protected):
     """A status message for displays and tools."""
 
 
-class AxisConfig(Section):
+class AxisSection(Section):
     """One axis: from which joystick, through which filter and limits, to which valve."""
 
     command: Command = Field(description="the joystick that commands the axis")
     valve: Valve = Field(description="the valve that moves the axis")
-    feedback: Feedback | None = None
+    feedback: FeedbackSection | None = None
     """What the valve says of itself: it is compared with what was commanded."""
     status: Status | None = None
     """Message with the status of the axis: signals State, Reason, RawCommand, ShapedCommand,
@@ -206,7 +212,7 @@ class AxisConfig(Section):
     at every transition; no one else may use its id."""
     sway: Sway | None = None
     """Swing of the tool on this axis."""
-    sway_sensor: SwaySensor | None = None
+    sway_sensor: SwaySensorSection | None = None
     """What measures that swing."""
     slewing: Slewing | None = None
     """Of an axis that slews: its full speed in angle, and its radius."""
@@ -248,10 +254,10 @@ class DeploymentConfig(Section):
     buses: dict[str, Bus] = Field(min_length=1, description="CAN buses by name")
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     joysticks: dict[str, Joystick] = Field(min_length=1, description="joystick messages by name")
-    switches: dict[str, Switch] = Field(
+    switches: dict[str, SwitchSection] = Field(
         {}, description="switches in messages of their own that enable joysticks, by name"
     )
-    axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
+    axes: dict[str, AxisSection] = Field(min_length=1, description="axes by name")
     motion: dict[str, Motion] = Field(
         {}, description="slew and near-far of a crane as one motion, by name"
     )

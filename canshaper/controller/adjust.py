@@ -6,9 +6,9 @@ The new numbers are lost when the daemon ends or reads its file again.
 from collections.abc import Iterable, Mapping
 
 from canshaper.config.adjust import Key, adjusted, value
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.machine.filters import filter_fault
 from canshaper.machine.stopping import stop_fault
 
@@ -88,7 +88,7 @@ class Adjuster:
                 raise ValueError(f"{text}: expected {low:g} to {high:g}, got {number:g}")
             yield _key(text), float(number)
 
-    def _config(self, name: str, runner: AxisRunner, values: Mapping[Key, float]) -> AxisConfig:
+    def _config(self, name: str, runner: AxisControl, values: Mapping[Key, float]) -> AxisSection:
         try:
             config = adjusted(runner.bound.config, values, self._deployment.config.axes[name])
         except ValueError as error:

@@ -10,7 +10,7 @@ from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.inputs import MachineInputs, parts, received_by
 from canshaper.controller.motion import motion_runners
 from canshaper.controller.outputs import Counters, OverrunDetector, ValveOutputs
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.controller.status import SensorReport, StatusMessages
 from canshaper.inputs.input import EnableGate, Key, Part, carry_over
 from canshaper.machine.deployment import Deployment
@@ -45,7 +45,7 @@ class Controller:
         self._senders = {one.key: one.sender() for one in deployment.sent()}
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
-            name: AxisRunner(
+            name: AxisControl(
                 bound, tick_s, inputs.joysticks[bound.config.command.joystick], self._senders
             )
             for name, bound in deployment.axes.items()
@@ -201,7 +201,7 @@ class Controller:
         if self._protocols:
             yield from self._of_protocols(now_ns)
 
-    def _changed(self, name: str, runner: AxisRunner, transition: Transition) -> None:
+    def _changed(self, name: str, runner: AxisControl, transition: Transition) -> None:
         """An axis has another state; one that trips is no longer moved by another, nor moves it."""
         self.events.append(StateEvent(name, transition))
         if transition.new is State.TRIPPED:
@@ -216,7 +216,7 @@ class Controller:
             yield from protocol.frames(now_ns)
             self.events += protocol.changes()
 
-    def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisRunner]:
+    def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisControl]:
         """Count missed ticks for every axis, then let the motions add to theirs.
 
         Returns:
@@ -246,7 +246,7 @@ class Controller:
             self._sensors[name] = SensorReport(name, self.axes[name])
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
 
-    def _report(self, name: str, runner: AxisRunner, now_ns: int) -> None:
+    def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
         """Report when valve or sway sensor say something else than before."""
         sent, feedback = runner.axis.sent, runner.feedback
         if feedback is not None and feedback.check(sent, now_ns):

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 
 from canshaper.codec.sent import Sender
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.sway_sensor import SwaySensorInput
@@ -109,7 +109,7 @@ def parts(
     deployment: Deployment,
     senders: Iterable[Sender],
     inputs: Mapping[tuple[str, int, bool], Part],
-    axes: Mapping[str, AxisRunner],
+    axes: Mapping[str, AxisControl],
     protocols: Iterable[BusProtocol],
 ) -> dict[Key, Part]:
     """Every part by its key.

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from canshaper.config.limits import Motion
 from canshaper.controller.events import MotionEvent
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.motion import TwoAxisMotion, farthest_m
@@ -21,7 +21,7 @@ class _Member:
 
     __slots__ = ("moving", "runner")
 
-    def __init__(self, runner: AxisRunner, full_speed: float) -> None:
+    def __init__(self, runner: AxisControl, full_speed: float) -> None:
         assert runner.axis.sway is not None  # checked with the deployment
         self.runner = runner
         self.moving = MovingAxis(full_speed, runner.period_s, runner.axis.sway)
@@ -68,8 +68,8 @@ class MotionRunner:
         self,
         name: str,
         config: Motion,
-        slew: AxisRunner,
-        near_far: AxisRunner | None,
+        slew: AxisControl,
+        near_far: AxisControl | None,
         radius: ValueInput | None,
         *,
         tick_s: float,
@@ -137,7 +137,7 @@ class MotionRunner:
         why = f"{apart}={states.get(apart, 'lost')}" if apart else ""
         return MotionEvent(self._name, why)
 
-    def on_trip(self, tripped: AxisRunner) -> None:
+    def on_trip(self, tripped: AxisControl) -> None:
         """An axis has tripped: where it is one of these, nothing is added any more, at once."""
         if any(member.runner is tripped for member in self._members):
             self._end()
@@ -149,7 +149,7 @@ class MotionRunner:
                 member.runner.drop_added()
 
 
-def _full_speed_m_s(near_far: AxisRunner) -> float:
+def _full_speed_m_s(near_far: AxisControl) -> float:
     sway = near_far.bound.config.sway
     assert sway is not None  # checked with the deployment
     return sway.full_speed_m_s
@@ -157,7 +157,7 @@ def _full_speed_m_s(near_far: AxisRunner) -> float:
 
 def motion_runners(
     deployment: Deployment,
-    axes: Mapping[str, AxisRunner],
+    axes: Mapping[str, AxisControl],
     radii: Mapping[str, ValueInput],
     tick_s: float,
 ) -> list[MotionRunner]:

@@ -5,11 +5,11 @@ from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.sent import Sender
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
-Turn = tuple[str, AxisRunner, Sender | None, ForwardingRule | None]
+Turn = tuple[str, AxisControl, Sender | None, ForwardingRule | None]
 """An axis with its name, and what goes out when it has moved: a message, or by a rule."""
 
 
@@ -23,13 +23,13 @@ class ValveOutputs:
 
     def __init__(
         self,
-        axes: Mapping[MessageKey, Sequence[AxisRunner]],
+        axes: Mapping[MessageKey, Sequence[AxisControl]],
         forwarding: Mapping[MessageKey, ForwardingRule],
     ) -> None:
         self._axes = axes
         self._forwarding = forwarding
 
-    def turns(self, order: Iterable[tuple[str, AxisRunner]]) -> list[Turn]:
+    def turns(self, order: Iterable[tuple[str, AxisControl]]) -> list[Turn]:
         """The axes in their order; a message goes out with the last one of its axes."""
         turns: list[Turn] = []
         for name, runner in order:

@@ -7,7 +7,7 @@ from typing import Self
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
@@ -16,7 +16,7 @@ from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ProfileChoice, ValueInput
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper
@@ -31,7 +31,7 @@ FOREIGN_NS = 1_000_000_000
 LEAST_RADIUS_M = 0.5
 
 
-class AxisRunner:
+class AxisControl:
     """One axis with its codecs: when it is due, what it sends.
 
     Attributes:
@@ -63,7 +63,7 @@ class AxisRunner:
         self.period_ticks = bound.period_ticks
         self.period_s = period_s = tick_s * bound.period_ticks
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
-        self.axis = Axis(
+        self.axis = ShapedAxis(
             period_s,
             config.limits.output_limits(),
             sway=sway,
@@ -147,8 +147,8 @@ class AxisRunner:
         assert self._sway_signal is not None  # of an axis with a sensor
         self._sway_signal.node = node
 
-    def isolate(self, joystick: CommandSource, axis: Axis | None = None) -> None:
-        """For a measurement: another joystick, perhaps another ``Axis``, nothing of other axes.
+    def isolate(self, joystick: CommandSource, axis: ShapedAxis | None = None) -> None:
+        """For a measurement: another joystick, perhaps another axis, nothing of other axes.
 
         Args:
             joystick: where the joystick comes from now.
@@ -176,7 +176,7 @@ class AxisRunner:
         self._trip = before._trip or self._trip
         self._foreign_ns = before._foreign_ns or self._foreign_ns
 
-    def adjust(self, config: AxisConfig) -> None:
+    def adjust(self, config: AxisSection) -> None:
         """Go on with another configuration of sway, filter and limits, all else as before.
 
         Args:
@@ -315,7 +315,7 @@ class AxisRunner:
         return self.chooser.number if self.chooser else 0
 
 
-def _shaper(config: AxisConfig, period_s: float, sway: SwayModel | None) -> Shaper:
+def _shaper(config: AxisSection, period_s: float, sway: SwayModel | None) -> Shaper:
     """The filter of an axis, for the rate that its valve has."""
     rate = config.limits.slowest_per_s
     parameters = config.filter.parameters()

@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from canshaper.config.filters import Profile
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.inputs.value import ProfileChoice, ValueInput
 from canshaper.machine.filters import parameter_sets
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import (
     STEPS_BETWEEN,
     ParameterSet,
@@ -44,7 +44,7 @@ class SetChooser:
     def __init__(
         self,
         bound: BoundAxis,
-        axis: Axis,
+        axis: ShapedAxis,
         load_state: ValueInput | None,
         profile: ProfileChoice | None,
     ) -> None:
@@ -116,7 +116,7 @@ def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[Para
     assert config.sway is not None  # checked with the deployment
     mode = config.sway.mode()
     sets: dict[str, tuple[ParameterSet, Sequence[ParameterSet]]] = {}
-    parts: dict[str, AxisConfig | Profile] = {"": config, **config.profiles}
+    parts: dict[str, AxisSection | Profile] = {"": config, **config.profiles}
     for name, part in parts.items():
         base = ParameterSet(0.0, mode, part.filter.kind, part.filter.parameters())
         sets[name] = (base, parameter_sets(part.gain_schedule))

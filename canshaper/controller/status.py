@@ -7,7 +7,7 @@ from canshaper.codec.sent import Sender
 from canshaper.codec.status import StatusCodec
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
 from canshaper.controller.outputs import Counters
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
@@ -27,13 +27,13 @@ class StatusMessages:
     def __init__(
         self,
         deployment: Deployment,
-        axes: Iterable[AxisRunner],
+        axes: Iterable[AxisControl],
         senders: Mapping[MessageKey, Sender],
     ) -> None:
         self._deployment, self._axes, self._senders = deployment, list(axes), senders
 
     def frames(
-        self, changed: Collection[AxisRunner], counters: Counters, last: int, now: int
+        self, changed: Collection[AxisControl], counters: Counters, last: int, now: int
     ) -> Iterator[Frame]:
         """Status of the axes that changed and of all that are due, and of the service.
 
@@ -75,7 +75,7 @@ class SensorReport:
         runner: the axis.
     """
 
-    def __init__(self, name: str, runner: AxisRunner) -> None:
+    def __init__(self, name: str, runner: AxisControl) -> None:
         self._name, self._runner = name, runner
         self._trust = Trust.NO_DATA
         self._length: SwingLength | None = None

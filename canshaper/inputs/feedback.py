@@ -5,7 +5,7 @@ from collections import deque
 from enum import Enum
 from typing import Self
 
-from canshaper.config.schema import Feedback as FeedbackConfig
+from canshaper.config.schema import FeedbackSection as FeedbackConfig
 from canshaper.inputs.value import ValueInput, measurable
 from canshaper.machine.inputs import BoundValue
 

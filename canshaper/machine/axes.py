@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.enable import slowest_ms
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.machine.filters import check_filters
 from canshaper.machine.identity import bind_status
@@ -32,7 +32,7 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
 
 
 def _bind_axis(
-    lookup: Lookup, shared_valves: SharedValves, name: str, axis: AxisConfig
+    lookup: Lookup, shared_valves: SharedValves, name: str, axis: AxisSection
 ) -> BoundAxis | None:
     place: Place = ("axes", name)
     add, problems, joysticks = (

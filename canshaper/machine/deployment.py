@@ -10,7 +10,7 @@ from cantools.database.can import Message
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.status import StatusCodec
-from canshaper.config.inputs import Input
+from canshaper.config.inputs import InputSection
 from canshaper.config.schema import DeploymentConfig, EmergencyStop
 from canshaper.config.source import Source
 from canshaper.machine.buses import BusLoad, bus_load
@@ -74,7 +74,7 @@ class Deployment:
             listen_only=self.listen_only,
         )
 
-    def inputs(self) -> list[Bound[Input]]:
+    def inputs(self) -> list[Bound[InputSection]]:
         """Joysticks, switches, radii, sway sensors, feedback and status words of the valves."""
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
@@ -85,7 +85,7 @@ class Deployment:
         return [*self.joysticks.values(), *self.switches, *(i for i in others if i)]
 
     @property
-    def stopping_inputs(self) -> list[Bound[Input]]:
+    def stopping_inputs(self) -> list[Bound[InputSection]]:
         """Those without which nothing may move: joysticks, their switches, emergency stop."""
         stop = [self.emergency_stop] if self.emergency_stop else []
         return [*self.joysticks.values(), *self.switches, *stop]

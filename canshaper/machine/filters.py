@@ -6,7 +6,7 @@ from typing import Any
 from canshaper.config.adjust import Key, adjusted, faults
 from canshaper.config.filters import Breakpoint, Filter, Profile
 from canshaper.config.limits import Sway
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.lookup import Lookup
@@ -14,7 +14,7 @@ from canshaper.shaping.registry import KINDS, STEPS_BETWEEN, ParameterSet, at_po
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 
-def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: float) -> None:
+def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
     """Every filter that the axis may get has to run at the period of its valve."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
     parts, filters = _parts(place, axis), _filters(place, axis)
@@ -40,7 +40,7 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
             add((*place, "profiles", name), f"expected a profile, got {name!r}; there are {names}")
 
 
-def _check_ends(lookup: Lookup, axis: AxisConfig, name: str, period_s: float) -> None:
+def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -> None:
     """At each end of an adjustable number of the swing the filter, scaled to it, has to run."""
     control, rate = lookup.config.control, axis.limits.slowest_per_s
     for text, ends in (control.adjustable if control else {}).items():
@@ -59,13 +59,13 @@ def _check_ends(lookup: Lookup, axis: AxisConfig, name: str, period_s: float) ->
                 lookup.diagnostics.add(place, f"at {end:g}: {fault}")
 
 
-def _parts(place: Place, axis: AxisConfig) -> list[tuple[Place, AxisConfig | Profile]]:
+def _parts(place: Place, axis: AxisSection) -> list[tuple[Place, AxisSection | Profile]]:
     """The axis and its profiles, by their places."""
     profiles = axis.profiles.items()
     return [(place, axis), *(((*place, "profiles", name), one) for name, one in profiles)]
 
 
-def _filters(place: Place, axis: AxisConfig) -> list[tuple[Place, Filter, Sway | None]]:
+def _filters(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway | None]]:
     """Every filter that the axis may get, by its place, with the sway data that it runs with."""
     filters: list[tuple[Place, Filter, Sway | None]] = []
     for at, part in _parts(place, axis):

@@ -13,9 +13,9 @@ from canshaper.codec.protection import Protection, SequenceChecker
 from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
-from canshaper.config.inputs import Input
+from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Radius
-from canshaper.config.schema import EmergencyStop, Feedback, Joystick, StatusWord
+from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
@@ -28,7 +28,7 @@ USUAL_MAX_STEP = 3
 
 Choosing = LoadState | ProfileSwitch
 """Sections of the load state, and of the operator's choice."""
-Section_co = TypeVar("Section_co", bound=Input, covariant=True)
+Section_co = TypeVar("Section_co", bound=InputSection, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Bound(Generic[Section_co]):
         return SequenceChecker(self.protection, step, config.qualify)
 
 
-BoundInput = Bound[Input]
+BoundInput = Bound[InputSection]
 """Whatever its section is."""
 
 
@@ -128,7 +128,7 @@ class BoundValue(Bound[Section_co]):
     signal: Signal
 
 
-AnySection = TypeVar("AnySection", bound=Input)
+AnySection = TypeVar("AnySection", bound=InputSection)
 
 
 def bind_input(
@@ -218,7 +218,9 @@ def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Ch
     return BoundValue(**vars(bound), signal=signal)
 
 
-def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundValue[Feedback] | None:
+def bind_feedback(
+    lookup: Lookup, place: Place, config: FeedbackSection
+) -> BoundValue[FeedbackSection] | None:
     """What a valve reports of itself."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None

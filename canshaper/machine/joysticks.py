@@ -12,7 +12,7 @@ from canshaper.codec.signals import (
     symmetrical_range,
 )
 from canshaper.config.enable import conditions, named_by
-from canshaper.config.inputs import Input, Switch
+from canshaper.config.inputs import InputSection, SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
 from canshaper.config.source import Place
 from canshaper.machine.diagnostics import Diagnostics
@@ -21,11 +21,11 @@ from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
 
 # What of a section is about its message: the same for every switch in it.
-_OF_MESSAGE = tuple(Input.model_fields)
+_OF_MESSAGE = tuple(InputSection.model_fields)
 
 
 @dataclass(frozen=True)
-class BoundSwitches(Bound[Switch]):
+class BoundSwitches(Bound[SwitchSection]):
     """A message with switches.
 
     Attributes:
@@ -66,7 +66,7 @@ def check_conditions(lookup: Lookup) -> None:
 
 def bind_switches(lookup: Lookup) -> list[BoundSwitches]:
     """Every message with switches."""
-    readers: dict[tuple[str, str], dict[str, Switch]] = {}
+    readers: dict[tuple[str, str], dict[str, SwitchSection]] = {}
     config, add = lookup.config, lookup.diagnostics.add
     needed = {c for joystick in config.joysticks for c in conditions(config, joystick)}
     for name, switch in config.switches.items():
@@ -76,7 +76,7 @@ def bind_switches(lookup: Lookup) -> list[BoundSwitches]:
     return [one for switches in readers.values() if (one := _bind(lookup, switches))]
 
 
-def _bind(lookup: Lookup, switches: dict[str, Switch]) -> BoundSwitches | None:
+def _bind(lookup: Lookup, switches: dict[str, SwitchSection]) -> BoundSwitches | None:
     """The switches of one message."""
     first, *others = switches
     config = switches[first]

@@ -11,7 +11,7 @@ from cantools.database.can import Signal
 from canshaper.codec.signals import find_signal, full_scale, in_range, is_neutral, named_fault
 from canshaper.config.filters import Profile
 from canshaper.config.inputs import Meaning
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.errors import there_are
 from canshaper.machine.used_message import NamedCode, UsedMessage, key_path
@@ -88,7 +88,7 @@ def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
 
 def values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
     """Values of the load state that the gain schedules name, by their places."""
-    parts: dict[Place, AxisConfig | Profile] = {}
+    parts: dict[Place, AxisSection | Profile] = {}
     for name, axis in config.axes.items():
         parts["axes", name] = axis
         parts |= {

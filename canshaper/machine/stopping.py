@@ -7,7 +7,7 @@ from typing import TypedDict
 
 from canshaper.config.enable import slowest_ms
 from canshaper.config.origin import simulated
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.stopping import allowed_s
@@ -30,7 +30,7 @@ class FullSpeed:
     rad_s: float | None
 
 
-def full_speed(axis: AxisConfig) -> FullSpeed:
+def full_speed(axis: AxisSection) -> FullSpeed:
     """Full speed of an axis, of one that slews at its largest radius where that is known."""
     slewing = axis.slewing
     speed_m_s = axis.sway.full_speed_m_s if axis.sway else None
@@ -40,7 +40,7 @@ def full_speed(axis: AxisConfig) -> FullSpeed:
     return FullSpeed(speed_m_s, None)
 
 
-def allowed_m(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> float | None:
+def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float | None:
     """Farthest that the limits allow the tip to travel when it stops; None without its speed.
 
     Args:
@@ -60,7 +60,7 @@ def allowed_m(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> float | 
     )
 
 
-def stated_fault(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> str | None:
+def stated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
     """Why an axis breaks its own ``stop_distance_m``, or None; arguments as ``allowed_m``."""
     stated = axis.limits.stop_distance_m
     if stated is None:
@@ -76,7 +76,7 @@ def stated_fault(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> str |
     )
 
 
-def unstated_fault(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> str | None:
+def unstated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
     """Why an axis may not move without a ``stop_distance_m``, or None; as ``allowed_m``."""
     allowed = allowed_m(axis, timeout_ms=timeout_ms, period_s=period_s)
     if axis.limits.stop_distance_m is not None or allowed is None or allowed <= MOST_UNSTATED_M:
@@ -87,7 +87,7 @@ def unstated_fault(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> str
     )
 
 
-def stop_fault(deployment: Deployment, name: str, axis: AxisConfig) -> str | None:
+def stop_fault(deployment: Deployment, name: str, axis: AxisSection) -> str | None:
     """Why an axis may not move over the way in which it stops, stated or not, or None.
 
     Args:

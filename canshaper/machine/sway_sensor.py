@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
-from canshaper.config.inputs import Input, SwaySensor
-from canshaper.config.schema import AxisConfig
+from canshaper.config.inputs import InputSection, SwaySensorSection
+from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.machine.inputs import Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
@@ -35,11 +35,11 @@ MOST_SECOND = 0.5
 # A second swing of long logs is about as much damped; the first one's damping says little of it.
 SECOND_DAMPING = 0.04
 # What of a section is about its message: the same for every axis that reads it.
-_OF_MESSAGE = (*Input.model_fields, "node")
+_OF_MESSAGE = (*InputSection.model_fields, "node")
 
 
 @dataclass(frozen=True)
-class SensorMessage(Bound[SwaySensor]):
+class SensorMessage(Bound[SwaySensorSection]):
     """A message with measurements of sway.
 
     Attributes:
@@ -66,7 +66,7 @@ class BoundSwaySensor:
         gains: of its observer, computed here because no loop may wait for them.
     """
 
-    config: SwaySensor
+    config: SwaySensorSection
     message: SensorMessage
     signal: Signal
     factor: float
@@ -81,7 +81,7 @@ class BoundSwaySensor:
         return f"{self.message.message.name}.{self.signal.name}"
 
 
-def sensor_limits(config: SwaySensor) -> SensorLimits:
+def sensor_limits(config: SwaySensorSection) -> SensorLimits:
     """Bounds of the measurements of a sensor."""
     noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
     second_s = config.second_period_s
@@ -89,7 +89,7 @@ def sensor_limits(config: SwaySensor) -> SensorLimits:
     return SensorLimits(noise, offset, config.length_range_pct / 100.0, second)
 
 
-def sensor_timing(config: SwaySensor, cycle_s: float, period_s: float) -> SensorTiming:
+def sensor_timing(config: SwaySensorSection, cycle_s: float, period_s: float) -> SensorTiming:
     """When a sensor measures, on an axis whose command is sent every so many seconds."""
     return SensorTiming(
         config.measured,
@@ -107,7 +107,7 @@ def bind_sway_sensors(lookup: Lookup, periods: Mapping[str, float]) -> dict[str,
         lookup: what it is bound with.
         periods: seconds between two commands of an axis, of those without a problem.
     """
-    readers: dict[tuple[str, str], dict[str, SwaySensor]] = {}
+    readers: dict[tuple[str, str], dict[str, SwaySensorSection]] = {}
     for name, axis in lookup.config.axes.items():
         if sensor := axis.sway_sensor:
             readers.setdefault((sensor.bus, sensor.message), {})[name] = sensor
@@ -118,7 +118,7 @@ def bind_sway_sensors(lookup: Lookup, periods: Mapping[str, float]) -> dict[str,
 
 
 def _bind_message(
-    lookup: Lookup, sensors: dict[str, SwaySensor], periods: Mapping[str, float]
+    lookup: Lookup, sensors: dict[str, SwaySensorSection], periods: Mapping[str, float]
 ) -> dict[str, BoundSwaySensor]:
     """The axes that read one message."""
     first, *others = sensors
@@ -155,7 +155,7 @@ def _place(axis: str) -> Place:
     return ("axes", axis, "sway_sensor")
 
 
-def _factor(used: UsedMessage, axis: str, sensor: SwaySensor) -> tuple[Signal, float] | None:
+def _factor(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> tuple[Signal, float] | None:
     """The signal of an axis, and rad or rad/s per unit of it, with the sign of the model."""
     place = (*_place(axis), "signal")
     signal = used.find(place, sensor.signal)
@@ -171,7 +171,7 @@ def _factor(used: UsedMessage, axis: str, sensor: SwaySensor) -> tuple[Signal, f
     return signal, -factor if sensor.invert else factor
 
 
-def _merit(used: UsedMessage, axis: str, sensor: SwaySensor) -> str | None:
+def _merit(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> str | None:
     """The figure of merit of the measurements of an axis, which several may share."""
     place = (*_place(axis), "merit")
     signal = used.find(place, sensor.merit)
@@ -186,7 +186,7 @@ def _merit(used: UsedMessage, axis: str, sensor: SwaySensor) -> str | None:
     return signal.name
 
 
-def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensor) -> None:
+def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensorSection) -> None:
     """What cannot work on an axis."""
     add, axis = lookup.diagnostics.add, lookup.config.axes[name]
     if axis.sway is None:
@@ -213,7 +213,7 @@ def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensor) -> 
             add((*_place(name), "use"), text)
 
 
-def _fusion_fault(sensor: SwaySensor, swing_s: float) -> str | None:
+def _fusion_fault(sensor: SwaySensorSection, swing_s: float) -> str | None:
     """Why an inclinometer shows nothing of a swing, or why this is none."""
     fusion_s, least_s = sensor.fusion_s, LEAST_FUSION * swing_s
     if sensor.kind != "inclination":
@@ -227,6 +227,6 @@ def _fusion_fault(sensor: SwaySensor, swing_s: float) -> str | None:
     return f"{least}, got {fusion_s:g} s" if fusion_s < least_s else None
 
 
-def _not_limit_aware(axis: AxisConfig) -> list[str]:
+def _not_limit_aware(axis: AxisSection) -> list[str]:
     filters = [axis.filter, *(profile.filter for profile in axis.profiles.values())]
     return sorted({one.kind for one in filters if not KINDS[one.kind].limit_aware})

@@ -20,11 +20,11 @@ from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
 from canshaper.config.schema import (
-    AxisConfig,
+    AxisSection,
     Command,
     DeploymentConfig,
     DirectionCodes,
-    Feedback,
+    FeedbackSection,
     StatusWord,
     Valve,
 )
@@ -261,13 +261,13 @@ class BoundAxis:
     """An axis with its valve message and, where it has one, its status message."""
 
     name: str
-    config: AxisConfig
+    config: AxisSection
     valve_message: Message
     valve: ValveCodec
     period_ticks: int
     status: StatusCodec[ReportedAxis] | None
     status_ticks: int
-    feedback: BoundValue[Feedback] | None = None
+    feedback: BoundValue[FeedbackSection] | None = None
     status_word: Bound[StatusWord] | None = None
     sway_sensor: BoundSwaySensor | None = None
 

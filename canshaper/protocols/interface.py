@@ -9,7 +9,7 @@ from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.inputs.sway_sensor import SensorNode
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.states import Reason
 
 MessageKey = tuple[str, int, bool]
@@ -38,7 +38,7 @@ class DrivenAxis(Protocol):
         """Sends the message of its valve."""
 
     @property
-    def axis(self) -> Axis:
+    def axis(self) -> ShapedAxis:
         """Its state machine."""
 
     @property

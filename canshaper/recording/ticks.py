@@ -8,7 +8,7 @@ from typing import NamedTuple
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.daemon.io_cycle import Standstill, io_cycle
 from canshaper.recording.channels import Key, Kind
 from canshaper.shaping.states import Reason
@@ -93,7 +93,7 @@ class Rows:
         return {name: row() for name, row in self._rows}
 
 
-def _row_of(controller: Controller, runner: AxisRunner) -> Callable[[], Row]:
+def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
     config, axis = runner.bound.config, runner.axis
     joystick, signal = controller.joysticks[config.command.joystick], config.command.signal
     full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0

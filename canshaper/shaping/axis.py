@@ -36,7 +36,7 @@ MOST_HELD = 2000
 UNATTENDED_TICKS = 3
 
 
-class Axis:
+class ShapedAxis:
     """State machine, filter and output stage of one axis.
 
     Args:

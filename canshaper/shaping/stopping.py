@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Self
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.states import MOVING, CommandInput, Reason
 
@@ -65,7 +65,7 @@ def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s
     return max(full * (timeout_s + period_s) + stop, full * period_s + release)
 
 
-def travel(new_axis: Callable[[], Axis], *, timeout_s: float, period_s: float) -> Travel:
+def travel(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> Travel:
     """Travel of an axis with its filter, computed by letting it run, in the worse direction.
 
     Args:
@@ -76,7 +76,7 @@ def travel(new_axis: Callable[[], Axis], *, timeout_s: float, period_s: float) -
     return Travel.worst([_travel(new_axis(), sign, timeout_s, period_s) for sign in (1.0, -1.0)])
 
 
-def _travel(axis: Axis, sign: float, timeout_s: float, period_s: float) -> Travel:
+def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) -> Travel:
     axis.tick(CommandInput())
     for _ in range(round(WARM_UP_S / period_s)):
         axis.tick(CommandInput(sign))
@@ -94,7 +94,7 @@ def _travel(axis: Axis, sign: float, timeout_s: float, period_s: float) -> Trave
     )
 
 
-def _way_s(steady: Axis, joystick: CommandInput, sign: float, period_s: float) -> float:
+def _way_s(steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float) -> float:
     """How far the axis gets in the old direction."""
     axis = copy.deepcopy(steady)
     way_s = most_s = 0.0

@@ -12,7 +12,7 @@ from canshaper_sim.hand import Hand, Held
 
 
 @dataclass
-class Seen:
+class CraneSession:
     """A crane that is listened to; ``hand`` where the page drives it, ``here`` in this process."""
 
     view: CraneView

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.shaping.registry import KINDS
 
 CALM, LENGTH = "calm", "length"
@@ -50,7 +50,7 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
     return {name: numbers for name, numbers in by_slider.items() if numbers}
 
 
-def _calm(name: str, axis: AxisConfig) -> list[Number]:
+def _calm(name: str, axis: AxisSection) -> list[Number]:
     """Time constants: all poles move along their rays, so that the filter keeps its shape."""
     if axis.sway is None:  # the daemon refuses: without a model there is nothing to join to
         return []
@@ -59,7 +59,7 @@ def _calm(name: str, axis: AxisConfig) -> list[Number]:
     return _numbers(f"axes.{name}.filter", axis.filter, powers)
 
 
-def _length(name: str, axis: AxisConfig) -> list[Number]:
+def _length(name: str, axis: AxisSection) -> list[Number]:
     """The period grows with the root of the length."""
     if axis.sway is None:
         return []

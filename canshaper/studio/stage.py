@@ -19,7 +19,7 @@ from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
 from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.numbers import LiveNumbers
-from canshaper.studio.seen import Seen
+from canshaper.studio.seen import CraneSession
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.sources import before_the_rest
 from canshaper.studio.view import CraneView
@@ -44,7 +44,7 @@ class Stage:
     def __init__(self, deployment: Deployment, events: Events) -> None:
         self.deployment = deployment
         self.events = events
-        self.cranes: dict[str, Seen] = {}
+        self.cranes: dict[str, CraneSession] = {}
         self.cab: Cab | None = None
         self.sliders: dict[str, list[Number]] = {}
         self.positions: dict[str, float] = {}
@@ -75,7 +75,7 @@ class Stage:
             path = self.deployment.path
             report = lambda text: self.events.add(MACHINE, text, "warn")  # noqa: E731
             self.numbers = LiveNumbers(path, control, report)
-        self.cranes[MACHINE] = Seen(self._view(MACHINE), open_ports(self.deployment))
+        self.cranes[MACHINE] = CraneSession(self._view(MACHINE), open_ports(self.deployment))
 
     def drive(
         self,
@@ -110,7 +110,7 @@ class Stage:
             )
             hand = Hand(self.deployment)
             self._cycle_ms = hand.cycle_ms
-            seen = Seen(view, open_ports(deployment), hand, crane, shaped=name == SHAPED)
+            seen = CraneSession(view, open_ports(deployment), hand, crane, shaped=name == SHAPED)
             self.cranes[name] = seen
             if name == SHAPED:
                 self._control = crane.control
@@ -134,7 +134,7 @@ class Stage:
         for name in (SHAPED, RAW):
             here = InProcessCrane(whole, changes, crane, self._reporter(name))
             self._cycle_ms = here.cycle_ms
-            self.cranes[name] = Seen(self._view(name), {}, shaped=name == SHAPED, here=here)
+            self.cranes[name] = CraneSession(self._view(name), {}, shaped=name == SHAPED, here=here)
 
     def _seat(self) -> None:
         """A driver's seat, and the sliders."""
@@ -270,7 +270,7 @@ class Stage:
                     self.positions = dict.fromkeys(self.sliders, 1.0)  # it has those of the file
         return not self._stop.is_set()
 
-    def _exchange(self, seen: Seen, held: Held, now_s: float, passed_ms: int) -> None:
+    def _exchange(self, seen: CraneSession, held: Held, now_s: float, passed_ms: int) -> None:
         """Take what waits on the buses of a crane; where the page drives it, move its joysticks."""
         frames: list[Frame] = []
         for port in seen.ports.values():

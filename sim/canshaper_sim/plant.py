@@ -8,7 +8,7 @@ from canshaper.codec.protection import UNPROTECTED, SequenceChecker
 from canshaper.codec.sent import Sender, SentMessage
 from canshaper.codec.signals import find_signal
 from canshaper.codec.valve import ValveCodec
-from canshaper.config.schema import Feedback
+from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import USUAL_MAX_STEP, BoundValue
@@ -87,7 +87,7 @@ class _ValveInput:
 class _ValveFeedback:
     """What a valve says of itself: how far it is open, each cycle of its message."""
 
-    def __init__(self, axis: str, bound: BoundValue[Feedback]) -> None:
+    def __init__(self, axis: str, bound: BoundValue[FeedbackSection]) -> None:
         config = bound.config
         source = VALVE_ADDRESS if bound.any_source else bound.key[1] & 0xFF
         self._axis = axis

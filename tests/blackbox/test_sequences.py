@@ -96,7 +96,7 @@ def test_no_attribute_of_a_state_is_left_out(name: str) -> None:
             cached = {n for n, one in vars(kind).items() if isinstance(one, cached_property)}
             assert vars(one).keys() - cached <= set(names), kind
             looked_at[kind.__name__] += 1
-    assert looked_at["Axis"] and looked_at["AxisRunner"] and looked_at["Controller"]
+    assert looked_at["ShapedAxis"] and looked_at["AxisControl"] and looked_at["Controller"]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -12,7 +12,7 @@ from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import Simulation, drive
 from canshaper.machine.binding import load_deployment
 from canshaper.report.stroke_metrics import crane_metrics
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper_sim.crane import CraneParameters
 from tests.faults.shipped import NAMES
 
@@ -126,15 +126,15 @@ def test_a_frame_that_the_gate_refuses_is_a_broken_promise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert measured_drive(ROBUST, 2, RANGES)["broken"] == 0
-    act = Axis.act
+    act = ShapedAxis.act
 
-    def runs_on(self: Axis, *arguments: object, **named: object) -> object:
+    def runs_on(self: ShapedAxis, *arguments: object, **named: object) -> object:
         transition = act(self, *arguments, **named)  # type: ignore[arg-type]
         if self.raw and abs(self.raw) < 60:  # a little faster than anybody asked
             self.output.steps += 3 if self.raw > 0 else -3
         return transition
 
-    monkeypatch.setattr(Axis, "act", runs_on)
+    monkeypatch.setattr(ShapedAxis, "act", runs_on)
     row = measured_drive(ROBUST, 2, RANGES)
     assert row["broken"] > 0
     assert "output=refused" in row["why"]

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from canshaper.config.load import load_config
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.errors import ConfigError
 from tests.config.sections import TOP, Problems, changed
 
 Load = Callable[[str | bytes], DeploymentConfig]
-AXIS = ", ".join(AxisConfig.model_fields)
+AXIS = ", ".join(AxisSection.model_fields)
 
 
 @pytest.mark.parametrize("name", ["slew", "command", "limits", "buses", "kind", "0"])

@@ -111,7 +111,7 @@ def machine(directory: Path, window_s: str) -> tuple[Path, int]:
 @pytest.mark.slow
 def test_it_is_in_the_schema_and_in_the_table(packages: Path) -> None:
     schema = json.loads(canshaper(packages, "config-schema").stdout)
-    kinds = schema["$defs"]["AxisConfig"]["properties"]["filter"]["discriminator"]["mapping"]
+    kinds = schema["$defs"]["AxisSection"]["properties"]["filter"]["discriminator"]["mapping"]
     assert kinds["moving_average"] == "#/$defs/MovingAverageFilter"
     window = schema["$defs"]["MovingAverageFilter"]["properties"]["window_s"]
     assert (window["minimum"], window["maximum"], window["unit"]) == (0.1, 10, "s")

@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from canshaper.config.inputs import Input
+from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Limits
-from canshaper.config.schema import AxisConfig, DeploymentConfig, Feedback
+from canshaper.config.schema import AxisSection, DeploymentConfig, FeedbackSection
 from canshaper.config.uncertainty import Accept
 
 START = """
@@ -28,14 +28,14 @@ def test_a_start_does_not_read_its_own_source() -> None:
 def test_a_key_says_what_it_is_for() -> None:
     assert DeploymentConfig.description("tick") == ("Joystick that the ticks follow.")
     assert DeploymentConfig.description("dbc") == "DBC files, relative to this file"
-    assert AxisConfig.description("slewing") == (
+    assert AxisSection.description("slewing") == (
         "Of an axis that slews: its full speed in angle, and its radius."
     )
     assert Accept.description("residual_deg_p99") == (
         "most of the p99 quantile: largest swing that is left later than 2.5 s after the last"
         " release, deg"
     )
-    assert AxisConfig.description("wrong") is None
+    assert AxisSection.description("wrong") is None
 
 
 def test_all_that_is_said_of_a_key_is_its_own() -> None:
@@ -43,6 +43,9 @@ def test_all_that_is_said_of_a_key_is_its_own() -> None:
     assert Limits.documentation("max_pct") == (
         "Fastest output; the filter works at reduced speed too."
     )
-    joystick, valve = Input.documentation("timeout_ms"), Feedback.documentation("timeout_ms")
+    joystick, valve = (
+        InputSection.documentation("timeout_ms"),
+        FeedbackSection.documentation("timeout_ms"),
+    )
     assert joystick == "Age at which it is lost; of a joystick at least two cycles and two ticks."
     assert valve == "age at which it counts as lost (ms)"

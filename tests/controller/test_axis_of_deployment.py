@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder
@@ -43,7 +43,7 @@ def test_the_grid_is_that_of_the_valve(changed_rig: Make) -> None:
     assert rig.run(50, Slew=1000, AntiSwayOff=1)["SlewCommand"]["Velocity"] == 100
 
 
-def sent(rig: Rig, axis: Axis) -> tuple[list[float], list[float]]:
+def sent(rig: Rig, axis: ShapedAxis) -> tuple[list[float], list[float]]:
     """What slew sends, and what an axis made by hand sends, through a stroke of two seconds."""
     got, expected = [], []
     for tick in range(200):
@@ -55,9 +55,9 @@ def sent(rig: Rig, axis: Axis) -> tuple[list[float], list[float]]:
     return got, expected
 
 
-def by_hand(rig: Rig, sway: SwayModel | None, shaper: Any) -> Axis:
+def by_hand(rig: Rig, sway: SwayModel | None, shaper: Any) -> ShapedAxis:
     config = rig.deployment.axes["slew"].config
-    return Axis(0.02, config.limits.output_limits(), sway=sway, shaper=shaper)
+    return ShapedAxis(0.02, config.limits.output_limits(), sway=sway, shaper=shaper)
 
 
 def test_a_filter_that_needs_the_tick_has_it(changed_rig: Make) -> None:

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.states import CommandInput, State
@@ -14,11 +14,11 @@ from tests.faults.shipped import CONFIG, NAMES
 EDGE = 1e-9
 
 
-def runners(name: str) -> list[AxisRunner]:
+def runners(name: str) -> list[AxisControl]:
     return list(Controller(load_deployment(CONFIG / f"{name}.yaml")).axes.values())
 
 
-def unshaped(runner: AxisRunner, rng: random.Random) -> tuple[OutputLimits, float]:
+def unshaped(runner: AxisControl, rng: random.Random) -> tuple[OutputLimits, float]:
     """Drive without anti-sway, up to 0.6 s of anything; limits and largest step of rounding."""
     axis, limits = runner.axis, runner.bound.config.limits.output_limits()
     for _ in range(3):

@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.inputs.feedback import Following
 from canshaper.inputs.input import Key
 from canshaper.shaping.states import State
@@ -49,7 +49,7 @@ def test_a_part_is_known_by_what_it_is_on_the_machine(rig: Rig) -> None:
     sent = [512, 513, 514, 784, 785, 768, 769, 770]
     senders = [("sender", *here, can_id, False) for can_id in sent]
     valves = {"slew": 512, "near_far": 513, "lift": 514}
-    runners: dict[Key, AxisRunner] = {("axis", name): controller.axes[name] for name in valves}
+    runners: dict[Key, AxisControl] = {("axis", name): controller.axes[name] for name in valves}
     for name, can_id in valves.items():
         runners["valve", *here, can_id, False, "Velocity"] = controller.axes[name]
     assert set(parts) == {*inputs, *senders, *runners}

@@ -6,11 +6,11 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
@@ -31,7 +31,7 @@ class Given(NamedTuple):
     damps: object
 
 
-def given(runner: AxisRunner) -> list[Given]:
+def given(runner: AxisControl) -> list[Given]:
     """What the sensor of an axis is given from now on."""
     sensed = runner.axis.sensed
     assert sensed is not None
@@ -109,14 +109,16 @@ def test_while_the_crane_slews_it_does() -> None:
 
 def test_and_its_filter_is_carried_out_for_that(monkeypatch: pytest.MonkeyPatch) -> None:
     drive = Slewing().until_it_damps()
-    act, carried = Axis.act, []
+    act, carried = ShapedAxis.act, []
 
-    def spied(axis: Axis, command: CommandInput, added: float, *, damps: bool = False) -> object:
+    def spied(
+        axis: ShapedAxis, command: CommandInput, added: float, *, damps: bool = False
+    ) -> object:
         if axis is drive.near_far.axis:
             carried.append(damps)
         return act(axis, command, added, damps=damps)
 
-    monkeypatch.setattr(Axis, "act", spied)
+    monkeypatch.setattr(ShapedAxis, "act", spied)
     drive.step()
     assert carried == [True]
 
@@ -135,7 +137,7 @@ def test_not_when_it_is_measured_alone() -> None:
 
 def test_a_valve_that_is_measured_with_an_axis_of_its_own_needs_no_sensor() -> None:
     drive = Slewing().until_it_damps()
-    own = Axis(0.02, OutputLimits(), sway=None, shaper=Off())
+    own = ShapedAxis(0.02, OutputLimits(), sway=None, shaper=Off())
     drive.near_far.isolate(drive.controller.joysticks["left"], own)
     before = len(drive.seen)
     drive.step()

@@ -8,7 +8,7 @@ import pytest
 from canshaper.codec.frame import FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State
@@ -190,7 +190,7 @@ def test_an_axis_that_is_measured_is_alone(changed_rig: Make) -> None:
     runner.isolate(rig.controller.joysticks["left"])
     assert set(near_far(rig, 60, Slew=1000)) == {0.0}
     assert runner.added == 0.0
-    other = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
+    other = ShapedAxis(TICK_S, OutputLimits(), sway=None, shaper=Off())
     runner.isolate(rig.controller.joysticks["left"], other)
     rig.run(60, Slew=1000)
     assert runner.axis is other

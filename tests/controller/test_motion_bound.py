@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
@@ -39,7 +39,7 @@ def test_the_quantisation_error_adds_one_step_of_the_frame_and_no_more(seed: int
         fall_per_s=chance.choice([1.0, 5.0, 20.0]),
         deadband=chance.choice([0.0, 0.05]),
     )
-    axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=steps)
+    axis = ShapedAxis(0.02, limits, sway=None, shaper=Off(), grid_steps=steps)
     axis.allow_added(most, 3600.0)
     axis.tick(CommandInput())
     command = added = 0.0

@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.controller.sets import SetChooser, profile_by_number, programs
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import ParameterSet, build_shaper
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
@@ -21,7 +21,7 @@ MODE = SwayMode.from_period(2.356, 0.038)
 LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, stop_s: 2.0,"
 
 
-class Watched(Axis):
+class Watched(ShapedAxis):
     """An axis that is where the test says, and keeps the filters that it gets."""
 
     def __init__(self, bound: BoundAxis) -> None:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from canshaper.cli.app import app
 from canshaper.codec.valve import ValveCodec
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import InternalError, raised
 from canshaper.machine.binding import load_deployment
@@ -95,17 +95,17 @@ def test_neutral_that_cannot_be_made_hides_no_failure_and_keeps_the_end_orderly(
 def test_a_valve_without_neutral_costs_the_others_nothing(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
-    def put(runner: AxisRunner, steps: int) -> None:
+    def put(runner: AxisControl, steps: int) -> None:
         if runner.bound.name == "slew":
             raise LookupError("no neutral")
         sound(runner, steps)
 
     def plant() -> None:
         bench.sent.clear()
-        monkeypatch.setattr(AxisRunner, "put", put)
+        monkeypatch.setattr(AxisControl, "put", put)
         monkeypatch.setattr(Controller, "tick", broken)
 
-    sound = AxisRunner.put
+    sound = AxisControl.put
     with pytest.raises(InternalError, match="ZeroDivisionError"):
         driven(bench, plant)
     assert {frame.can_id for frame in bench.sent} >= {0x201, 0x202}
@@ -117,9 +117,9 @@ def test_a_last_frame_that_is_refused_is_in_the_log(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
     def plant() -> None:
-        monkeypatch.setattr(AxisRunner, "put", lambda runner, _: sound(runner, 9))
+        monkeypatch.setattr(AxisControl, "put", lambda runner, _: sound(runner, 9))
 
-    sound = AxisRunner.put
+    sound = AxisControl.put
     driven(bench, plant)
     refused = [line for line in log() if "output=refused" in line]
     assert [line.split()[-2:] for line in refused] == [

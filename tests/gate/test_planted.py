@@ -13,7 +13,7 @@ from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.controller.runner import AxisRunner
+from canshaper.controller.runner import AxisControl
 from canshaper.gate.build import record_of
 from canshaper.gate.fields import word_of
 from canshaper.machine.binding import load_deployment
@@ -95,7 +95,7 @@ def drive(name: str) -> Drive:
     return made
 
 
-Wrong = Callable[[dict[str, Any], AxisRunner], None]
+Wrong = Callable[[dict[str, Any], AxisControl], None]
 
 
 class Planted:
@@ -154,7 +154,7 @@ def _put(steps: int) -> Wrong:
     return lambda raw, runner: runner.bound.valve.put(raw, steps)
 
 
-def _signal(runner: AxisRunner) -> Any:
+def _signal(runner: AxisControl) -> Any:
     name = runner.bound.config.valve.signal
     return next(s for s in runner.bound.valve_message.signals if s.name == name)
 
@@ -169,7 +169,7 @@ def _beyond(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None
     """Beyond the range of the DBC, where the bits of the signal reach farther."""
     valve = made.deployment.axes[axis].valve
 
-    def wrong(raw: dict[str, Any], runner: AxisRunner) -> None:
+    def wrong(raw: dict[str, Any], runner: AxisControl) -> None:
         signal = _signal(runner)
         valve.put(raw, valve.steps)
         room = raw_limits(signal)[1] - raw[signal.name]
@@ -204,7 +204,7 @@ def _flip(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
     """A bit of the command is wrong, and it means far more or less speed, or the other way."""
     valve = made.deployment.axes[axis].valve
 
-    def wrong(raw: dict[str, Any], runner: AxisRunner) -> None:
+    def wrong(raw: dict[str, Any], runner: AxisControl) -> None:
         signal, before = _signal(runner), valve.read(raw)
         bits = [1 << n for n in range(signal.length)]
         rng.shuffle(bits)

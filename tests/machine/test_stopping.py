@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisSection
 from canshaper.machine.stopping import (
     FullSpeed,
     allowed_m,
@@ -18,11 +18,11 @@ SLEWING = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"
 STATED = ", stop_distance_m: 200"  # as the machine of these tests has it, slew first
 
 
-def slew(machine: Machine) -> AxisConfig:
+def slew(machine: Machine) -> AxisSection:
     return machine.load().axes["slew"].config
 
 
-def stopping(axis: AxisConfig, stated: float | None) -> AxisConfig:
+def stopping(axis: AxisSection, stated: float | None) -> AxisSection:
     """The axis with another stated distance, or none."""
     limits = axis.limits.model_copy(update={"stop_distance_m": stated})
     return axis.model_copy(update={"limits": limits})

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from canshaper.config.inputs import Kind
 from canshaper.machine.sway_sensor import SECOND_DAMPING
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.free_swing import sensor_gains
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
@@ -139,7 +139,7 @@ class Setup:
         drive = Drive(SCRIPTS[name] if isinstance(name, str) else name)
         sway = SwayModel(MODE, TICK_S)
         shaper = build_shaper("robust", TICK_S, sway, valve_rate_per_s=5.0, taps=self.taps)
-        axis = Axis(TICK_S, LIMITS, sway=sway, shaper=shaper, grid_steps=STEPS)
+        axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=shaper, grid_steps=STEPS)
         sensor, sensed = None, None
         if self.measured:
             noise = math.radians(NOISE_DEG[self.measured])

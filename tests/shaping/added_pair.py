@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
@@ -15,10 +15,10 @@ SLACK = 1e-4
 LARGEST, TIME_S = 0.25, 1.5
 
 
-def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[Axis, Axis]:
+def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[ShapedAxis, ShapedAxis]:
     """An axis that may be added to, and one to which nothing is added."""
     one, plain = (
-        Axis(TICK_S, limits, sway=None, shaper=shaper(), grid_steps=STEPS) for _ in range(2)
+        ShapedAxis(TICK_S, limits, sway=None, shaper=shaper(), grid_steps=STEPS) for _ in range(2)
     )
     one.allow_added(LARGEST, TIME_S)
     one.tick(CommandInput())

@@ -1,6 +1,6 @@
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
@@ -27,7 +27,7 @@ class Drive:
         self.tick_s = tick_s
         self.limits = limits or OutputLimits(tail_s=0.5)
         self.model = SwayModel(MODE, tick_s)
-        self.axis = Axis(
+        self.axis = ShapedAxis(
             tick_s,
             self.limits,
             sway=self.model,

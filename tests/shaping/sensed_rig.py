@@ -2,7 +2,7 @@
 
 import math
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput
@@ -21,7 +21,7 @@ class Rig:
 
     def __init__(self, *, damps: bool = True, offset_rad: float = 0.0) -> None:
         self.model, self.real = SwayModel(MODE, TICK_S), SwayModel(MODE, TICK_S)
-        self.axis = Axis(
+        self.axis = ShapedAxis(
             TICK_S, OutputLimits(tail_s=0.5), sway=self.model, shaper=Gff(self.model, (-5.0, -4.0))
         )
         timing = SensorTiming(Measured.ANGLE, TICK_S, 0.0, 0.0, lost_s=0.07)

@@ -2,7 +2,7 @@
 
 import math
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.gff import Gff
@@ -28,7 +28,7 @@ class Ruleless:
 
 def axis_with(
     limits: OutputLimits = LIMITS, steps: int = 125, shaper: str = "robust", **changes: float
-) -> Axis:
+) -> ShapedAxis:
     """An axis in READY."""
     sway = SwayModel(MODE, TICK_S)
     total = math.fsum(TAPS)
@@ -40,14 +40,16 @@ def axis_with(
         "gff": Gff(sway, (-5.655, -4.112)),
         "off": Off(),
     }
-    axis = Axis(TICK_S, limits, sway=sway, shaper=shapers[shaper], grid_steps=steps, **changes)
+    axis = ShapedAxis(
+        TICK_S, limits, sway=sway, shaper=shapers[shaper], grid_steps=steps, **changes
+    )
     axis.tick(CommandInput())
     axis.tick(CommandInput())
     assert axis.state is State.READY
     return axis
 
 
-def tapped(axis: Axis, level: float, duration_s: float, rest_s: float = 3.5) -> list[float]:
+def tapped(axis: ShapedAxis, level: float, duration_s: float, rest_s: float = 3.5) -> list[float]:
     """What is sent at a tap."""
     held = round(duration_s / TICK_S)
     sent = []

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State
@@ -16,10 +16,10 @@ TRIP = CommandInput(enabled=False)
 LOST = CommandInput(fault=Reason.JOYSTICK_TIMEOUT)
 
 
-def stopped(sign: float, stop: CommandInput) -> Axis:
+def stopped(sign: float, stop: CommandInput) -> ShapedAxis:
     """Demanded once, stopped with the next tick, and ready again in the fourth one after it."""
     sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
-    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off(), stop_s=2 * TICK_S)
+    axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=Off(), stop_s=2 * TICK_S)
     axis.allow_added(LARGEST, 6.0)
     for joystick in (CommandInput(), CommandInput(sign * DEMAND), stop, stop):
         axis.tick(joystick)
@@ -68,7 +68,7 @@ def test_missed_ticks_count_towards_the_tail() -> None:
 @pytest.mark.parametrize("demand", [0.1, 0.6])
 def test_after_a_bypass_in_neutral_the_slower_of_both_counts(sign: float, demand: float) -> None:
     sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
-    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=Off())
     axis.allow_added(LARGEST, 6.0)
     for joystick in (CommandInput(), *[CommandInput(sign * demand, bypass=True)] * 10):
         axis.tick(joystick)
@@ -84,7 +84,7 @@ def test_after_a_bypass_in_neutral_the_slower_of_both_counts(sign: float, demand
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
     sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
-    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=Off())
     axis.allow_added(LARGEST, 10 * TICK_S)
     axis.tick(CommandInput())
     for _ in range(30):
@@ -99,7 +99,7 @@ def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
 def test_missed_ticks_of_an_axis_that_stands_use_up_no_time() -> None:
     """The motion asks for less than a step of the frame."""
     sway = SwayModel(SwayMode(2.86, 0.05), TICK_S)
-    axis = Axis(TICK_S, LIMITS, sway=sway, shaper=Off())
+    axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=Off())
     axis.allow_added(LARGEST, 10 * TICK_S)
     axis.tick(CommandInput())
     for _ in range(3):

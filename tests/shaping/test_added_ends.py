@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.off import Off
@@ -128,7 +128,7 @@ def test_nor_while_it_falls_already() -> None:
 
 
 def test_nor_what_rounding_has_left_out() -> None:
-    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=10)
+    axis = ShapedAxis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=10)
     axis.allow_added(LARGEST, TIME_S)
     axis.tick(CommandInput())
     axis.tick(CommandInput(1.0))
@@ -141,7 +141,7 @@ def test_nor_what_rounding_has_left_out() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_falls_is_rounded_to_the_side_of_rest(sign: float) -> None:
-    axis = Axis(TICK_S, OutputLimits(fall_per_s=0.07), sway=None, shaper=Off(), grid_steps=50)
+    axis = ShapedAxis(TICK_S, OutputLimits(fall_per_s=0.07), sway=None, shaper=Off(), grid_steps=50)
     axis.allow_added(LARGEST, TIME_S)
     axis.tick(CommandInput())
     for _ in range(10):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.shaping.axis import UNATTENDED_TICKS, Axis
+from canshaper.shaping.axis import UNATTENDED_TICKS, ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
@@ -12,9 +12,9 @@ TICK_S, TAIL = 0.02, 5
 LIMITS = OutputLimits(tail_s=TAIL * TICK_S, rise_per_s=10.0, fall_per_s=10.0)
 
 
-def axis() -> Axis:
+def axis() -> ShapedAxis:
     """An axis in neutral, which a motion may move for ten ticks."""
-    one = Axis(TICK_S, LIMITS, sway=SwayModel(SwayMode(2.86, 0.05), TICK_S), shaper=Off())
+    one = ShapedAxis(TICK_S, LIMITS, sway=SwayModel(SwayMode(2.86, 0.05), TICK_S), shaper=Off())
     one.allow_added(0.25, 10 * TICK_S)
     return one
 

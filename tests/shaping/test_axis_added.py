@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput, Reason, State
@@ -59,7 +59,7 @@ class AddedByAnother(RuleBasedStateMachine):
         limits, steps = setup
         self.limits = limits
         model = SwayModel(MODE, TICK_S)
-        self.axis = Axis(
+        self.axis = ShapedAxis(
             TICK_S,
             limits,
             sway=model,

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.output import MOST_CARRY
 from canshaper.shaping.shapers.gff import Gff
@@ -18,9 +18,9 @@ MODE = SwayMode(2.86, 0.05)
 POLES = (-5.655, -4.112)
 
 
-def axis_with(limits: OutputLimits, steps: int = 125) -> Axis:
+def axis_with(limits: OutputLimits, steps: int = 125) -> ShapedAxis:
     model = SwayModel(MODE, TICK_S)
-    axis = Axis(TICK_S, limits, sway=model, shaper=Gff(model, POLES), grid_steps=steps)
+    axis = ShapedAxis(TICK_S, limits, sway=model, shaper=Gff(model, POLES), grid_steps=steps)
     axis.allow_added(1.0, 3600.0)
     axis.tick(CommandInput())
     assert axis.state is State.READY
@@ -83,7 +83,7 @@ def test_in_the_long_run_joystick_and_addition_are_sent_in_full(
 ) -> None:
     """Where the operator asked for more within the tail."""
     limits = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, tail_s=20.0)
-    axis = Axis(TICK_S, limits, sway=None, shaper=Off())
+    axis = ShapedAxis(TICK_S, limits, sway=None, shaper=Off())
     axis.allow_added(LARGEST, 1.0)
     axis.tick(CommandInput())
     axis.tick(CommandInput(math.copysign(1.0, joystick)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.late_model import BLEND_S
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
@@ -136,7 +136,7 @@ def test_a_retune_to_the_same_filter_changes_next_to_nothing(drive_with: DriveWi
 
 
 def test_an_axis_without_sway_can_be_given_one() -> None:
-    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
+    axis = ShapedAxis(TICK_S, OutputLimits(), sway=None, shaper=Off())
     axis.tick(CommandInput())
     axis.hold(3)
     axis.retune(NEW_MODE, new_filter)

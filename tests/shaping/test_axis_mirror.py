@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput, Reason, State
@@ -19,9 +19,9 @@ LIMITS = [
 ]
 
 
-def axis_with(limits: OutputLimits) -> Axis:
+def axis_with(limits: OutputLimits) -> ShapedAxis:
     model = SwayModel(MODE, TICK_S)
-    return Axis(TICK_S, limits, sway=model, shaper=Gff(model, (-5.655, -4.112)))
+    return ShapedAxis(TICK_S, limits, sway=model, shaper=Gff(model, (-5.655, -4.112)))
 
 
 def busy(seed: int) -> list[tuple[CommandInput, float]]:
@@ -68,7 +68,7 @@ class Pausing:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_axis_at_rest_in_the_middle_of_its_run_on_is_not_done(sign: float) -> None:
     """The filter rests, but may ask for more: the tail decides, not the moment."""
-    axis = Axis(TICK_S, OutputLimits(tail_s=1.0), sway=None, shaper=Pausing(sign))
+    axis = ShapedAxis(TICK_S, OutputLimits(tail_s=1.0), sway=None, shaper=Pausing(sign))
     for joystick in [CommandInput(), *[CommandInput(sign)] * 20]:
         axis.tick(joystick)
     sent = []

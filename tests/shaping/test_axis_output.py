@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
@@ -135,7 +135,7 @@ def test_a_joystick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -
 
     def sent(full: float) -> list[float]:
         sway = SwayModel(SwayMode(2.27, 0.024), 0.02)
-        axis = Axis(0.02, limits, sway=sway, shaper=Gff(sway, (-2.0, -2.5)))
+        axis = ShapedAxis(0.02, limits, sway=sway, shaper=Gff(sway, (-2.0, -2.5)))
         velocities = []
         for number in range(500):
             if number == 250:
@@ -151,7 +151,7 @@ def test_a_joystick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -
 
 def test_limits_change_in_neutral_and_hold_from_then_on() -> None:
     sway = SwayModel(SwayMode(2.27, 0.024), 0.02)
-    axis = Axis(0.02, OutputLimits(), sway=sway, shaper=Off(), grid_steps=10_000)
+    axis = ShapedAxis(0.02, OutputLimits(), sway=sway, shaper=Off(), grid_steps=10_000)
     slow = OutputLimits(maximum=0.5, rise_per_s=1.0, fall_per_s=2.0)
     axis.tick(CommandInput(0.0))
     axis.limit(slow)
@@ -177,7 +177,7 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
     def left(missed: int) -> float:
         truth, sway = model.retuned(model.mode, 0.0), model.retuned(model.mode, 0.0)
         shaper = build_shaper(kind, 0.02, sway, valve_rate_per_s=5.0, **options[kind])
-        axis = Axis(0.02, OutputLimits(), sway=sway, shaper=shaper)
+        axis = ShapedAxis(0.02, OutputLimits(), sway=sway, shaper=shaper)
         axis.tick(CommandInput())
         largest, now = 0.0, 0
         while now < 600:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode
@@ -48,14 +48,14 @@ def watched(whole: Any, part: str) -> Watched:
 
 
 @pytest.fixture
-def moving() -> Axis:
+def moving() -> ShapedAxis:
     axis = axis_with()
     for joystick in [LET_GO] * 3 + [OUT] * 20:
         axis.tick(joystick)
     return axis
 
 
-def test_a_stop_loses_the_travel_of_small_strokes(moving: Axis) -> None:
+def test_a_stop_loses_the_travel_of_small_strokes(moving: ShapedAxis) -> None:
     small = watched(moving._stage, "_small")
     moving.tick(OUT)
     assert not small.with_name("lose")
@@ -63,14 +63,14 @@ def test_a_stop_loses_the_travel_of_small_strokes(moving: Axis) -> None:
     assert small.with_name("lose")
 
 
-def test_missed_ticks_count_for_small_strokes(moving: Axis) -> None:
+def test_missed_ticks_count_for_small_strokes(moving: ShapedAxis) -> None:
     small = watched(moving._stage, "_small")
     moving.hold(5)
     ((command, applied, ticks),) = small.with_name("hold")
     assert (command, applied, ticks) == (moving.command, moving.applied, 5)
 
 
-def test_a_retune_loses_the_travel_of_small_strokes(moving: Axis) -> None:
+def test_a_retune_loses_the_travel_of_small_strokes(moving: ShapedAxis) -> None:
     small = watched(moving._stage, "_small")
     moving.retune(SwayMode(2.4, 0.05), lambda sway: Gff(sway, (-5.0, -4.0)))
     assert small.with_name("lose")

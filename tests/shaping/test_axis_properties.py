@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
@@ -52,7 +52,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
         model = SwayModel(MODE, setup.tick_s) if setup.filter == "gff" else None
         shaper = self.shaper(model, (-5.655, -4.112))
         rest = {"neutral_band": BAND, "stop_s": setup.stop_s, "grid_steps": setup.steps}
-        self.axis = Axis(setup.tick_s, limits, sway=model, shaper=shaper, **rest)
+        self.axis = ShapedAxis(setup.tick_s, limits, sway=model, shaper=shaper, **rest)
         self.shadow = SwayModel(MODE, setup.tick_s)  # the hanging tool, as far as it is known
         self.rise, self.fall = limits.rise_per_s * setup.tick_s, limits.fall_per_s * setup.tick_s
         # Rates act before rounding. Half a step to either side makes one step; one and a half where

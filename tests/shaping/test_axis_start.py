@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
@@ -28,9 +28,9 @@ class Stubborn:
         return 1.0
 
 
-def new_axis() -> Axis:
+def new_axis() -> ShapedAxis:
     model = SwayModel(MODE, TICK_S)
-    return Axis(TICK_S, OutputLimits(), sway=model, shaper=Gff(model, (-5.0, -4.0)))
+    return ShapedAxis(TICK_S, OutputLimits(), sway=model, shaper=Gff(model, (-5.0, -4.0)))
 
 
 def test_before_the_first_tick_an_axis_carries_neutral() -> None:
@@ -52,7 +52,7 @@ def test_ticks_missed_before_the_first_one_swing_nothing() -> None:
 
 def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None:
     model = SwayModel(OTHER, TICK_S)
-    right = Axis(TICK_S, OutputLimits(), sway=model, shaper=Gff(model, (-2.0, -2.5)))
+    right = ShapedAxis(TICK_S, OutputLimits(), sway=model, shaper=Gff(model, (-2.0, -2.5)))
     axis = new_axis()
     axis.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))
     assert axis.sway is not None
@@ -87,7 +87,7 @@ def test_nor_does_a_reset_switch_that_was_pressed_in_the_first_valid_frame(drive
 
 
 def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
-    axis = Axis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn())
+    axis = ShapedAxis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn())
     for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
         axis.tick(joystick)
     stopping = 0
@@ -99,7 +99,7 @@ def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
 
 
 def test_a_stop_shorter_than_a_tick_is_one_tick() -> None:
-    axis = Axis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn(), stop_s=0.001)
+    axis = ShapedAxis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn(), stop_s=0.001)
     for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
         axis.tick(joystick)
     axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
@@ -110,7 +110,7 @@ def test_a_stop_shorter_than_a_tick_is_one_tick() -> None:
 
 def test_full_speed_is_125_steps_where_nothing_else_is_said() -> None:
     """The frame of ISO 11783-7: 125 steps to either side."""
-    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
+    axis = ShapedAxis(TICK_S, OutputLimits(), sway=None, shaper=Off())
     for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
         axis.tick(joystick)
     assert axis.raw == 125

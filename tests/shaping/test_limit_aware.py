@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.fir import Fir, zv_taps
@@ -87,7 +87,7 @@ def test_residual_swing_where_a_limit_acts(
         fir = Fir(zv_taps(mode, TICK_S))
         shapers: dict[str, Shaper] = {"bare": fir, "aware": LimitAware(sway, fir), "off": Off()}
         # A grid far finer than any valve's: the limits alone are judged.
-        axis = Axis(TICK_S, limits, sway=sway, shaper=shapers[kind], grid_steps=100_000)
+        axis = ShapedAxis(TICK_S, limits, sway=sway, shaper=shapers[kind], grid_steps=100_000)
         for command in [0.0, *commands]:
             axis.tick(CommandInput(command))
         assert axis.state is State.READY
@@ -109,7 +109,7 @@ def test_a_slow_valve_gets_feedback_that_it_can_follow(mode: SwayMode, rate: flo
         sway = SwayModel(mode, TICK_S)
         fir = Fir(zv_taps(mode, TICK_S))
         shaper: Shaper = LimitAware(sway, fir, rate) if aware else fir
-        axis = Axis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
+        axis = ShapedAxis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
         for command in [0.0, *REVERSAL]:
             axis.tick(CommandInput(command))
         return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
@@ -156,7 +156,7 @@ def test_after_output_invalid_it_starts_again() -> None:
     mode = MODES[1]
     sway = SwayModel(mode, TICK_S)
     broken = Broken(Fir(zv_taps(mode, TICK_S)))
-    axis = Axis(TICK_S, RATE, sway=sway, shaper=LimitAware(sway, broken))
+    axis = ShapedAxis(TICK_S, RATE, sway=sway, shaper=LimitAware(sway, broken))
     for command in [0.0, *[1.0] * 70]:
         axis.tick(CommandInput(command))
     assert axis.sent > 0.5
@@ -170,7 +170,7 @@ def test_after_output_invalid_it_starts_again() -> None:
     assert axis.state is State.READY
     # From here on it does what a fresh one does.
     fresh_sway = SwayModel(mode, TICK_S)
-    fresh = Axis(
+    fresh = ShapedAxis(
         TICK_S, RATE, sway=fresh_sway, shaper=LimitAware(fresh_sway, Fir(zv_taps(mode, TICK_S)))
     )
     fresh.tick(CommandInput())
@@ -190,7 +190,7 @@ def test_missed_ticks_leave_no_swing(mode: SwayMode) -> None:
         fir = Fir(zv_taps(mode, TICK_S))
         limits = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, tail_s=4.0)
         shaper = LimitAware(sway, fir) if known else fir
-        axis = Axis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
+        axis = ShapedAxis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
         for i, command in enumerate([0.0, *RELEASE]):
             if i in (20, 45, 130):
                 axis.hold(12)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff, poles_from_denominator
 from canshaper.shaping.shapers.kind import Shaper
@@ -76,7 +76,7 @@ def busy_hand(seed: int) -> tuple[list[float], int]:
     return [0.0] * 2 + commands + [0.0] * round(8.0 / TICK_S), 2 + len(commands)
 
 
-def sent_by(axis: Axis, commands: list[float]) -> list[float]:
+def sent_by(axis: ShapedAxis, commands: list[float]) -> list[float]:
     sent = []
     for command in commands:
         axis.tick(CommandInput(command))
@@ -93,8 +93,8 @@ def swing(sent: list[float], mode: SwayMode) -> np.ndarray:
     return signal.lfilter(numerator.ravel(), denominator, sent)
 
 
-def axis_with(shaper: Shaper, sway: SwayModel | None) -> Axis:
-    return Axis(TICK_S, LIMITS, sway=sway, shaper=shaper, grid_steps=125)
+def axis_with(shaper: Shaper, sway: SwayModel | None) -> ShapedAxis:
+    return ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=shaper, grid_steps=125)
 
 
 @pytest.mark.slow

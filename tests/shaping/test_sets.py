@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import (
     KINDS,
@@ -159,9 +159,9 @@ def test_poles_go_from_the_faster_one_to_the_faster_one() -> None:
 # -- in motion -------------------------------------------------------------------------------------
 
 
-def axis_with(shaper_of: str) -> Axis:
+def axis_with(shaper_of: str) -> ShapedAxis:
     sway = SwayModel(EMPTY, TICK_S)
-    return Axis(
+    return ShapedAxis(
         TICK_S,
         OutputLimits(rise_per_s=5.0, fall_per_s=5.0, tail_s=2.0),
         sway=sway,
@@ -220,7 +220,7 @@ def test_an_output_that_is_no_number_trips_with_and_without_a_model(sway: bool) 
             return math.nan
 
     model = SwayModel(EMPTY, TICK_S) if sway else None
-    axis = Axis(TICK_S, OutputLimits(), sway=model, shaper=Broken())
+    axis = ShapedAxis(TICK_S, OutputLimits(), sway=model, shaper=Broken())
     axis.tick(CommandInput())
     axis.tick(CommandInput(0.5))
     assert (axis.state.name, axis.reason.name, axis.raw) == ("TRIPPED", "OUTPUT_INVALID", 0)

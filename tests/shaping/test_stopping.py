@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.stopping import Travel, allowed_s, travel
@@ -33,10 +33,10 @@ def axis_with(
     period_s: float = 0.02,
     stop_s: float = 2.0,
     **p: Any,
-) -> Axis:
+) -> ShapedAxis:
     sway = SwayModel(MODE, period_s)
     shaper = build_shaper(kind, period_s, sway, **p)
-    return Axis(period_s, limits, sway=sway, shaper=shaper, stop_s=stop_s, grid_steps=1000)
+    return ShapedAxis(period_s, limits, sway=sway, shaper=shaper, stop_s=stop_s, grid_steps=1000)
 
 
 def test_without_a_filter_it_is_the_fall_and_the_wait() -> None:

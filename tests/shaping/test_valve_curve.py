@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, on_grid, with_deadband, without_deadband
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
@@ -127,9 +127,9 @@ def test_a_band_that_ends_at_zero_and_a_rounded_full_speed_make_a_curve(
     assert [curve.velocity(command) for command in commands] == pytest.approx(speeds)
 
 
-def driven(command: float, added: float = 0.0) -> Axis:
+def driven(command: float, added: float = 0.0) -> ShapedAxis:
     limits = OutputLimits(rise_per_s=50.0, fall_per_s=50.0, curve=CURVE)
-    axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=1000)
+    axis = ShapedAxis(0.02, limits, sway=None, shaper=Off(), grid_steps=1000)
     axis.tick(CommandInput())
     for _ in range(5):
         axis.tick(CommandInput(command), added)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
     from canshaper.commissioning.nodes.node import Node, Pdo
     from canshaper.commissioning.nodes.parameters import Parameter
-    from canshaper.commissioning.nodes.use import Use
+    from canshaper.commissioning.nodes.use import MessageTiming
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
 _NAME_LETTERS = 20  # of a node; its messages' names have 32
@@ -131,7 +131,7 @@ class Nodes:
         nodes = {n: (self.named[n].id, ms) for n in names if (ms := heartbeat_ms(self.named[n]))}
         return FirstCanopen(ours, master, nodes)
 
-    def parameters(self, uses: "dict[str, Use]") -> "list[Parameter]":
+    def parameters(self, uses: "dict[str, MessageTiming]") -> "list[Parameter]":
         """What has to be set in the nodes of messages that are used so."""
         if not self.named:
             return []
@@ -143,7 +143,7 @@ class Nodes:
             for p in parameters(name, node, self._of(name, uses))
         ]
 
-    def missing(self, uses: "dict[str, Use]") -> Iterator[str]:
+    def missing(self, uses: "dict[str, MessageTiming]") -> Iterator[str]:
         """What they do not have."""
         if not self.named:
             return
@@ -152,10 +152,10 @@ class Nodes:
         for name, node in self._used(uses):
             yield from (f"{name} {text}" for text in missing(node, self._of(name, uses)))
 
-    def _used(self, uses: "dict[str, Use]") -> "list[tuple[str, Node]]":
+    def _used(self, uses: "dict[str, MessageTiming]") -> "list[tuple[str, Node]]":
         return [(name, node) for name, node in self.named.items() if self._of(name, uses)]
 
-    def _of(self, name: str, uses: "dict[str, Use]") -> "list[tuple[Pdo, Use]]":
+    def _of(self, name: str, uses: "dict[str, MessageTiming]") -> "list[tuple[Pdo, MessageTiming]]":
         return [
             (pdo, uses[message])
             for message, (owner, pdo) in self._pdos.items()
@@ -163,16 +163,16 @@ class Nodes:
         ]
 
 
-def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, Use]":
+def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, MessageTiming]":
     """How a machine uses messages: how often they come, and when they are lost."""
-    from canshaper.commissioning.nodes.use import Use
+    from canshaper.commissioning.nodes.use import MessageTiming
 
     cycles = {message.name: message.cycle_time for message in messages}
-    uses: dict[str, Use] = {}
+    uses: dict[str, MessageTiming] = {}
 
     def add(message: str | None, timeout_ms: int, cycle_ms: int | None = None) -> None:
         if message is not None:
-            uses[message] = Use(cycle_ms or cycles.get(message), timeout_ms)
+            uses[message] = MessageTiming(cycle_ms or cycles.get(message), timeout_ms)
 
     for joystick in machine.joysticks:
         for message in (joystick.message, joystick.switch):

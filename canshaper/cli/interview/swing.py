@@ -49,7 +49,7 @@ def sensor_of(
     """What measures the swing of an axis; ``others`` are messages left, ``bound`` axes have one."""
     from canshaper.cli.interview.first import FirstSensor
     from canshaper.commissioning import suggest
-    from canshaper.config.inputs import SwaySensor
+    from canshaper.config.inputs import SwaySensorSection
     from canshaper.config.load import limits
     from canshaper.machine.sway_sensor import LEAST_FUSION
 
@@ -66,7 +66,7 @@ def sensor_of(
     if answer == NONE:
         return None
     message, signal = possible[answer]
-    least, most = limits(SwaySensor, "timeout_ms")
+    least, most = limits(SwaySensorSection, "timeout_ms")
     timeout_ms = int(min(max(SENSOR_CYCLES * (message.cycle_time or 0), least), most))
     if (signal.unit or "").endswith("/s"):
         codes = code_meanings(signal)
@@ -75,7 +75,7 @@ def sensor_of(
     kind = ask(text, one(["angle", "inclination"]), "angle")
     fusion_s = None
     if kind == "inclination":
-        shortest, longest = LEAST_FUSION * swing_s, limits(SwaySensor, "fusion_s")[1]
+        shortest, longest = LEAST_FUSION * swing_s, limits(SwaySensorSection, "fusion_s")[1]
         text = "    time constant with which accelerations correct its gyro, s (its data sheet)"
         fusion_s = ask(text, number(shortest, longest), f"{max(5.0, shortest):.2g}")
     codes = code_meanings(signal)

@@ -70,7 +70,7 @@ def check(
 
 def _as_dict(deployment: "Deployment") -> dict[str, Any]:
     """Everything as plain data; travel in seconds of full speed."""
-    from canshaper.commissioning.doubts import doubts
+    from canshaper.commissioning.doubts import warnings_of
     from canshaper.commissioning.stopping import stopping
 
     config, loads = (
@@ -81,7 +81,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
         "file": str(deployment.path),
         "good": True,
         "problems": [],
-        "warnings": [asdict(warning) for warning in doubts(deployment)],
+        "warnings": [asdict(warning) for warning in warnings_of(deployment)],
         "not_used": [asdict(warning) for warning in deployment.messages.warnings()[1]],
         "digest": f"{deployment.identity.digest:#06x}",
         "identity": deployment.identity.lines()[1:],
@@ -112,7 +112,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
 
 def _print(deployment: "Deployment") -> None:
     """Everything for people."""
-    from canshaper.commissioning.doubts import doubts
+    from canshaper.commissioning.doubts import warnings_of
     from canshaper.commissioning.stopping import print_stopping
     from canshaper.gate.build import record_of
     from canshaper.report.console import SafeConsole
@@ -153,7 +153,7 @@ def _print(deployment: "Deployment") -> None:
     if unchecked := record_of(deployment).unchecked:
         names = ", ".join(unchecked)
         echo(f"  the gate does not know the checksum of {names}: it is of another package")
-    for warning in doubts(deployment):
+    for warning in warnings_of(deployment):
         echo(f"WARNING: {warning}")
 
 

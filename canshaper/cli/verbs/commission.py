@@ -114,9 +114,9 @@ def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: b
     from canshaper.commissioning.procedure.state import read_state
 
     if not simulated:
-        return Machine(Terminal(), words)
+        return Machine(Prompts(), words)
     state = read_state(files.state)
-    return Simulated(Terminal(), changes or (state.changes if state else []))
+    return Simulated(Prompts(), changes or (state.changes if state else []))
 
 
 def _procedure(
@@ -206,7 +206,7 @@ def _show(procedure: "Procedure", proposal: "Proposal") -> None:
         echo(f"{procedure.files.deployment} stays as it is.")
 
 
-class Terminal:
+class Prompts:
     """Prompts of the steps; with ``--yes`` or ``--answers`` they wait for no one."""
 
     def ready(self, words: str) -> None:

@@ -145,7 +145,7 @@ def _write_dbc(path: Path, nodes: Nodes) -> None:
 def _designed(file: Path, axis: str) -> bool:
     """Whether a robust shaper was designed for an axis and written; otherwise says why not."""
     try:
-        from canshaper.commissioning.robust import design_robust, outline, write_design
+        from canshaper.commissioning.robust import design_robust, summary_line, write_design
 
         deployment = loader(str(file))()
         one = design_robust(deployment, axis)
@@ -158,7 +158,7 @@ def _designed(file: Path, axis: str) -> bool:
     except CanshaperError as error:
         echo(f"axis {axis}: no robust shaper yet: {error}")
     else:
-        echo(outline(one))
+        echo(summary_line(one))
         return True
     return False
 

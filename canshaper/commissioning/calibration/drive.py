@@ -11,13 +11,13 @@ from dataclasses import replace
 
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
-from canshaper.commissioning.calibration.ramp import EndWatch, Ramp, SpeedFeedback
+from canshaper.commissioning.calibration.ramp import EndStopDetector, Ramp, SpeedFeedback
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import MOVING, CommandInput, Reason, State
@@ -90,7 +90,7 @@ class CalibrationDrive:
         self._runner = runner = self._controller.axes[axis]
         period_s = deployment.config.tick_ms / 1000.0 * runner.bound.period_ticks
         limits = runner.bound.config.limits
-        measured = Axis(
+        measured = ShapedAxis(
             period_s,
             OutputLimits(
                 limits.max_pct / 100.0, 0.0, limits.rise_per_s, limits.fall_per_s, tail_s=0.0
@@ -113,7 +113,7 @@ class CalibrationDrive:
         self._samples: dict[str, list[Sample]] = {}
         self.ended = ""
         self.progress = 0.0
-        self._end = EndWatch()
+        self._end = EndStopDetector()
 
     @property
     def waiting_for(self) -> str:

@@ -11,7 +11,7 @@ from canshaper.codec.identifier import NULL, group_of
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
-from canshaper.config.inputs import Input
+from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Limits
 from canshaper.errors import ConfigError, Problem
 from canshaper.inputs.value import ValueInput, measurable
@@ -95,7 +95,7 @@ LEAST = 5.0
 PART, LASTING_S = 0.5, 0.5
 
 
-class EndWatch:
+class EndStopDetector:
     """Watches the speed of an axis on its ramp."""
 
     def __init__(self) -> None:
@@ -213,7 +213,7 @@ def _bound(
     if of_axis and (of_axis.config.message, of_axis.config.signal) == (name, signal):
         return of_axis
     bus = deployment.axes[axis].config.valve.bus
-    config = Input(bus=bus, message=name, timeout_ms=SILENT_MS)
+    config = InputSection(bus=bus, message=name, timeout_ms=SILENT_MS)
     return BoundInput(config, message, Layout(message), UNPROTECTED, None)
 
 

@@ -20,7 +20,7 @@ from canshaper.commissioning.nodes.node import (
     Node,
     Pdo,
 )
-from canshaper.commissioning.nodes.use import Use
+from canshaper.commissioning.nodes.use import MessageTiming
 from canshaper.config.bus import Bus
 from canshaper.errors import NodeError
 
@@ -67,7 +67,7 @@ def heartbeat_ms(node: Node) -> int | None:
     return round(HEARTBEATS * (node.value(*_HEARTBEAT) or HEARTBEAT_MS))
 
 
-def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, Use]]) -> list[Parameter]:
+def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> list[Parameter]:
     """What has to be set in a node, in this order.
 
     Args:
@@ -87,7 +87,7 @@ def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, Use]]) -> list[P
     return parameters
 
 
-def missing(node: Node, used: Sequence[tuple[Pdo, Use]]) -> Iterator[str]:
+def missing(node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> Iterator[str]:
     """What a node does not have, and what that means."""
     if node.variable(*_HEARTBEAT) is None:
         yield "has no heartbeat (1017h); it is not supervised"
@@ -114,7 +114,7 @@ def _services(node: Node) -> Iterator[_Setting]:
     yield _EMCY, EMERGENCY + node.id, "identifier of its emergency messages"
 
 
-def _of_pdo(node: Node, pdo: Pdo, use: Use) -> Iterator[_Setting]:
+def _of_pdo(node: Node, pdo: Pdo, use: MessageTiming) -> Iterator[_Setting]:
     if pdo.transmission not in _BY_EVENT:
         yield (pdo.index, TRANSMISSION), _PROFILE, f"{pdo.name} on no SYNC"
     if pdo.transmitted and use.cycle_ms:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Use:
+class MessageTiming:
     """How a deployment uses a message: sent every so many ms, lost after so many."""
 
     cycle_ms: int | None

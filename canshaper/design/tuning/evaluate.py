@@ -13,7 +13,7 @@ from typing import Self
 
 from canshaper.design.tuning.formulation import SETTLED, at_length
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
@@ -207,7 +207,7 @@ def _press_and_release(
 ) -> list[tuple[float, list[float]]]:
     """What the axis sends: for the press and for the release, (speed before, sent)."""
     sway = SwayModel(mode, tick_s)
-    axis = Axis(
+    axis = ShapedAxis(
         tick_s,
         machine.limits,
         sway=sway,

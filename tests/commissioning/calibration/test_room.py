@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, EndWatch, Ramp
+from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, EndStopDetector, Ramp
 from canshaper.commissioning.calibration.run import run_simulated
 from canshaper.commissioning.calibration.write import speed_signal
 from canshaper.errors import CalibrationError
@@ -45,7 +45,7 @@ def test_a_ramp_that_reaches_the_end_of_a_joint_is_no_measurement(axis: str) -> 
 
 def watched(*samples: tuple[str, float, float], tremble: float = 0.0) -> bool:
     """Samples of (part, command, speed), a tenth of a second apart; whether one is the end."""
-    watch, rest = EndWatch(), [("rest", 0.0, sign * tremble) for sign in (1, -1)]
+    watch, rest = EndStopDetector(), [("rest", 0.0, sign * tremble) for sign in (1, -1)]
     steps = [*rest, *samples]
     reached = [watch.reached(part, 0.1 * n, c, s) for n, (part, c, s) in enumerate(steps)]
     return any(reached)

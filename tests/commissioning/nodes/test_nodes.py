@@ -12,7 +12,7 @@ from canshaper.commissioning.nodes import messages
 from canshaper.commissioning.nodes.eds import Eds
 from canshaper.commissioning.nodes.node import Node
 from canshaper.commissioning.nodes.parameters import heartbeat_ms, missing, parameters
-from canshaper.commissioning.nodes.use import Use
+from canshaper.commissioning.nodes.use import MessageTiming
 from canshaper.errors import ConfigError
 from tests.commissioning.nodes.eds_files import (
     INCLINOMETER,
@@ -130,7 +130,7 @@ def test_what_has_to_be_set_is_what_differs(tmp_path: Path) -> None:
         0x1800: pdo("TPDO1", "$NODEID+0x180", "50", 1),
     }
     node = node_of(tmp_path, guarded, 0x10)
-    used = [(node.pdos[0], Use(20, 100))]
+    used = [(node.pdos[0], MessageTiming(20, 100))]
     assert [(one.where, one.value) for one in parameters("left", node, used)] == [
         ("1017h:0", 200),
         ("100Ch:0", 0),
@@ -140,11 +140,11 @@ def test_what_has_to_be_set_is_what_differs(tmp_path: Path) -> None:
         ("6423h:0", 1),
         ("1010h:1", 0x65766173),
     ]
-    off = [(node.pdos[1], Use(20, 100))]
+    off = [(node.pdos[1], MessageTiming(20, 100))]
     assert ("1801h:1", 0x290) in [(p.where, p.value) for p in parameters("left", node, off)]
     valve = node_of(tmp_path, VALVE, 0x20)
     command, status, _ = valve.pdos
-    used = [(command, Use(20, 300)), (status, Use(100, 300))]
+    used = [(command, MessageTiming(20, 300)), (status, MessageTiming(100, 300))]
     assert [(one.where, one.value) for one in parameters("slew", valve, used)] == [("1400h:5", 300)]
     assert list(missing(valve, used)) == []
 
@@ -153,7 +153,7 @@ def test_what_a_node_has_not_is_said(tmp_path: Path) -> None:
     bare = {key: VALVE[key] for key in VALVE if key not in (0x1014, 0x1017)}
     bare |= {0x1400: pdo("RPDO1", "$NODEID+0x200", None), 0x1800: pdo("T", "$NODEID+0x180", None)}
     node = node_of(tmp_path, bare)
-    used = [(node.pdos[0], Use(20, 300)), (node.pdos[1], Use(100, 300))]
+    used = [(node.pdos[0], MessageTiming(20, 300)), (node.pdos[1], MessageTiming(100, 300))]
     assert list(missing(node, used)) == [
         "has no heartbeat (1017h); it is not supervised",
         "reports no errors of its own (no 1014h)",
@@ -274,4 +274,4 @@ def test_garbled_files_are_read_or_refused(seed: int, tmp_path: Path) -> None:
         return
     parsed = messages.messages(node, "n", messages.bytes_of(node))
     assert messages.dbc(parsed)
-    parameters("n", node, [(one, Use(20, 100)) for one in node.pdos])
+    parameters("n", node, [(one, MessageTiming(20, 100)) for one in node.pdos])

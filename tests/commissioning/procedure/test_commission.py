@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.cli.verbs.commission import Terminal
+from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure
@@ -35,7 +35,7 @@ def steps() -> Any:
 
 
 def procedure(changes: list[str] | None = None) -> Procedure:
-    bench = Simulated(Terminal(), changes or [])
+    bench = Simulated(Prompts(), changes or [])
     COPY.write_bytes(Path("machine.yaml").read_bytes())
     return Procedure(Files(COPY), bench, load_deployment, STEPS, origin=Path("machine.yaml"))
 
@@ -99,7 +99,7 @@ def test_a_joystick_of_another_axis_is_put_right(machine: Path) -> None:
     machine.write_text(swapped.replace("signal: X,", "signal: NearFar,"))
     real = load_deployment(machine)
     assert real.axes["slew"].config.command.signal == "NearFar"
-    bench = _WrongHand(Terminal(), [])
+    bench = _WrongHand(Prompts(), [])
     COPY.write_bytes(machine.read_bytes())
     one = Procedure(Files(COPY), bench, load_deployment, STEPS, origin=machine)
     one.accept(one.run(one.step("joysticks")))
@@ -155,7 +155,7 @@ class _Edited(Simulated):
 def test_a_file_that_was_changed_in_the_middle_of_a_step_is_noticed(machine: Path) -> None:
     one = procedure()
     one.accept(one.run(one.step("check")))
-    two = Procedure(Files(COPY), _Edited(Terminal(), []), load_deployment, STEPS, origin=machine)
+    two = Procedure(Files(COPY), _Edited(Prompts(), []), load_deployment, STEPS, origin=machine)
     with pytest.raises(UsageError, match="changed by someone else meanwhile"):
         two.accept(two.run(two.step("buses")))
     assert two.news == [
@@ -185,7 +185,7 @@ def test_the_second_commissioning_of_a_file_is_reported(machine: Path) -> None:
     commission("--step", "buses", "--yes")  # its end lets the next one in
 
 
-class _Interrupted(Terminal):
+class _Interrupted(Prompts):
     """Ctrl-C in the middle of a drive."""
 
     def progress(self, what: str) -> Any:

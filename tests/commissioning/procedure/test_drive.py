@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.cli.verbs.commission import Terminal
+from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure, Proposal
@@ -22,7 +22,7 @@ BEFORE, AFTER = "drive-before.log", "drive-after.log"
 Change = Callable[[Task], Task]
 
 
-class Driver(Terminal):
+class Driver(Prompts):
     """Sees what it is given to see."""
 
     def __init__(self, saw: str = "") -> None:
@@ -100,7 +100,7 @@ def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path
     measured: Any = proposal.numbers["crane"]
     copy = machine.with_name("copy.yaml")
     copy.write_bytes(machine.read_bytes())
-    other = Procedure(Files(copy), Simulated(Terminal(), []), load_deployment, STEPS, origin=copy)
+    other = Procedure(Files(copy), Simulated(Prompts(), []), load_deployment, STEPS, origin=copy)
     simulated: Any = other.run(other.step("drive")).numbers["crane"]
     for name in ("residual_before_deg", "residual_after_deg"):
         assert measured[name] == pytest.approx(simulated[name], abs=0.1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.cli.verbs.commission import Terminal
+from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Simulated, Task
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure, Proposal
@@ -21,7 +21,7 @@ class Otherwise(Simulated):
     """The simulated crane, whose operator has a mind of his own."""
 
     def __init__(self, change: Any) -> None:
-        super().__init__(Terminal(), [])
+        super().__init__(Prompts(), [])
         self._change = change
 
     def drive(self, deployment: Any, log: Path, task: Task) -> None:
@@ -125,7 +125,7 @@ class Renamed(Simulated):
     """The simulated crane of ``machine.yaml``, for a file with other names of its axes."""
 
     def __init__(self, names: dict[str, str]) -> None:
-        super().__init__(Terminal(), [])
+        super().__init__(Prompts(), [])
         self._names = names
         self.tasks: list[Task] = []
 

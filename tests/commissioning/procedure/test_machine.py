@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.cli.verbs.commission import Terminal
+from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.calibration import run
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.ramp import Ramp
@@ -179,7 +179,7 @@ def test_the_prompt_of_enter_is_clean(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
-    Terminal().ready("Move it.")
+    Prompts().ready("Move it.")
     assert capsys.readouterr().out == "\n  Move it.\nEnter begins: "
 
 
@@ -213,5 +213,5 @@ def test_an_answer_that_is_none_of_those_allowed(
     machine: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("me\ncanshaper\n"))
-    assert Machine(Terminal(), []).raw_mode("swing") is Mode.RAW
+    assert Machine(Prompts(), []).raw_mode("swing") is Mode.RAW
     assert "expected one of other, canshaper, got 'me'" in capsys.readouterr().err

@@ -22,7 +22,7 @@ from canshaper.design.tuning.modes import second_mode
 from canshaper.design.tuning.robust import least_residual, shortest
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.axis import Axis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
@@ -137,7 +137,9 @@ def pulse(bound: BoundAxis, hold_s: float) -> list[float]:
     shaper = build_shaper(
         "robust", TICK_S, sway, valve_rate_per_s=5.0, **bound.config.filter.parameters()
     )
-    axis = Axis(TICK_S, machine.limits, sway=sway, shaper=shaper, neutral_band=0.02, stop_s=2.0)
+    axis = ShapedAxis(
+        TICK_S, machine.limits, sway=sway, shaper=shaper, neutral_band=0.02, stop_s=2.0
+    )
     axis.tick(CommandInput(0.0))
     sent = []
     for tick in range(round((hold_s + 2.0) / TICK_S)):

@@ -4,7 +4,7 @@ from functools import partial
 
 from matplotlib.figure import Figure
 
-from canshaper.commissioning.doubts import doubts
+from canshaper.commissioning.doubts import warnings_of
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
 from canshaper.config.source import Source
@@ -50,7 +50,7 @@ def run(context: Context) -> Outcome:
     print_stopping(deployment, outcome.sheet)
     outcome.sheet.print(*deployment.identity.lines())
     outcome.numbers["digest"] = f"{deployment.identity.digest:#06x}"
-    for doubt in doubts(deployment):
+    for doubt in warnings_of(deployment):
         outcome.sheet.print(f"WARNING: {doubt}")
     source = Source(deployment.path)
     faults = [*unstated(deployment)]
