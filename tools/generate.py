@@ -20,7 +20,7 @@ from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.config.protection import PROFILES
 from canshaper.config.section import Section
 from canshaper.config.uncertainty import MEASURES
-from canshaper.controller.outputs import Counters
+from canshaper.controller.valve_messages import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions

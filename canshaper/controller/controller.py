@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.inputs import MachineInputs, parts, received_by
 from canshaper.controller.motion import motion_runners
-from canshaper.controller.outputs import Counters, OverrunDetector, ValveOutputs
+from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
 from canshaper.controller.status import SensorReport, StatusMessages
+from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
 from canshaper.inputs.input import EnableGate, Key, Part, carry_over
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey

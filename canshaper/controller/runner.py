@@ -8,7 +8,7 @@ from typing import Self
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
 from canshaper.config.schema import AxisSection
-from canshaper.controller.sets import SetChooser
+from canshaper.controller.parameter_sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource

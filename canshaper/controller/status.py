@@ -6,8 +6,8 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
 from canshaper.codec.status import StatusCodec
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
-from canshaper.controller.outputs import Counters
 from canshaper.controller.runner import AxisControl
+from canshaper.controller.valve_messages import Counters
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode

@@ -19,7 +19,7 @@ from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
 from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.numbers import LiveNumbers
-from canshaper.studio.seen import CraneSession
+from canshaper.studio.session import CraneSession
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.sources import before_the_rest
 from canshaper.studio.view import CraneView

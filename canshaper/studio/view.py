@@ -10,7 +10,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, with_source
 from canshaper.codec.status import StatusCodec
 from canshaper.commissioning.frame_finder import InputFinder
-from canshaper.controller.sets import profile_by_number
+from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick

@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.controller.outputs import Counters
+from canshaper.controller.valve_messages import Counters
 
 COUNTED = {
     "WrongLength": {"WRONG_LENGTH"},

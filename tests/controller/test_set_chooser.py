@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.controller.sets import SetChooser, profile_by_number, programs
+from canshaper.controller.parameter_sets import SetChooser, profile_by_number, programs
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import ParameterSet, build_shaper

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.controller.controller import Controller
-from canshaper.controller.sets import profile_by_number
+from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from tests.machine.gateway_files import j1939_gateway

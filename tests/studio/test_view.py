@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.controller.outputs import Counters
+from canshaper.controller.valve_messages import Counters
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS

@@ -70,7 +70,7 @@ def check(
 
 def _as_dict(deployment: "Deployment") -> dict[str, Any]:
     """Everything as plain data; travel in seconds of full speed."""
-    from canshaper.commissioning.doubts import warnings_of
+    from canshaper.commissioning.file_warnings import warnings_of
     from canshaper.commissioning.stopping import stopping
 
     config, loads = (
@@ -112,7 +112,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
 
 def _print(deployment: "Deployment") -> None:
     """Everything for people."""
-    from canshaper.commissioning.doubts import warnings_of
+    from canshaper.commissioning.file_warnings import warnings_of
     from canshaper.commissioning.stopping import print_stopping
     from canshaper.gate.build import record_of
     from canshaper.report.console import SafeConsole
