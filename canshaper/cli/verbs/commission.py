@@ -155,7 +155,7 @@ def _lead(procedure: "Procedure", name: str | None) -> None:
         _one(procedure, step)
         step = None if name else procedure.next_open()
     if procedure.next_open() is None:
-        echo(f"No step is open: {procedure.files.state}")
+        echo(f"All steps are done: {procedure.files.state}")
 
 
 def _one(procedure: "Procedure", step: "Step") -> None:
@@ -172,7 +172,7 @@ def _one(procedure: "Procedure", step: "Step") -> None:
             echo(f"NOTE: {procedure.news.pop(0)}")
         _show(procedure, proposal)
         choices = (AGAIN, SKIP, STOP) if proposal.poor else (YES, AGAIN, SKIP, STOP)
-        what = "accept" if not proposal.poor else "too poor"
+        what = "accept" if not proposal.poor else "not enough data"
         default = STOP if proposal.poor else YES
         answer = ask(f"{step.name}: {what} ({', '.join(choices)})", one(choices), default)
         if answer == YES:
@@ -199,7 +199,7 @@ def _show(procedure: "Procedure", proposal: "Proposal") -> None:
         if picture.suffix == ".png":
             echo(f"Picture: {picture}")
     for fault in proposal.poor:
-        echo(f"TOO POOR: {fault}")
+        echo(f"NOT ENOUGH DATA: {fault}")
     if proposal.diff:
         echo(f"It would write into {procedure.files.deployment}:\n{proposal.diff}")
     elif not proposal.poor:

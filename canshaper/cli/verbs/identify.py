@@ -77,7 +77,7 @@ def identify(
 
     Finds free swings by itself: by the commands in the log where the deployment names them, else by
     the shape of the signal. Intervals are of 95 %. Draws OUT/identify.png. Exit code 1 where the
-    data of an axis is too poor, with what to do; 2 where a file or an option is wrong.
+    data of an axis is not enough, with what to do; 2 where a file or an option is wrong.
 
     LABEL= says what hangs on the crane: logs of one label count together, several labels are
     compared. A label that is a number is the value of the grapple's signal. Of a folder every log

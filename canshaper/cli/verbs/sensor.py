@@ -58,7 +58,7 @@ def sensor(
     From a log, or with --live from the buses, where nothing is sent: drive each axis by hand, one
     after the other, at some 40 % for about a second, forth and back, four times, with a pause of
     two swings after each. By default on the simulated crane. Intervals are of 95 %. Draws
-    OUT/sensor.png. Exit code 1 where the data of a sensor is too poor, with what to do; 2 where a
+    OUT/sensor.png. Exit code 1 where the data of a sensor is not enough, with what to do; 2 where a
     file or an option is wrong; 3 where a bus cannot be opened.
 
     Examples:
@@ -177,7 +177,7 @@ def _print(
         for note in finding.notes:
             results.print(f"  note: {note}")
         for fault in finding.poor:
-            results.print(f"  too poor: {fault}")
+            results.print(f"  not enough data: {fault}")
     for line in written:
         results.print(line)
     if written:

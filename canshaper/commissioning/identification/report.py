@@ -22,7 +22,7 @@ def lines(finding: Finding) -> list[str]:
     """A finding for people, one line a fact."""
     text_lines = [heading(finding), *(f"  {text}" for text in _basis(finding))]
     text_lines += [f"  note: {note}" for note in finding.notes]
-    text_lines += [f"  too poor: {fault}" for fault in finding.poor]
+    text_lines += [f"  not enough data: {fault}" for fault in finding.poor]
     return text_lines
 
 
@@ -39,7 +39,7 @@ def heading(finding: Finding) -> str:
     if finding.full_speed_m_s:
         speed = finding.full_speed_m_s
         text += f", full speed {speed.value:.2f} ± {speed.half:.2f} m/s"
-    return text if finding.usable else f"{text} (too poor)"
+    return text if finding.usable else f"{text} (not enough data)"
 
 
 def _basis(finding: Finding) -> list[str]:

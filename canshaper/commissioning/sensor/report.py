@@ -26,7 +26,7 @@ def heading(finding: Finding) -> str:
     driven = len(finding.data)
     explained = 100.0 * max(0.0, finding.fit.explained(math.radians(finding.noise)))
     text += f": {driven} driven stretch{'es' * (driven != 1)}, {explained:.0f} % explained"
-    return f"{text} (too poor)" if finding.poor else text
+    return f"{text} (not enough data)" if finding.poor else text
 
 
 def table(axis: BoundAxis, finding: Finding) -> Table:

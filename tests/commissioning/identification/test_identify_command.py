@@ -181,7 +181,7 @@ def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: 
     before = file.read_bytes()
     result = run(tmp_path, logs / "still.log", "--file", file, "--write")
     assert result.exit_code == 1
-    assert "too poor" in result.output
+    assert "not enough data" in result.output
     assert "drive the axis shortly, let go of the joysticks" in result.output
     assert "Written" not in result.output
     assert file.read_bytes() == before

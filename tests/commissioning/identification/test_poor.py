@@ -1,4 +1,4 @@
-"""Data that is too poor is reported, with what to do; nothing is made of it."""
+"""Data that is not enough is reported, with what to do; nothing is made of it."""
 
 import math
 

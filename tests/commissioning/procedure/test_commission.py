@@ -76,7 +76,7 @@ def test_another_crane_than_before_is_refused(machine: Path) -> None:
 def test_a_poor_swing_leaves_the_step_open_and_says_what_to_do(machine: Path) -> None:
     crane = ("--set", "slew.deadband=0.5")  # more than max_pct: 40, so the axis does not move
     shown = commission(*crane, "--step", "swing", "--yes", code=1)
-    assert "TOO POOR: slew: " in shown
+    assert "NOT ENOUGH DATA: slew: " in shown
     assert "is it the right signal, and the sensor on?" in shown
     assert "It would write" not in shown
     assert COPY.read_bytes() == machine.read_bytes()

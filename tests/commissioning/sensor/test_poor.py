@@ -1,4 +1,4 @@
-"""Data that is too poor is refused, with what is missing and what to do."""
+"""Data that is not enough is refused, with what is missing and what to do."""
 
 import functools
 import math

@@ -90,7 +90,7 @@ def test_what_is_too_poor_is_not_written(tmp_path: Path, file: Path) -> None:
     log_simulated(log, load_deployment(file), REAL, Script("rest", (), 20.0))
     text = sensor(file, log, "--write", "--out", tmp_path, code=1)
     assert "Slew, drive.log: SwayAngle.Across: nothing found" in text
-    assert "too poor: expected near_far driven alone for 2 s or more, got 0.0 s" in text
+    assert "not enough data: expected near_far driven alone for 2 s or more, got 0.0 s" in text
     assert "Picture" not in text
     assert file.read_bytes() == before
 

@@ -82,7 +82,7 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
     for part in one.parts:
         again = shown(part)
         parts.append(html.text(again) if isinstance(again, str) else html.table(again))
-    parts += [html.text(f"TOO POOR: {fault}") for fault in one.poor]
+    parts += [html.text(f"NOT ENOUGH DATA: {fault}") for fault in one.poor]
     paths = [folder / picture for picture in one.pictures]
     drawings = {path.stem for path in paths if path.suffix == ".svg"}
     for path in paths:
