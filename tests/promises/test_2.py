@@ -1,0 +1,107 @@
+"""Promise 2, by the bytes of frames: the worst controller there can be, and the sound one."""
+
+import math
+import random
+from collections.abc import Iterator
+
+from tests.faults.axis import Axis
+from tests.promises.world import REST, World, every
+from tests.promises.worst import Worst
+
+STICKS = (1.0, 0.0, -1.0, 0.5, -0.05, 0.02, -0.02, 0.03)
+
+
+def rounding(axis: Axis) -> float:
+    return 1.5 * axis.step + 1e-6
+
+
+def run_on(axis: Axis) -> int:
+    """Periods from the last demand to rest, at most."""
+    return axis.tail + math.ceil(1.0 / axis.fall) + 1
+
+
+@every
+class TestNeutralStops:
+    """**The joystick in neutral always stops**, within the bounded run-on of the filter: after
+    `tail_s` the output falls to zero by `fall_per_s`. For `tail_s` after anti-sway was switched on
+    in motion, or a trip or the end of a stop cut a motion off, there is no run-on, so that nothing
+    is run twice or later."""
+
+    def judged(self, world: World) -> World:
+        """After the tail each frame is lower by the fall, and from its end on there is none."""
+
+        def judge(axis: str, before: float, now: float) -> None:
+            seen = world.buses.axes[axis]
+            of = seen.axis
+            last = max(one.deflected for one in (seen, seen.partner or seen))
+            since = seen.period - last
+            if now and since > of.tail + bool(of.moves_with):  # its partner's demand counts, too
+                assert since <= run_on(of), f"{axis}: after the run-on"
+                least = abs(before) - of.fall + rounding(of)
+                assert abs(now) <= least and now * before > 0, f"{axis}: does not fall"
+
+        world.judge = judge
+        return world
+
+    def test_whatever_a_controller_sends(self, name: str) -> None:
+        """Held, tapped, turned round, a little beside neutral, in a bypass; then in neutral."""
+        world = Worst(name)
+        self.judged(world)
+        longest = max(run_on(one) * one.period_ticks for one in world.axes.values())
+        for taps in ((40, 0.0), (4, 0.0), (6, 0.02), (30, -0.02)):
+            world.starts()
+            world.go(taps[0], **world.held(1.0))
+            world.go(longest // 2, **world.held(taps[1]))
+            world.sign = {axis: -sign for axis, sign in world.sign.items()}
+            world.go(longest // 2 + 5)
+            assert not any(world.speed.values())
+            world.go(10)
+            world.sign = {axis: -sign for axis, sign in world.sign.items()}
+
+    def test_of_the_sound_controller(self, name: str) -> None:
+        """Any strokes: no frame is refused, and after the run-on it rests."""
+        world = self.judged(World(name))
+        rng = random.Random(name)
+        world.go(REST)
+        for _ in range(8):
+            world.go(rng.randint(2, 25), **{axis: rng.choice(STICKS) for axis in world.axes})
+        assert any(world.way.values())
+        world.go(max(run_on(one) * one.period_ticks for one in world.axes.values()) + 2)
+        world.go(5)
+        assert not any(world.speed.values())
+
+    def test_no_run_on_after_anti_sway_was_switched_on(self, name: str) -> None:
+        world = World(name)
+        off = {j.name: {j.off.name: 1} for j in world.machine.joysticks.values() if j.off}
+        world.go(REST)
+        world.raw = off
+        world.go(20, **world.held(1.0))
+        world.raw = {}
+        assert any(world.speed.values())
+        world.go(world.machine.gateway)  # whose frames are a tick old
+        for _ in self.falling(world):
+            world.go(1)
+
+    def test_no_run_on_after_a_trip(self, name: str) -> None:
+        """Reset at once: what was cut off is not run later."""
+        world = World(name)
+        world.go(REST)
+        world.go(30, **world.held(1.0))
+        world.enable = 0
+        world.go(2)
+        assert not any(world.speed.values())
+        world.enable = 1
+        for _ in self.falling(world):
+            world.go(1)
+
+    def falling(self, world: World) -> Iterator[int]:
+        """Ticks of a tail, in which the output never rises; what a motion adds besides."""
+
+        def judge(axis: str, before: float, now: float) -> None:
+            of = world.axes[axis]
+            if not of.moves_with and of.joystick.off:
+                least = max(0.0, abs(before) - of.fall) + rounding(of)
+                assert abs(now) <= least, f"{axis}: runs on"
+
+        world.judge = judge
+        yield from range(max(one.tail * one.period_ticks for one in world.axes.values()) + 5)
