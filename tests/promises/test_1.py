@@ -1,54 +1,10 @@
 """Promise 1, by the bytes of frames and the worst controller there can be."""
 
-from collections.abc import Callable, Iterable
-
-from canshaper.codec.frame import Frame
-from tests.promises.world import every
+from tests.promises.events import Event, code, counter_stands, flag, once, shorter, silence
+from tests.promises.world import World, every
 from tests.promises.worst import Worst
 
-Event = Callable[[Worst, int], None]
 RUN, AFTER = 8, 5  # ticks
-
-
-def flag(**values: int) -> Event:
-    """Enable or emergency stop of the hand, or switches of the machine."""
-
-    def event(world: Worst, k: int) -> None:
-        for name, value in values.items():
-            setattr(world, name, value)
-
-    return event
-
-
-def once(act: Callable[[Worst], None]) -> Event:
-    return lambda world, k: act(world) if k == 0 else None
-
-
-def joysticks(change: Callable[[Worst, Frame], Iterable[Frame]]) -> Event:
-    """Frames of joysticks come otherwise."""
-
-    def event(world: Worst, k: int) -> None:
-        keys = {one.key for one in world.machine.joysticks.values()}
-        world.change = lambda frame: change(world, frame) if frame[:3] in keys else [frame]
-
-    return event
-
-
-def shorter(world: Worst, frame: Frame) -> Iterable[Frame]:
-    return [frame._replace(data=frame.data[:-1])]
-
-
-def code(raw: int) -> Event:
-    """Every velocity signal has a raw value so far from the end of its range."""
-
-    def event(world: Worst, k: int) -> None:
-        for axis in world.axes.values():
-            signal = axis.signal
-            value = signal.mask >> bool(signal.sign)
-            world.raw.setdefault(axis.joystick.name, {})[signal.name] = value - raw
-
-    return event
-
 
 EVENTS: dict[str, Event] = {
     "enable released": flag(enable=0),
@@ -57,14 +13,15 @@ EVENTS: dict[str, Event] = {
     "another switch off": lambda world, k: setattr(world, "agree", False),
     "emergency stop": flag(stop=1),
     "emergency stop for a tick": lambda world, k: setattr(world, "stop", int(k == 0)),
-    "silence": joysticks(lambda world, frame: []),
-    "wrong length": joysticks(shorter),
-    "the last code": code(0),
-    "the last but one": code(1),
-    "second sender": once(Worst.second_sender),
-    "failed send": once(Worst.send_failed),
-    "stalled loop": once(Worst.stalled),
-    "reload": once(Worst.reload),
+    "silence": silence,
+    "wrong length": shorter,
+    "counter stands": counter_stands,
+    "a code of the DBC": code(0),
+    "beyond the range": code(-1),
+    "second sender": once(World.second_sender),
+    "failed send": once(World.send_failed),
+    "stalled loop": once(World.stalled),
+    "reload": once(lambda world: world.reload()),
 }
 
 

@@ -27,7 +27,8 @@ class TestEveryFrameIsOfItsTick:
         assert len({frame[:3] for frame in left}) == len(left)
         return left
 
-    def counters(self, world: World, frames: list[Frame], before: dict[tuple[str, int, bool], int]
+    def counters(
+        self, world: World, frames: list[Frame], before: dict[tuple[str, int, bool], int]
     ) -> None:
         for frame in frames:
             axis = world.moved_by[frame[:3]][0]
@@ -60,7 +61,7 @@ class TestEveryFrameIsOfItsTick:
         before: dict[tuple[str, int, bool], int] = {}
         for k in range(32):
 
-            def plant(frames: list[Frame], k: int = k) -> Iterator[Frame]:
+            def plant(frames: list[Frame], k: int = k, past: list[Frame] = past) -> Iterator[Frame]:
                 for frame in frames:
                     old = next((one for one in past if one[:3] == frame[:3]), frame)
                     several = [frame, frame], [old, frame], [frame, old], [old]
@@ -78,7 +79,9 @@ class TestEveryFrameIsOfItsTick:
         """Of any speed, right behind the tick, also where it asks for nothing new."""
         world = self.world(name)
         if world.machine.gateway:
-            pytest.skip("a frame of ours may leave next to one that is passed on: rates hold over both")
+            pytest.skip(
+                "a frame of ours may leave next to one that is passed on: rates hold over both"
+            )
         for key, axes in world.moved_by.items():
             frame = next(one for one in world.left if one[:3] == key)
             for speed in (0.2, 0.6, -0.5, 1.0):

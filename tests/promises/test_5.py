@@ -12,6 +12,9 @@ from tests.promises.test_2 import rounding
 from tests.promises.world import REST, World, every
 from tests.promises.worst import Worst
 
+HEADERS = {"p04": 12, "p07": 20}  # bytes of E2E
+WORDS = (0x8, 0x9, 0xB, 0xF, 0x3)  # of CiA 408
+
 Wrong = Callable[[World, Frame], Iterator[Frame]]
 
 
@@ -43,15 +46,14 @@ def values(world: World, frame: Frame) -> Iterator[Frame]:
     """Every value of a command of up to ten bits, of a longer one the ends and some; every code of
     a direction, of the same command in another resolution, of a control word."""
     for axis in world.moved_by[frame[:3]]:
-        of, (also, codes, e2e) = world.axes[axis], world._commands[axis]
-        fields = [of.valve, *also, *([codes[0]] if codes else [])]
-        fields += [of.words.control] if of.words else []
-        for field in fields:
+        e2e = world.file["axes"][axis]["valve"].get("e2e")
+        for field in world.fields(axis):
             rng, ones, full = random.Random(axis), field.mask, field.full
-            raws = range(ones + 1) if ones < 1024 else [
-                *(0, 1, ones, ones >> 1, (ones >> 1) + 1, full, full + 1, ones - full, ones + 1 - full),
-                *(rng.randrange(ones) for _ in range(100)), *field.special,
-            ]  # fmt: skip
+            half = (ones >> 1) + 1
+            raws = [0, 1, half - 1, half, full, full + 1, ones - full, ones + 1 - full, ones]
+            raws += [*field.special, *(rng.randrange(ones) for _ in range(100))]
+            if ones < 1024:
+                raws = [*range(ones + 1)]
             for raw in raws:
                 word = int.from_bytes(frame.data, "little") & ~(ones << field.start)
                 data = (word | (raw & ones) << field.start).to_bytes(len(frame.data), "little")
@@ -72,15 +74,20 @@ def identifiers(world: World, frame: Frame) -> Iterator[Frame]:
             yield frame._replace(bus=bus)
 
 
+CANOPEN = (
+    (0, "01"), (0x80, ""), (0xA0, "0" * 16), (0x720, "05"), (0x620, "2b40600006000000"),
+    (0x77E, "04"),
+)  # fmt: skip
+
+
 def others(world: World, frame: Frame) -> Iterator[Frame]:
     """Joysticks; NMT, SYNC, SDO, heartbeats of CANopen; requests, claims, transport of J1939."""
     yield from (world.joystick(name) for name in world.machine.joysticks)
     for bus in world.machine.buses:
         for command in (2, 0x80, 0x81, 0x82, 3):
             yield from (Frame(bus, 0, False, bytes([command, node])) for node in (0, 0x20))
-        for number, data in ((0, b"\x01"), (0x80, b""), (0xA0, bytes(8)), (0x720, b"\x05"),
-                             (0x620, bytes.fromhex("2b40600006000000")), (0x77E, b"\x04")):  # fmt: skip
-            yield Frame(bus, number, False, data)
+        for number, content in CANOPEN:
+            yield Frame(bus, number, False, bytes.fromhex(content))
         for number in (0x18EAFF9C, 0x18EA339C, 0x18ECFF9C, 0x18EBFF9C, 0x18FED89C, 0x18D0FF9C):
             yield from (Frame(bus, number, True, bytes(n)) for n in (3, 9))
         yield Frame(bus, 0x18EEFF33, True, bytes(8))
@@ -97,46 +104,53 @@ WRONG: dict[str, Wrong] = {
 
 
 def right(world: World, sound: Frame, frame: Frame) -> bool:
-    """Whether a frame may leave in the place of a sound one, by the file and the DBC alone.
-
-    In doubt it may: on the way back, by a motion, after a fall.
-    """
-    if frame[:3] in world.moved_by and frame[:3] != sound[:3]:
-        return True  # it is right or wrong in the turn of that valve
-    if frame[:3] != sound[:3]:  # of what is no valve's the content is not looked at
+    """Whether a frame may leave in the place of a sound one, by the file and the DBC alone."""
+    if frame[:3] != sound[:3]:
+        if frame[:3] in world.moved_by:
+            return True  # it is right or wrong in the turn of that valve
         keys = (*world.machine.statuses, world.machine.service, world.machine.identity)
-        return frame[:3] in keys and 8 <= len(frame.data) <= 64
+        return frame[:3] in keys and 8 <= len(frame.data) <= 64  # whatever it says
     if len(frame.data) != len(sound.data):
         return False
-    before, after = (int.from_bytes(one.data, "little") for one in (sound, frame))
-    for axis in world.moved_by[frame[:3]]:
-        of, (also, codes, e2e) = world.axes[axis], world._commands[axis]
-        steps = world.decode(axis, frame.data)
-        if steps is None or sealed(e2e, frame.data) != frame.data:
-            return False
-        fields = [of.valve, *also, *([codes[0]] if codes else [])]
-        if of.words:
-            fields.append(of.words.control)
-            if of.words.control.get(after) not in (0x8, 0x9, 0xB, 0xF, 0x3):
-                return False
-        ours = sum(field.mask << field.start for field in fields)
+    axes = world.moved_by[frame[:3]]
+    return whole(world, axes, sound.data, frame.data) and all(
+        may_be(world, axis, world.decode(axis, frame.data)) for axis in axes
+    )
+
+
+def whole(world: World, axes: list[str], sound: bytes, data: bytes) -> bool:
+    """Whether all that is no command is as before, and signals of a command agree."""
+    before, after = int.from_bytes(sound, "little"), int.from_bytes(data, "little")
+    ours = 0
+    for axis in axes:
+        fields, e2e = world.fields(axis), world.file["axes"][axis]["valve"].get("e2e")
+        ours |= sum(field.mask << field.start for field in fields)
         if e2e:
-            ours |= (1 << 8 * {"p04": 12, "p07": 20}[e2e["profile"]]) - 1
-        before, after = before & ~ours, after & ~ours
-        if any(abs(one.get(int.from_bytes(frame.data, "little")) - one.full * abs(steps) / of.steps) > 0.51
-               for one in also):  # fmt: skip
+            ours |= (1 << 8 * HEADERS[e2e["profile"]]) - 1
+        steps, words = world.decode(axis, data) or 0, world.axes[axis].words
+        also = [one.get(after) - one.full * abs(steps) / fields[0].full for one in fields[1:]
+                if one.name in world.file["axes"][axis]["valve"].get("also", [])]  # fmt: skip
+        if sealed(e2e, data) != data or any(abs(one) > 0.51 for one in also):
             return False
-        speed, now = of.velocity(steps), world.speed[axis]
-        seen = world.buses.axes[axis]
-        if not steps:
-            continue
-        most = max(abs(now) + of.rise, abs(now)) + rounding(of)
-        asked = max(seen.most(1.0), seen.most(-1.0), abs(now), of.largest_added) + rounding(of)
-        if seen.stopped_at_once(world.now_ns) or seen.latched or not seen.neutral:
+        if words and words.control.get(after) not in WORDS:
             return False
-        if abs(speed) > min(most, asked) or abs(speed - now) > max(of.rise, of.fall) + rounding(of):
-            return of.largest_added > 0.0 and abs(speed) < abs(now)
-    return before == after
+    return before & ~ours == after & ~ours
+
+
+def may_be(world: World, axis: str, steps: int | None) -> bool:
+    """Whether a command may be sent now; in doubt it may: on the way back, by a motion."""
+    of, seen, now = world.axes[axis], world.buses.axes[axis], world.speed[axis]
+    if not steps:
+        return steps == 0
+    if seen.stopped_at_once(world.now_ns) or seen.latched or not seen.neutral:
+        return False
+    speed, rounds = of.velocity(steps), rounding(of)
+    asked = max(seen.most(1.0), seen.most(-1.0), abs(now), of.largest_added)
+    if abs(speed) > min(abs(now) + of.rise, asked) + rounds:
+        return False
+    return abs(speed - now) <= max(of.rise, of.fall) + rounds or (
+        of.largest_added > 0.0 and abs(speed) < abs(now)
+    )
 
 
 @every

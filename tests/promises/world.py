@@ -19,8 +19,8 @@ from canshaper.machine.deployment import Deployment
 from tests.faults.fields import Field
 from tests.faults.machine import Key, Machine
 from tests.faults.shipped import CONFIG, NAMES
-from tests.promises.seen import Buses
 from tests.promises.sealed import sealed
+from tests.promises.seen import Buses
 
 REST = 25  # ticks until claims, nodes and neutral are seen
 ACTIVE = 0xF  # control word of CiA 408
@@ -139,6 +139,12 @@ class World:
         name, signs = of.direction
         codes = Field(signal(name)), {sign: code for code, sign in signs.items()}
         return also, codes, valve.get("e2e")
+
+    def fields(self, axis: str) -> list[Field]:
+        """Where its command lies in the frame of its valve; the first one is the size."""
+        of, (also, codes, _) = self.axes[axis], self._commands[axis]
+        words = [of.words.control] if of.words else []
+        return [of.valve, *also, *([codes[0]] if codes else []), *words]
 
     def count(self, axis: str, data: bytes) -> int:
         """Alive counter of a valve's frame, where that is a signal."""
@@ -272,6 +278,11 @@ class World:
         return plant
 
     # --- what goes wrong -------------------------------------------------------------------------
+
+    def well(self) -> None:
+        """Nothing is wrong any more."""
+        self.enable, self.stop, self.agree, self.raw = 1, 0, True, {}
+        self.change = lambda frame: [frame]
 
     def second_sender(self) -> None:
         """Another node sends what our valves receive."""

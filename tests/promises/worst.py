@@ -89,11 +89,6 @@ class Worst(World):
         self.go(6, **self.held(size))
         assert all(self.speed[axis] * sign > 0 for axis, sign in self.sign.items())
 
-    def well(self) -> None:
-        """Nothing is wrong any more."""
-        self.enable, self.stop, self.agree, self.raw = 1, 0, True, {}
-        self.change = lambda frame: [frame]
-
     def _candidates(self, axis: str) -> list[int]:
         """Commands, the one that goes farthest to its side first, neutral last."""
         of, sign, last = self.axes[axis], self.sign[axis], self._steps[axis]
