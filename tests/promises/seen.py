@@ -41,7 +41,7 @@ class Seen:
         self.deflected = -(10**6)
         self._causes: set[str] = set()
         self._seen = (0, 0, 0)
-        self._pressed = 0
+        self._presses = self._pressed = 0  # at the last look, and when it latched
 
     def failed(self) -> None:
         """Its last frame did not get out; at rest nothing is lost by that."""
@@ -73,7 +73,7 @@ class Seen:
         self.period, before, self.demand = period, self.asked, 0.0
         if causes:
             if (moves or causes & {"second sender", "emergency stop"}) and not self.latched:
-                self.latched, self._pressed = True, presses - ("enable" not in causes)
+                self.latched, self._pressed = True, self._presses
             self.neutral, self.stop_until = False, -1
             if not axis.moves_with:  # a motion adds by what was asked before as well
                 before.clear()
@@ -86,6 +86,7 @@ class Seen:
         elif not self.latched or presses > self._pressed:
             self.neutral, self.latched = True, False
         self._causes.clear()
+        self._presses = presses
         self._seen = (
             joystick.releases,
             joystick.disagreements,

@@ -4,6 +4,17 @@ from tests.promises.events import Event, code, counter_stands, flag, once, short
 from tests.promises.world import World, every
 from tests.promises.worst import Worst
 
+
+def pressed_meanwhile(world: World) -> None:
+    """Enable is released and pressed in frames that wait while the loop stands."""
+    world.stalled()
+    sticks, world.stick = world.stick, {}
+    for world.enable in (0, 0, 1, 1):
+        for name in world.machine.joysticks:
+            world.receive(world.joystick(name))
+    world.stick = sticks
+
+
 RUN, AFTER = 8, 5  # ticks
 
 EVENTS: dict[str, Event] = {
@@ -21,6 +32,7 @@ EVENTS: dict[str, Event] = {
     "second sender": once(World.second_sender),
     "failed send": once(World.send_failed),
     "stalled loop": once(World.stalled),
+    "stalled loop, and pressed meanwhile": once(pressed_meanwhile),
     "reload": once(lambda world: world.reload()),
 }
 
