@@ -66,9 +66,9 @@ class TestNeutralStops:
         for _ in range(8):
             world.go(rng.randint(2, 25), **{axis: rng.choice(STICKS) for axis in world.axes})
         assert any(world.way.values())
-        world.go(max(run_on(one) * one.period_ticks for one in world.axes.values()) + 2)
-        world.go(5)
+        world.go(max(run_on(one) * one.period_ticks for one in world.axes.values()) + 7)
         assert not any(world.speed.values())
+        assert not world.refusals()
 
     def test_no_run_on_after_anti_sway_was_switched_on(self, name: str) -> None:
         world = World(name)
@@ -83,7 +83,7 @@ class TestNeutralStops:
             world.go(1)
 
     def test_no_run_on_after_a_trip(self, name: str) -> None:
-        """Reset at once: what was cut off is not run later."""
+        """Reset at once, and touched: what was cut off is not run later."""
         world = World(name)
         world.go(REST)
         world.go(30, **world.held(1.0))
@@ -91,17 +91,21 @@ class TestNeutralStops:
         world.go(2)
         assert not any(world.speed.values())
         world.enable = 1
-        for _ in self.falling(world):
-            world.go(1)
+        world.go(3)
+        assert not any(world.speed.values())
+        for _ in self.falling(world, asked=0.1):
+            world.go(1, **world.held(0.1))
+        assert any(world.speed.values())
 
-    def falling(self, world: World) -> Iterator[int]:
-        """Ticks of a tail, in which the output never rises; what a motion adds besides."""
+    def falling(self, world: World, asked: float = 0.0) -> Iterator[int]:
+        """Ticks of a tail, with an output no faster than asked; but for what a motion adds."""
 
         def judge(axis: str, before: float, now: float) -> None:
             of = world.axes[axis]
             if not of.moves_with and of.joystick.off:
-                least = max(0.0, abs(before) - of.fall) + rounding(of)
+                least = max(asked, abs(before) - of.fall) + rounding(of)
                 assert abs(now) <= least, f"{axis}: runs on"
 
         world.judge = judge
         yield from range(max(one.tail * one.period_ticks for one in world.axes.values()) + 5)
+        assert not world.refusals()

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.controller.events import RefusalEvent
 from tests.promises.sealed import sealed
 from tests.promises.test_2 import rounding
 from tests.promises.world import REST, World, every
@@ -200,8 +199,7 @@ class TestOneWrongCommand:
                     count = world.count(axis, frame.data)
                     assert count == (counts[frame[:3]] + 1) & counter.mask
             assert not any(world.speed.values()), (size, wrong)
-            refused = [e for e in world.evil.events if isinstance(e, RefusalEvent)]
-            assert len(refused) == len(world.moved_by)
+            assert len(world.refusals()) == len(world.moved_by)
             world.go(10, world.commands(**world.held(0.1)), **world.held(size))
             assert not any(world.speed.values())
 

@@ -13,6 +13,7 @@ import yaml
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
+from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -259,6 +260,12 @@ class World:
         self.stick = stick
         for _ in range(ticks):
             self.step(plant)
+
+    def refusals(self) -> list[str]:
+        """What the gate has refused since they were asked for."""
+        refused = [one.why for one in self.evil.events if isinstance(one, RefusalEvent)]
+        self.evil.events.clear()
+        return refused
 
     def held(self, size: float) -> dict[str, float]:
         """Every joystick deflected, one this way and the next one the other."""
