@@ -8,18 +8,12 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.codec.signals import FieldSet
 from canshaper.config.limits import Limits
 from canshaper.config.schema import Command as Stick
 from canshaper.config.schema import Valve
-from canshaper.gate.build import record_of
 from canshaper.gate.fields import openings_of, word_of
 from canshaper.gate.signals import command_of, field_of, part_of, stick_of
 from canshaper.shaping.limits import without_deadband
-from canshaper_sim.hand import Hand, Held
-from tests.faults import shipped
-from tests.gate.bench import load
-from tests.rigs.sent import command_raw
 
 HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: JOYSTICK SHAPER\nBO_ 2 Message: 8 JOYSTICK\n'
 DBC = Path(__file__).parents[2] / "dbc"
@@ -176,63 +170,6 @@ def test_a_rocker(forth: int, back: int, demand: float | None) -> None:
     section = Stick(joystick="left", signal="Forth", negative="Back")
     data = bytes([0, forth, 0, back, *bytes(4)])
     assert stick_of(one, section, one).demand(word_of(data)) == pytest.approx(demand)
-
-
-@pytest.mark.parametrize("name", shipped.NAMES)
-def test_joysticks_are_read_as_the_codec_reads_them(name: str) -> None:
-    deployment, rng = load(name), random.Random(name)
-    record = record_of(deployment)
-    for axis in deployment.axes.values():
-        config = axis.config.command
-        joystick, stick = deployment.joysticks[config.joystick], record.axes[axis.name].stick
-        assert stick.band == config.neutral_pct / 100.0
-        for _ in range(300):
-            data = rng.randbytes(joystick.message.length)
-            if chosen := joystick.chosen:
-                raw = joystick.decode(data)[0] | {chosen.signal: chosen.value}
-                data = FieldSet(joystick.message).layout.encode(raw)
-            command = joystick.decode(data)[1][config.signal]
-            demand = stick.demand(word_of(data))
-            assert demand == (pytest.approx(command) if isinstance(command, float) else None)
-
-
-@pytest.mark.parametrize("name", shipped.NAMES)
-def test_commands_are_read_as_the_valve_codec_writes_them(name: str) -> None:
-    deployment, rng = load(name), random.Random(name)
-    record = record_of(deployment)
-    for axis in deployment.axes.values():
-        command, codec = record.axes[axis.name].command, axis.valve
-        layout = codec.message.fields.layout
-        assert command.size.full == codec.steps
-        assert record.axes[axis.name].valve == codec.message.key
-        for steps in (0, 1, -1, codec.steps, -codec.steps, rng.randrange(codec.steps)):
-            data = layout.encode(command_raw(codec, steps))
-            assert command.steps(word_of(data)) == steps
-        for _ in range(300):
-            data = rng.randbytes(axis.valve_message.length)
-            steps = command.steps(word_of(data))
-            assert steps is None or steps == codec.read(layout.decode(data))
-
-
-@pytest.mark.parametrize("name", shipped.NAMES)
-def test_what_a_hand_sends_is_received(name: str) -> None:
-    """Identifiers, lengths, counters and checksums of every message."""
-    deployment = load(name)
-    record, hand = record_of(deployment), Hand(deployment)
-    for one in record.messages.values():
-        frames = [
-            f for t in range(0, 200, deployment.config.tick_ms) for f in hand.frames(t, Held())
-        ]
-        own = [
-            f
-            for f in frames
-            if f[2] == one.extended
-            and (f[1] in one.ids or (one.group and f[1] & one.group[0] == one.group[1]))
-        ]
-        assert own
-        for frame in own:
-            assert len(frame.data) == one.length
-            assert one.check is None or one.check.right(frame.data)
 
 
 def command_steps(one: Any, data: bytes, joystick: Stick | None = None, **valve: Any) -> int | None:

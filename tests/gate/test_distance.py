@@ -4,11 +4,10 @@ import math
 
 import pytest
 
-from canshaper.controller.events import RefusalEvent
 from canshaper.gate.axis import BLEND_S, Asked
 from canshaper.gate.build import SLACK, SWING_SLACK, slack_of
-from tests.gate.attacker import World
 from tests.gate.bench import Bench, bench, limited, load, signs
+from tests.promises.world import World
 
 FULL = 125
 
@@ -76,15 +75,10 @@ class TestDistance:
             assert slack_of(lift.model_copy(update={key: [1]})) == SWING_SLACK
 
 
-def refusals(world: World, ticks: int, **stick: float) -> list[RefusalEvent]:
+def refusals(world: World, ticks: int, **stick: float) -> list[str]:
     """Hold the sticks so; return what the gate refuses of the sound controller."""
-    world.stick = stick
-    refused = []
-    for _ in range(ticks):
-        world.step()
-        refused += [one for one in world.evil.events if isinstance(one, RefusalEvent)]
-        world.evil.events.clear()
-    return refused
+    world.go(ticks, **stick)
+    return world.refusals()
 
 
 def test_a_stop_forgets_what_may_run_on_and_not_what_was_asked() -> None:

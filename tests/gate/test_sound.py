@@ -9,12 +9,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from canshaper.controller.events import RefusalEvent
-from tests.gate.attacker import World
-from tests.gate.kinds import NAMES, joysticks
+from tests.faults.shipped import NAMES
+from tests.promises.world import World
 
 TICKS, FIRST = 900, 110
-QUICK, QUICK_TICKS, MANY = 18, 350, 400
+QUICK, QUICK_TICKS, MANY = 20, 350, 400
 FAULTS = ("enable", "enable", "silent", "bypass", "bypass", "late", "stalled", "not sent")
 
 
@@ -50,24 +49,20 @@ class Random:
         self.faults = {rng.randrange(FIRST, TICKS): rng.choice(FAULTS) for _ in range(8)}
         self.faults = dict(list(self.faults.items())[: rng.choice((0, 1, 2, 4, 8))])
         self.left = dict.fromkeys((*FAULTS, "rest"), 0)  # ticks of each that is under way
-        sections = self.world.file["joysticks"].items()
-        self.off = {name: one["anti_sway_off"] for name, one in sections if "anti_sway_off" in one}
-        self.keys = joysticks(self.world)
+        joysticks = self.world.machine.joysticks
+        self.off = {name: one.off.name for name, one in joysticks.items() if one.off}
+        self.keys = {one.key for one in joysticks.values()}
 
     def fault(self, what: str) -> int:
         """Begin one; deadlines that it misses."""
         world, length = self.world, self.rng.choice((1, 2, 3, 8, 20, 60, 150))
         self.left[what] = length
         if what == "late":
-            world.n += (missed := min(length, 3))
-            return missed
+            return min(length, 3)
         if what == "stalled":
-            world.n += 30
-            world.guarded.stalled()
+            world.stalled(30)
         elif what == "not sent":
-            valves = {world.valve(axis) for axis in world.axes}
-            for frame in [one for one in world.left if one[:3] in valves]:
-                world.guarded.send_failed(frame)
+            world.send_failed()
         elif what == "enable":
             self.left[what] = min(length, 20)
         if what != "bypass":
@@ -88,9 +83,7 @@ class Random:
             world.raw.setdefault(name, {})[signal] = int(left["bypass"] > 0)
         self.left = {what: ticks - 1 for what, ticks in left.items()}
         world.step(missed=missed)
-        why = [one.why for one in world.evil.events if isinstance(one, RefusalEvent)]
-        world.evil.events.clear()
-        return "".join(why[:1])
+        return "".join(world.refusals()[:1])
 
 
 def refused(seed: int, ticks: int = TICKS) -> str:
@@ -99,7 +92,7 @@ def refused(seed: int, ticks: int = TICKS) -> str:
     for number in range(ticks):
         if why := drive.tick(number):
             return f"seed {seed}, {drive.world.name}, tick {number}: {why}, faults {drive.faults}"
-        moves += any(drive.world.seen.values())
+        moves += any(drive.world.speed.values())
     assert moves > ticks // 20
     return ""
 

@@ -1,7 +1,7 @@
 """Promise 1, by the bytes of frames and the worst controller there can be."""
 
-from tests.promises.events import Event, code, counter_stands, flag, once, shorter, silence
-from tests.promises.world import World, every
+from tests.promises.events import Event, code, counter_stands, flag, once, shorter, silence, without
+from tests.promises.world import HOUR_NS, World, every
 from tests.promises.worst import Worst
 
 
@@ -25,6 +25,8 @@ EVENTS: dict[str, Event] = {
     "emergency stop": flag(stop=1),
     "emergency stop for a tick": lambda world, k: setattr(world, "stop", int(k == 0)),
     "silence": silence,
+    "silence of switches": without(lambda world: [one.key for one in world.machine.switches]),
+    "stamps of an hour ago": flag(age_ns=HOUR_NS),
     "wrong length": shorter,
     "counter stands": counter_stands,
     "a code of the DBC": code(0),

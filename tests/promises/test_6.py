@@ -20,7 +20,7 @@ from tests.promises.events import (
     silence,
     without,
 )
-from tests.promises.world import REST, World, every
+from tests.promises.world import HOUR_NS, REST, World, every
 
 JOYSTICK = {"JOYSTICK_ERROR", "JOYSTICK_NOT_AVAILABLE", "JOYSTICK_OUT_OF_RANGE"}
 JOYSTICK |= {"JOYSTICK_CONTRADICTORY"}
@@ -70,6 +70,12 @@ FAULTS = {
     "failed send": Fault(once(World.send_failed), {"SEND_FAILED"}),
     "stalled loop": Fault(once(World.stalled), {"LOOP_STALLED"}),
     "silence": Fault(silence, {"JOYSTICK_TIMEOUT", "ENABLE_LOST"}, "STOPPING"),
+    "stamps of an hour ago": Fault(
+        flag(age_ns=HOUR_NS),
+        {"JOYSTICK_TIMEOUT", "ENABLE_LOST", "NODE_FAULT"},
+        "STOPPING",
+        here=lambda w: not (w.machine.nodes or w.machine.stop or w.machine.switches),
+    ),
     "wrong length": Fault(shorter, {"JOYSTICK_TIMEOUT", "ENABLE_LOST"}, "STOPPING"),
     "a code of the DBC": Fault(
         code(0), JOYSTICK, "STOPPING", lambda w: all(map(broken, w.axes.values()))
@@ -152,6 +158,7 @@ class TestEveryFault:
     def fields(self, world: World) -> Iterator[dict[str, str]]:
         """Changes of state, as the log has them."""
         for event in world.evil.events:
+            assert "output=refused" not in event.text
             if event.text.startswith("axis=") and " state=" in event.text:
                 yield dict(word.split("=", 1) for word in event.text.split() if "=" in word)
         world.evil.events.clear()

@@ -26,6 +26,7 @@ from tests.promises.seen import Buses
 REST = 25  # ticks until claims, nodes and neutral are seen
 ACTIVE = 0xF  # control word of CiA 408
 SMALLEST = 1e-9
+HOUR_NS = 3_600_000_000_000
 
 # To the gate each of these is as another one in its place is; they differ in filters and sensors.
 ALIKE = (
@@ -79,6 +80,7 @@ class World:
         raw: raw values of some signals, by joystick, whatever the hand does.
         change: what becomes of a frame before it is received: none, one or more.
         judge: looks at each velocity that leaves: axis, the one before, and now.
+        age_ns: by its stamp so long ago every frame comes.
         left: what left in the last tick.
         speed: of each axis; its last command holds until the valve's timeout.
         way: of each axis, s of full speed.
@@ -97,7 +99,7 @@ class World:
         self.enable, self.reset, self.stop, self.agree = 1, 0, 0, True
         self.change: Change = lambda frame: [frame]
         self.judge: Callable[[str, float, float], None] = lambda *_: None
-        self.n = 0
+        self.n, self.age_ns = HOUR_NS // self.machine.tick_ns, 0
         self.left: list[Frame] = []
         self.speed = dict.fromkeys(self.axes, 0.0)
         self.way = dict.fromkeys(self.axes, 0.0)
@@ -105,7 +107,7 @@ class World:
         for axis, one in self.axes.items():
             self.moved_by.setdefault(one.valve_key, []).append(axis)
         self._commands = {axis: self._command(axis) for axis in self.axes}
-        self._last = dict.fromkeys(self.axes, 0)
+        self._last = dict.fromkeys(self.axes, self.n)
         self._counts: dict[Key, int] = {}
         self._control: dict[str, int] = {}
 
@@ -212,12 +214,13 @@ class World:
 
     def receive(self, frame: Frame) -> list[Frame]:
         """A frame comes in; what of it goes through a gateway."""
-        self.buses.receive(frame, self.now_ns)
-        return self.passed(frame)
+        at_ns = self.now_ns - self.age_ns
+        self.buses.receive(frame, at_ns)
+        return self.passed(frame, at_ns)
 
-    def passed(self, frame: Frame) -> list[Frame]:
+    def passed(self, frame: Frame, at_ns: int) -> list[Frame]:
         """What leaves for it at once."""
-        passed = self.guarded.receive(frame, self.now_ns)
+        passed = self.guarded.receive(frame, at_ns)
         return [passed] if passed else []
 
     def ticked(self, missed: int) -> Iterable[Frame]:
@@ -289,7 +292,7 @@ class World:
     def well(self) -> None:
         """Nothing is wrong any more."""
         self.enable, self.stop, self.agree, self.raw = 1, 0, True, {}
-        self.change = lambda frame: [frame]
+        self.change, self.age_ns = lambda frame: [frame], 0
 
     def second_sender(self) -> None:
         """Another node sends what our valves receive."""

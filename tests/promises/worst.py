@@ -33,8 +33,8 @@ class Worst(World):
         self._next = dict(at_rest(name))
         self._steps = dict.fromkeys(self.axes, 0)
 
-    def passed(self, frame: Frame) -> list[Frame]:
-        self.gate.receive(frame[:3], frame.data, self.now_ns)
+    def passed(self, frame: Frame, at_ns: int) -> list[Frame]:
+        self.gate.receive(frame[:3], frame.data, at_ns)
         keys = [key for key in self.moved_by if key[1:] == frame[1:3] and self.machine.gateway]
         return [one for key in keys for one in self._sent(key, frame.data)]
 
