@@ -35,7 +35,7 @@ TESTS = {
     "machine": ["tests/machine", "tests/codec"],
     "shaping": ["tests/shaping"],
     "inputs": DAEMON,
-    "gate": DAEMON,
+    "gate": [*DAEMON, "tests/promises"],
     "protocols": [*DAEMON, "tests/machine/test_gateway_binding.py"],
     "controller": DAEMON,
     "daemon": DAEMON,

@@ -19,7 +19,7 @@ BIN = Path(sys.executable).parent
 JOBS = os.environ.get("JOBS") or str(len(os.sched_getaffinity(0)))
 SPREAD = ("-n", JOBS, "--dist", "loadfile")
 # Rooms of what decides whether a valve moves.
-GATE = "codec machine shaping inputs gate bus protocols controller daemon"
+GATE = "codec machine shaping inputs gate promises bus protocols controller daemon"
 COUNTED = re.compile(r"(\d+) (passed|failed|skipped|error)")
 SKIPPED = re.compile(r"^SKIPPED \[(\d+)\] [^ ]+ (.+)$")
 FAILED = re.compile(r"^(FAILED|ERROR) ")
@@ -136,11 +136,14 @@ def rows_of_more() -> list[list[Part]]:
     cover = [pytest(*SPREAD, few, "-m", "not slow", "--cov", "--cov-report=term", *gate)]
     core = [[sys.executable, "tools/mutation.py", f"-j{JOBS}", "core"]]
     service = [[sys.executable, "-m", "tests.lane.services", "-q"]]
-    slow, study = (pytest(*SPREAD, "-m", mark) for mark in ("slow and not study", "study"))
+    slow = pytest(*SPREAD, "-m", "slow and not study", "--ignore=tests/proof")
+    study = pytest(*SPREAD, "-m", "study")
+    proof = pytest(*SPREAD, "tests/proof")
     return [
         [Part("types", "mypy, import contracts", types)],
         [Part("coverage", "every line and branch of what decides whether a valve moves", cover)],
         [Part("mutation-core", "a test notices every small change of the core", core)],
+        [Part("proof", "rules of the gate, for all numbers", [proof])],
         [Part("slow", "tests of a second and more", [slow])],
         [
             Part(

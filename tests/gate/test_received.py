@@ -236,6 +236,7 @@ def test_numbers_are_set_within_the_range_of_the_file() -> None:
     of = one.axis.of
     of.ranges = dict.fromkeys(("limits.rise_per_s", "limits.fall_per_s"), (2.0, 4.0))
     of.ranges |= {"limits.max_pct": (50.0, 80.0), "sway.full_speed_m_s": (1.0, 2.0)}
+    of.ranges["filter.a1"] = (0.5, 0.9)  # which is nothing to the gate
     for value, maximum in ((60.0, 0.6), (90.0, 0.8), (10.0, 0.5)):
         one.gate.set("axes.near_far.limits.max_pct", value)
         assert of.maximum == maximum

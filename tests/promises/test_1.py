@@ -41,9 +41,8 @@ EVENTS: dict[str, Event] = {
 
 @every
 class TestNoMotionWithoutAnOperator:
-    """**No motion without an operator.** A valve frame carries motion only in a moving state, which
-    an axis enters only from READY; READY needs a fresh, valid, enabled joystick that was seen in
-    neutral."""
+    """**No motion without an operator.** An axis moves only from READY, and READY needs a
+    fresh, valid, enabled joystick that was seen in neutral."""
 
     def world(self, name: str) -> Worst:
         """What moves is checked in each frame that leaves."""

@@ -23,9 +23,8 @@ def run_on(axis: Axis) -> int:
 @every
 class TestNeutralStops:
     """**The joystick in neutral always stops**, within the bounded run-on of the filter: after
-    `tail_s` the output falls to zero by `fall_per_s`. For `tail_s` after anti-sway was switched on
-    in motion, or a trip or the end of a stop cut a motion off, there is no run-on, so that nothing
-    is run twice or later."""
+    `tail_s` the output falls to zero by `fall_per_s`. For `tail_s` after anti-sway was switched
+    on in motion, or after a trip or the end of a stop cut a motion off, there is no run-on."""
 
     def judged(self, world: World) -> World:
         """After the tail each frame is lower by the fall, and from its end on there is none."""

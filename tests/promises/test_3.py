@@ -15,10 +15,10 @@ STROKES = (
 
 @every
 class TestNeverFaster:
-    """**Never faster than commanded** within the tail, and never against the joystick, unless
-    configured: with `motion` one axis adds a bounded velocity to another, whose joystick may be in
-    neutral; with `reversal: brake_shaped` the output runs on for up to `tail_s` after the joystick
-    was pulled the other way, never faster than commanded there before."""
+    """**Never faster than commanded** within the tail, and never against the joystick, with two
+    exceptions that the file has to state: with `motion` one axis adds a bounded velocity to
+    another one, whose joystick may be in neutral; with `reversal: brake_shaped` the output runs
+    on for up to `tail_s` after a reversal, never faster than commanded there before."""
 
     def world(self, name: str) -> Worst:
         world = Worst(name)

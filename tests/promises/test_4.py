@@ -10,9 +10,9 @@ from tests.promises.world import REST, World, every
 
 @every
 class TestEveryFrameIsOfItsTick:
-    """**Every frame is computed in the tick that sends it**, in a gateway not more than a tick
-    before. Nothing is repeated: no cyclic job of the kernel (BCM), no resend, no frame while the
-    loop stands."""
+    """**Every frame is computed in the tick that sends it**, in a gateway at most one tick
+    before. Nothing is repeated: no cyclic job of the kernel (BCM), no resend, no frame while
+    the loop stands still."""
 
     def world(self, name: str) -> World:
         world = World(name)

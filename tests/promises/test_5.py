@@ -154,8 +154,8 @@ def may_be(world: World, axis: str, steps: int | None) -> bool:
 
 @every
 class TestOneWrongCommand:
-    """**One wrong command reaches no valve.** The gate checks each valve frame before the socket,
-    by the file's limits and the bytes alone."""
+    """**One wrong command reaches no valve.** The gate checks each valve frame before the
+    socket, by the file's limits and the bytes alone."""
 
     @pytest.mark.parametrize("what", WRONG)
     def test_no_wrong_frame_leaves(self, name: str, what: str) -> None:

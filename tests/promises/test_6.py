@@ -107,11 +107,11 @@ FAULTS = {
 
 @every
 class TestEveryFault:
-    """**Every fault has a name, a reaction and a way back.** No fault of machine or bus ends the
-    loop. What a part of the program raises does: every valve is sent neutral,
-    `failed reason=INTERNAL_ERROR` with its place stands in log and black box, and the service
-    manager starts it again. Where a valve's neutral cannot be made either, it gets no frame and its
-    own timeout acts; the log ends with `stopped valves=not-sent`."""
+    """**Every fault has a name, a reaction and a way back.** No fault of machine or bus ends
+    the loop. An error within the program does: every valve is sent neutral, log and black box
+    have `failed reason=INTERNAL_ERROR` with the place, the service manager starts it again. A
+    valve whose neutral cannot be made gets no frame; the log ends with `stopped
+    valves=not-sent`."""
 
     def moving(self, name: str) -> World:
         world = World(name)
@@ -220,12 +220,17 @@ class TestEveryFault:
         world = self.moving(name)
         sound, key = world.evil.neutral_frames, next(iter(world.moved_by))
         moving = world.commands(**world.held(0.3))
-        world.evil.neutral_frames = (
-            lambda: [  # type: ignore[method-assign]
-                next(iter(moving([one]))) if one[:3] == key else one for one in sound()
-            ]
-        )
-        left = {frame[:3] for frame in world.guarded.neutral_frames()}
-        assert key not in left
-        assert left >= set(world.moved_by) - {key}
-        assert any("output=refused" in event.text for event in world.evil.events)
+        for wrong in (
+            lambda frame: next(iter(moving([frame]))),
+            lambda frame: frame._replace(data=frame.data[:-1]),
+        ):
+            world.evil.neutral_frames = (
+                lambda wrong=wrong: [  # type: ignore[method-assign,misc]
+                    wrong(one) if one[:3] == key else one for one in sound()
+                ]
+            )
+            left = {frame[:3] for frame in world.guarded.neutral_frames()}
+            assert key not in left
+            assert left >= set(world.moved_by) - {key}
+            assert any("output=refused" in event.text for event in world.evil.events)
+            world.evil.events.clear()
