@@ -3,9 +3,6 @@
 from dataclasses import replace
 from typing import Any
 
-import pytest
-
-from canshaper.gate.axis import FOREIGN_NS
 from tests.faults import variants
 from tests.gate.bench import Bench, bench, load
 
@@ -26,54 +23,6 @@ class TestStopsAtOnce:
         one.gate.tick(one.now_ns, 0)
         one.receive(one.joysticks(near_far=1.0, enable=False))
         assert "why=enable" in one.gate.leaving(one.key, one.frame(60))
-
-    def test_a_second_sender(self) -> None:
-        one = self.moving()
-        one.gate.receive(one.key, bytes(2), one.now_ns)
-        assert "why=second sender" in one.sends(60, near_far=1.0)
-        start = one.number
-        while (one.number - start) * 20_000_000 <= FOREIGN_NS:
-            one.sends(0, enable=one.number % 2 == 0)
-            assert not one.axis.armed
-        one.sends(0, enable=False)
-        one.rests()
-        assert one.axis.armed
-
-    def test_what_has_waited_does_not_count_but_bad_news(self) -> None:
-        one = bench()
-        one.rests()
-        one.gate.stalled()
-        one.receive(one.joysticks(near_far=0.5))
-        one.receive(one.joysticks(enable=False))
-        one.receive(one.joysticks())
-        assert "limit=stopped" in one.sent(10)
-        assert one.axis.joystick.press < 0
-
-    def test_decoders_disagree(self) -> None:
-        one = self.moving()
-        one.gate.disagrees([one.axis])
-        assert "why=decoders disagree" in one.sends(60, near_far=1.0)
-
-    @pytest.mark.parametrize("how", ["enable", "sender", "send", "loop", "refused"])
-    def test_latched_it_does_not_move_until_a_press(self, how: str) -> None:
-        one = self.moving()
-        if how == "enable":
-            one.sends(0, near_far=1.0, enable=False)
-        elif how == "sender":
-            one.gate.receive(one.key, bytes(2), one.now_ns)
-            one.number += FOREIGN_NS // 20_000_000
-        elif how == "send":
-            one.gate.send_failed(one.key)
-        elif how == "loop":
-            one.gate.stalled()
-        else:
-            assert one.sends(-FULL, near_far=1.0)
-        if how != "enable":  # neutral alone is no reset
-            one.rests(10)
-            assert not one.restarts(10, near_far=0.5)
-            one.rests(10, enable=False)
-        one.rests(10)
-        assert not one.sends(10, near_far=0.5)
 
     def test_a_press_before_it_is_no_reset(self) -> None:
         one = bench()

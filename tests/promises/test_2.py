@@ -92,9 +92,10 @@ class TestNeutralStops:
         world.enable = 1
         world.go(3)
         assert not any(world.speed.values())
+        world.way = dict.fromkeys(world.axes, 0.0)
         for _ in self.falling(world, asked=0.1):
             world.go(1, **world.held(0.1))
-        assert any(world.speed.values())
+        assert any(world.way.values())
 
     def falling(self, world: World, asked: float = 0.0) -> Iterator[int]:
         """Ticks of a tail, with an output no faster than asked; but for what a motion adds."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+import pytest
+
 from tests.promises.test_2 import rounding
 from tests.promises.world import World, every
 from tests.promises.worst import Worst
@@ -66,3 +68,16 @@ class TestNeverFaster:
                 sign = world.sign[partner.name]
                 world.go(20, **{axis: world.sign[axis] * 0.8, partner.name: -0.4 * sign})
                 assert world.speed[partner.name] * sign <= 0.0
+
+
+@pytest.mark.parametrize("held", ["slew", "near_far"])
+def test_what_a_motion_adds_ends(held: str) -> None:
+    """One stick is held for 12 s; the other axis is sent to and fro: 6 s of a quarter at most."""
+    world = TestNeverFaster().world("forwarder-robust")
+    partner = world.axes[held].moves_with
+    assert partner is not None
+    world.go(5)
+    for _ in range(12):
+        world.go(50, **{held: 0.8})
+        world.sign[partner.name] *= -1
+    assert 0.3 < world.way[partner.name] <= 6.0 * partner.largest_added + 0.1
