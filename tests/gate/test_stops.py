@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+from canshaper.gate.axis import FOREIGN_NS
 from tests.faults import variants
 from tests.gate.bench import Bench, bench, load
 
@@ -16,6 +17,18 @@ class TestStopsAtOnce:
         one = bench(**limits)
         one.ramp(60, near_far=1.0)
         return one
+
+    def test_a_second_sender(self) -> None:
+        one = self.moving()
+        one.gate.receive(one.key, bytes(2), one.now_ns)
+        assert "why=second sender" in one.sends(60, near_far=1.0)
+        start = one.number
+        while (one.number - start) * 20_000_000 <= FOREIGN_NS:
+            one.sends(0, enable=one.number % 2 == 0)
+            assert not one.axis.armed
+        one.sends(0, enable=False)
+        one.rests()
+        assert one.axis.armed
 
     def test_what_a_frame_says_after_the_tick_began_counts_for_the_next_frame(self) -> None:
         one = self.moving()
