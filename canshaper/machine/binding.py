@@ -88,6 +88,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         lookup.fd(),
         source=source,
         codes=lookup.codes(),
+        starts=lookup.starts(),
     )
 
 

@@ -20,7 +20,7 @@ from canshaper.machine.inputs import Bound, BoundJoystick, BoundValue, Choosing
 from canshaper.machine.joysticks import BoundSwitches
 from canshaper.machine.motion import BoundMotion
 from canshaper.machine.routing import Key, Routing, build_routing
-from canshaper.machine.used_message import NamedCode
+from canshaper.machine.used_message import NamedCode, StartValue
 from canshaper.machine.valves import BoundAxis
 
 
@@ -49,6 +49,8 @@ class Deployment:
     """The file, for the lines of what is wrong with it on this machine."""
     codes: tuple[NamedCode, ...] = ()
     """Meanings of the named values of the signals that are read."""
+    starts: tuple[StartValue, ...] = ()
+    """What valve messages carry in signals that no axis uses."""
     listen_only: bool = False
     """Nothing is sent but status: another controller drives the machine, or no one does."""
 

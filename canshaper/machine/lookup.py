@@ -26,7 +26,7 @@ from canshaper.machine.database import MOST_BYTES, Messages, load_dbc, too_many
 from canshaper.machine.dbc_parse import MOST_PARSED
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.named_codes import Listing, check_codes, listings
-from canshaper.machine.used_message import NamedCode, UsedMessage, key_path
+from canshaper.machine.used_message import NamedCode, StartValue, UsedMessage, key_path
 
 
 @dataclass(frozen=True)
@@ -116,6 +116,10 @@ class Lookup:
     def fd(self) -> frozenset[tuple[str, int, bool]]:
         """Bus, id and format of the messages of CAN FD that are used."""
         return frozenset(key for key, used in self.used.items() if is_fd(used.message))
+
+    def starts(self) -> tuple[StartValue, ...]:
+        """Return what valve messages carry besides, of all messages."""
+        return tuple(one for used in self.used.values() for one in used.starts)
 
     def codes(self) -> tuple[NamedCode, ...]:
         """Named values of the signals that are read, with their meanings."""

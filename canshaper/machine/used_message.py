@@ -25,6 +25,15 @@ class NamedCode(NamedTuple):
     means: str
 
 
+class StartValue(NamedTuple):
+    """A signal of a valve message that no axis uses: every frame carries its start value."""
+
+    message: str
+    signal: str
+    value: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class UsedMessage:
     """A message with the part of the deployment file that names it.
@@ -40,6 +49,7 @@ class UsedMessage:
         uses: what its signals are used for, by name: each has one use, or a switch could move an
             axis.
         codes: what the named values of its signals mean.
+        starts: start values of signals that no axis uses, in a valve message.
     """
 
     diagnostics: Diagnostics
@@ -51,6 +61,7 @@ class UsedMessage:
     chosen: Chosen | None = None
     uses: dict[str, str] = field(default_factory=dict)
     codes: list[NamedCode] = field(default_factory=list)
+    starts: list[StartValue] = field(default_factory=list)
 
     def add(self, key: str, text: str) -> None:
         """Note a problem at a key of its part of the deployment file."""

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -96,6 +97,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
             for name, bus in config.buses.items()
         },
         "codes": [code._asdict() for code in deployment.codes],
+        "start_values": [one._asdict() for one in deployment.starts],
         "axes": {
             one.name: {
                 "filter": config.axes[one.name].filter.kind,
@@ -144,6 +146,9 @@ def _print(deployment: "Deployment") -> None:
         if section.slewing and section.sway and name not in moved:
             echo(f"  {name} is in no motion: together with another axis it leaves more swing;")
             echo("    a motion takes one axis that moves the tip in and out, which joints are not")
+    for message, starts in groupby(deployment.starts, lambda one: one.message):
+        values = ", ".join(f"{one.signal} {one.value:g} {one.unit}".rstrip() for one in starts)
+        echo(f"  {message} also carries {values}, used by no axis")
     _print_codes(deployment.codes)
     identity = deployment.identity
     echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
