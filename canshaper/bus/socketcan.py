@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from canshaper.bus.device import check_device, check_mtu
+from canshaper.bus.device import check_device, check_mtu, check_present
 from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
@@ -60,6 +60,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
             opened[1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
             opened[2].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)  # all, not one
             set_filters(opened, ids)
+        check_present(bus)
         for one in opened:
             one.bind((bus.channel,))
         check_mtu(bus)

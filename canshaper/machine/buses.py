@@ -20,6 +20,8 @@ from canshaper.errors import did_you_mean
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.lookup import Lookup
 
+# Characters of the name of an interface (linux/if.h, IFNAMSIZ less the end).
+LONGEST_NAME = 15
 # They carry CAN FD without being asked to.
 ALWAYS_FD = frozenset(("udp_multicast", "virtual"))
 # They take bit rate and switch of CAN FD without a parameter of that name (python-can 4.6).
@@ -113,6 +115,9 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         if key in channels:
             add(("buses", name), f"has the channel {bus.channel} of bus {channels[key]}")
         channels[key] = name
+        if bus.interface == "socketcan" and not (1 <= len(bus.channel) <= LONGEST_NAME):
+            text = f"expected the name of an interface, 1 to {LONGEST_NAME} characters"
+            add(("buses", name, "channel"), f"{text}, got {bus.channel!r}")
         _check_match(diagnostics, config, name, bus)
         _check_node_ids(diagnostics, name, bus)
         _check_fd(diagnostics, name, bus)

@@ -46,6 +46,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Made]:
 
     monkeypatch.setattr(socket, "socket", make)
     monkeypatch.setattr(socketcan, "check_device", lambda *_: None)
+    monkeypatch.setattr(socketcan, "check_present", lambda *_: None)
     return opened
 
 

@@ -149,6 +149,7 @@ def test_sockets_of_another_device_are_closed_at_once(
     made: list[Opened] = []
     monkeypatch.setattr(Opened, "made", made, raising=False)
     monkeypatch.setattr("canshaper.bus.socketcan.socket.socket", Opened)
+    monkeypatch.setattr("canshaper.bus.socketcan.check_present", lambda _: None)
     right = open_sockets(bus("can0", serial="0A17", port=0), ids)
     assert [one.closed for one in made] == [False] * len(right)
     made.clear()

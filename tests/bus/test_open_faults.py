@@ -3,11 +3,14 @@
 import errno
 import socket
 import sys
+from functools import partial
+from pathlib import Path
 
 import pytest
 
 from canshaper.bus import port as bus_module
 from canshaper.bus import python_can, socketcan
+from canshaper.bus.device import check_present
 from canshaper.bus.port import open_port
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import FrameFault
@@ -105,3 +108,26 @@ def test_an_error_without_words_is_reported_by_its_kind(monkeypatch: pytest.Monk
     monkeypatch.setattr(python_can, "open_python_can", none)
     with pytest.raises(BusError, match="cannot open slcan channel ttyS0: ValueError"):
         open_port("crane", Bus(interface="slcan", channel="ttyS0"), lambda _: None)
+
+
+@pytest.mark.parametrize("channel", ["can7", ""])
+def test_no_socket_is_bound_to_a_name_without_an_interface(channel: str, tmp_path: Path) -> None:
+    """Binding would make the kernel look for a module; to "" it would bind to every interface."""
+    (tmp_path / "sys/class/net/can0").mkdir(parents=True)
+    check_present(Bus(interface="socketcan", channel="can0"), tmp_path)
+    with pytest.raises(OSError, match="No such device"):
+        check_present(Bus(interface="socketcan", channel=channel), tmp_path)
+
+
+def test_where_the_system_shows_no_interfaces_the_kernel_is_asked(tmp_path: Path) -> None:
+    check_present(Bus(interface="socketcan", channel="can7"), tmp_path)
+
+
+def test_a_name_is_looked_at_before_it_is_bound(
+    made: list[Made], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(socketcan, "check_present", partial(check_present, root=Path("/nowhere")))
+    with pytest.raises(OSError, match="No such device"):
+        open_sockets(BUS.model_copy(update={"channel": ""}), None)
+    assert made[0].closed
+    assert not made[0].bound

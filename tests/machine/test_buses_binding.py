@@ -52,3 +52,16 @@ def test_the_numbers_of_the_axes_end_at_the_last_one_of_j1939(tmp_path: Path) ->
         f"buses.crane.j1939.first_spn: expected the last SPN up to {LAST_SPN}, got {LAST_SPN + 1}"
         f" from {first + 1} on"
     )
+
+
+@pytest.mark.parametrize(
+    ("channel", "got"), [('""', "''"), ("can-of-the-crane", "'can-of-the-crane'")]
+)
+def test_a_channel_that_is_no_name_of_an_interface(
+    machine: Machine, channel: str, got: str
+) -> None:
+    line = machine.in_yaml("channel: vcan0", f"channel: {channel}")
+    expected = "expected the name of an interface, 1 to 15 characters"
+    assert machine.problems() == [
+        f"machine.yaml:{line}: buses.crane.channel: {expected}, got {got}"
+    ]
