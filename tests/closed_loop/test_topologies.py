@@ -34,6 +34,7 @@ def test_a_gateway_in_the_line_damps_as_much() -> None:
     assert min(reductions.values()) > 90.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("crane", ["front", "rear"])
 def test_each_of_two_cranes_damps_as_much(crane: str) -> None:
     reductions = residual_reduction_pct("two-cranes.yaml", crane)

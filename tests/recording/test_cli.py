@@ -24,6 +24,7 @@ def called(*arguments: object, code: int = 0) -> str:
     return result.output
 
 
+@pytest.mark.slow
 def test_a_log_goes_through_the_controller(tmp_path: Path) -> None:
     text = called(DRIVE, "--config", "forwarder-robust.yaml", "--out", tmp_path)
     assert "those of a clock: the log has none" in text

@@ -57,6 +57,7 @@ def trust(file: Path) -> list[str]:
     return [text.removeprefix(start) for text in texts if text.startswith(start)]
 
 
+@pytest.mark.slow
 def test_on_the_simulated_crane(tmp_path: Path) -> None:
     text = sensor(FILE, "--axis", "near_far", "--set", "sway_sensor.delay_s=0.1", "--out", tmp_path)
     assert "Near-far, sensor.log: SwayAngle.Along: 2 driven stretches, 100 % explained" in text
