@@ -60,7 +60,7 @@ class Canopen(Section):
     nodes: dict[str, CanopenNode] = Field({}, description="other nodes, by a name of your choice")
 
     def __hash__(self) -> int:
-        """Of all but the names: a bus is a key where it is asked for what is open."""
+        """Return a hash of all but the names: a bus is a key of the open buses."""
         return hash((self.node, self.heartbeat_ms, self.master, *self.nodes.values()))
 
 
@@ -122,8 +122,8 @@ class Bus(Section):
     """Bit rate of their data: with it they are sent with bit rate switch (BRS), without it at one
     bit rate; received ones count with and without."""
     options: dict[str, Scalar] = Field({})
-    """What else python-can opens the interface with, such as { host: 10.0.0.5, port: 29536 } for
-    socketcand."""
+    """Further options with which python-can opens the interface, such as
+    { host: 10.0.0.5, port: 29536 } for socketcand."""
     match: Match | None = Field(
         None, description="the device behind the channel; without it the name alone counts"
     )
@@ -143,7 +143,7 @@ class Bus(Section):
         return self.interface in ("virtual", "udp_multicast")
 
     def __hash__(self) -> int:
-        """Of where it is: a bus is a key where it is asked for what is open."""
+        """Return a hash of interface and channel: a bus is a key of the open buses."""
         return hash((self.interface, self.channel))
 
 

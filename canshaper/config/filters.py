@@ -36,7 +36,7 @@ class SecondMode(Section):
 
 
 class DesignedFor(Section):
-    """What a filter was designed for; written with it, and held against what the file says now."""
+    """Swing and valve that a filter was designed for; compared with the file when it is loaded."""
 
     period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")]
     damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")]
@@ -123,7 +123,7 @@ class FilterSection(Section):
         return self.model_dump(exclude={"kind", "designed_for"}, exclude_none=True)
 
     def design(self) -> DesignedFor | None:
-        """What it was designed for, where the file says so."""
+        """Return the swing and valve that it was designed for, where the file has them."""
         return getattr(self, "designed_for", None)
 
     def __reduce__(self) -> Any:
@@ -174,7 +174,7 @@ def _with_runs(schema: dict[str, Any]) -> None:
 
 
 def _or_false(schema: dict[str, Any]) -> None:
-    """What a reader of YAML 1.1 makes of ``off``, into the JSON schema; see ``_named_off``."""
+    """Allow false for ``off`` in the JSON schema, as YAML 1.1 reads it; see ``_named_off``."""
     schema["enum"] = [schema.pop("const"), False]
     del schema["type"]
 
@@ -215,7 +215,7 @@ def filter_of(kind: str, **parameters: Any) -> Filter:
 
 
 def designed(mode: SwayMode) -> dict[str, float]:
-    """What ``designed_for`` says of the swing that a filter was designed for."""
+    """Return the values of ``designed_for`` that give the swing of a filter."""
     return {"period_s": round(mode.period_s, 4), "damping_ratio": round(mode.damping_ratio, 4)}
 
 

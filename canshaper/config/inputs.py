@@ -1,4 +1,4 @@
-"""Sections of what a machine is told besides its joysticks: switches, enables, inputs, sensors."""
+"""Sections of inputs besides joysticks: switches, enables, sensors."""
 
 from typing import Annotated, Any, Literal
 
@@ -123,7 +123,7 @@ class SwaySensorSection(NamedCodes, InputSection):
 
     @property
     def measured(self) -> Measured:
-        """What it measures."""
+        """Quantity that it measures."""
         return Measured.RATE if self.kind == "rate" else Measured.ANGLE
 
     @property

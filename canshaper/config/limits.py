@@ -13,7 +13,7 @@ from canshaper.shaping.valve_curve import ValveCurve
 
 
 class Slewing(Section):
-    """What full speed of a slewing axis is in angle, and how far out the tip may be meanwhile."""
+    """Angular speed of a slewing axis at full speed, and the largest radius of its tip."""
 
     full_speed_rad_s: Annotated[float, number(0.05, 3, "rad/s", "angular speed at full command")]
     largest_radius_m: Annotated[
@@ -41,11 +41,11 @@ class Limits(Section):
     curve_command_pct: (
         list[Annotated[float, number(-100, 100, "% of full command", "command")]] | None
     ) = None
-    """Of the measured valve, instead of ``deadband_pct``: its commands (% of full command)."""
+    """Commands of the measured valve (% of full command), instead of ``deadband_pct``."""
     curve_speed_pct: (
         list[Annotated[float, number(-100, 100, "% of full speed", "speed at a command")]] | None
     ) = None
-    """Of the measured valve: the speed at each of these commands (% of full speed)."""
+    """Speeds of the measured valve at each of these commands (% of full speed)."""
     curve_origin: Origin | None = Field(None, description="where this curve comes from")
     tail_s: Annotated[
         float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
@@ -95,7 +95,7 @@ class Limits(Section):
         return ValveCurve([v / 100.0 for v in command or []], [v / 100.0 for v in speed or []])
 
     def output_limits(self) -> OutputLimits:
-        """The same in fractions of full scale."""
+        """Return the limits in fractions of full scale."""
         return OutputLimits(
             maximum=self.max_pct / 100.0,
             minimum=self.min_pct / 100.0,
@@ -120,7 +120,7 @@ class Radius(NamedCodes, InputSection):
 
 
 class Motion(Section):
-    """What the axes of a crane add for each other, see ``TwoAxisMotion``.
+    """Two-axis motion: velocities that two axes add for each other, see ``TwoAxisMotion``.
 
     Without a radius, or without a near-far axis, slew gets what needs neither.
     """

@@ -217,7 +217,7 @@ class _Place:
 
     @property
     def expected(self) -> str:
-        """What may stand here, in words."""
+        """Values that may stand here, in words."""
         if limits := self.limits:
             low, high = limits
             extras = [field.json_schema_extra for field in self._fields]
@@ -240,7 +240,7 @@ def _kinds(section: type[BaseModel]) -> tuple[Any, ...]:
 
 
 def _short(value: Any) -> str:
-    """What stands there, not at length; of a key without a value nothing does."""
+    """Return a short text of a value; "nothing" for a key without one."""
     text = "nothing" if value is None else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 

@@ -53,7 +53,7 @@ def written_by(verb: str, *, simulated: bool | None, log: str | None = None) -> 
 
 
 def note(verb: str) -> str:
-    """What stands in place of comments on numbers that a verb has replaced."""
+    """Return the comment that replaces those on numbers that a verb has written."""
     return f"Written by canshaper {verb}."
 
 

@@ -152,6 +152,5 @@ class Protected(Section):
     ) = None
     """Its period instead of GenMsgCycleTime, where the DBC has none or a wrong one."""
     multiplexor: Annotated[int, number(0, 2**32, "", "value of the multiplexor")] | None = None
-    """Of a message with one multiplexor, the value with which it is meant; what we send carries it.
-    Of frames with another value only checksum and counter are looked at, where they have them
-    too."""
+    """Value of the multiplexor with which the message is meant; what we send carries it. Of frames
+    with another value only checksum and counter are checked, where they have them too."""

@@ -87,7 +87,7 @@ class DirectionFlags(Section):
 
 
 class Scaling(Section):
-    """What the signal of a velocity means, where the DBC does not say it or says it wrong."""
+    """Meaning of a velocity signal, where the DBC does not say it or says it wrong."""
 
     full: Annotated[float, number(1e-6, 1e9, "", "from zero to full command")] | None = None
     """From zero to full command, in the unit of the signal; by default the end of its DBC range,
@@ -179,7 +179,7 @@ class Valve(Scaling, Protected):
 
 
 class FeedbackSection(NamedCodes, InputSection):
-    """What a valve says of itself: estimated flow, or position of the spool."""
+    """Feedback of a valve: estimated flow, or position of the spool."""
 
     signal: str = Field(
         description="signal with the flow or position, its sign that of the command"
@@ -205,7 +205,7 @@ class AxisSection(Section):
     command: Command = Field(description="the joystick that commands the axis")
     valve: Valve = Field(description="the valve that moves the axis")
     feedback: FeedbackSection | None = None
-    """What the valve says of itself: it is compared with what was commanded."""
+    """Feedback of the valve, compared with what was commanded."""
     status: Status | None = None
     """Message with the status of the axis: signals State, Reason, RawCommand, ShapedCommand,
     PredictedSway and optionally ActiveSet, SwaySensor, SwingLength. Sent every GenMsgCycleTime and
@@ -213,9 +213,9 @@ class AxisSection(Section):
     sway: Sway | None = None
     """Swing of the tool on this axis."""
     sway_sensor: SwaySensorSection | None = None
-    """What measures that swing."""
+    """Sensor that measures that swing."""
     slewing: Slewing | None = None
-    """Of an axis that slews: its full speed in angle, and its radius."""
+    """Full speed in angle and radius of an axis that slews."""
     filter: Filter = Field(description="filter of the axis")
     gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
     profiles: dict[str, Profile] = Field(
@@ -266,7 +266,7 @@ class DeploymentConfig(Section):
     emergency_stop: EmergencyStop | None = None
     """An emergency stop that is reported on the bus."""
     load_state: LoadState | None = None
-    """What hangs on the crane; it chooses in the gain schedules of the axes."""
+    """Load of the crane; it chooses in the gain schedules of the axes."""
     profile: ProfileSwitch | None = None
     """The operator's choice among the profiles of the axes."""
     status: Status | None = None
@@ -275,8 +275,8 @@ class DeploymentConfig(Section):
         None, description="message with a 16-bit signal Digest of what runs, sent once a second"
     )
     control: Control | None = None
-    """What may be changed while the machine works."""
+    """Numbers that may be changed while the machine works."""
     uncertainty: Uncertainty = Uncertainty()
-    """What a campaign of drives draws from."""
+    """Ranges from which a campaign draws its drives."""
     accept: Accept = Accept()
-    """What it has to show."""
+    """Limits that a campaign has to keep."""

@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema
 from canshaper.config.source import Place
 
 VERSION = 1
-"""Of the file's format."""
+"""Version of the file's format."""
 
 
 def number(low: float, high: float, unit: str, text: str) -> Any:
@@ -36,7 +36,7 @@ class Section(BaseModel):
 
     @classmethod
     def description(cls, key: str) -> str | None:
-        """What a key is for, shortly: of its field, or the docstring that stands behind it."""
+        """Return a short description of a key: that of its field, or the docstring behind it."""
         field = cls.model_fields.get(key)
         return (field and field.description) or _docstrings(cls).get(key)
 

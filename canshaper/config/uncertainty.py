@@ -1,4 +1,4 @@
-"""What is not known exactly of a machine, and what a campaign of drives has to show for it."""
+"""Uncertainty of a machine, and limits that a campaign of drives is compared with."""
 
 from typing import Annotated, Any, TypeVar
 

@@ -29,7 +29,7 @@ def test_a_key_says_what_it_is_for() -> None:
     assert DeploymentConfig.description("tick") == ("Joystick that the ticks follow.")
     assert DeploymentConfig.description("dbc") == "DBC files, relative to this file"
     assert AxisSection.description("slewing") == (
-        "Of an axis that slews: its full speed in angle, and its radius."
+        "Full speed in angle and radius of an axis that slews."
     )
     assert Accept.description("residual_deg_p99") == (
         "most of the p99 quantile: largest swing that is left later than 2.5 s after the last"
