@@ -31,7 +31,7 @@ class Adjuster:
         self._in_file = {text: self._now(text) for text in self._ranges}
 
     def table(self) -> dict[str, dict[str, float]]:
-        """Of every adjustable number its value now, that of the file, the least and the most."""
+        """Return value now, value in the file, minimum and maximum of every adjustable number."""
         return {
             text: {"now": self._now(text), "file": self._in_file[text], "low": low, "high": high}
             for text, (low, high) in self._ranges.items()

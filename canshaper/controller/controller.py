@@ -137,14 +137,14 @@ class Controller:
         return self._forward(frame, arrived_ns) if self._forwarding else None
 
     def _handler(self, frame: Frame) -> FrameHandler | None:
-        """What receives a frame that is known by more than its identifier."""
+        """Return the handler of a frame that is known by more than its identifier."""
         for protocol in self._protocols:
             if (handler := protocol.handler(frame)) is not None:
                 return handler
         return None
 
     def _forward(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """What a frame leaves as on the other bus of a gateway, if its joystick received it."""
+        """Return the frame for the other bus of a gateway, if a joystick has received one."""
         for rule in self._forwarding.values():
             if rule.new_frame():
                 if self._stood_still:  # what has waited is not passed on later either
@@ -202,14 +202,14 @@ class Controller:
             yield from self._of_protocols(now_ns)
 
     def _changed(self, name: str, runner: AxisControl, transition: Transition) -> None:
-        """An axis has another state; one that trips is no longer moved by another, nor moves it."""
+        """Report the change of state of an axis; a trip ends what a two-axis motion adds."""
         self.events.append(StateEvent(name, transition))
         if transition.new is State.TRIPPED:
             for motion in self.motions:
                 motion.on_trip(runner)
 
     def _of_protocols(self, now_ns: int) -> Iterator[Frame]:
-        """What protocols send besides commands and status, and what they report."""
+        """Yield the frames of protocols besides commands and status; take faults and events."""
         for protocol in self._protocols:
             if fault := protocol.silence(now_ns):
                 self.counters.add(fault)
@@ -258,7 +258,10 @@ class Controller:
             self.events += sensor.events()
 
     def stalled(self) -> None:
-        """The loop stood still for longer than any input may be old: nothing good still holds.
+        """Invalidate every input: the loop stood still for longer than any input may be old.
+
+        The next tick also discards what has waited in the sockets. A fault or trip among it still
+        counts, though it may be over by now.
 
         Nor does what comes before the next tick, which has waited in the sockets: that tick forgets
         it. Bad news among it counts like any other, though it may be over by now.
@@ -271,7 +274,7 @@ class Controller:
             runner.trip_in_motion(Reason.LOOP_STALLED)
 
     def _invalidate(self, bus: str | None = None) -> None:
-        """Every input has to come again before it counts: those of one bus, or all."""
+        """Invalidate the inputs of one bus, or all: they have to come again before they count."""
         for (where, _, _), entry in self.inputs.items():
             if bus in (None, where):
                 entry.invalidate()
@@ -279,7 +282,7 @@ class Controller:
             protocol.invalidate(bus)
 
     def on_bus_off(self, bus: str) -> None:
-        """We are not on a bus now: frames are missed there."""
+        """Pass on to the protocols that we are off a bus: frames are missed there."""
         for protocol in self._protocols:
             protocol.on_bus_off(bus)
 

@@ -1,4 +1,4 @@
-"""What an administrator wants to read: changes of axes and valves."""
+"""Events for the log: changes of axes, valves and sensors, and refusals of the gate."""
 
 import math
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class StateEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         t = self.transition
         text = f"axis={self.axis} state={t.new.name} from={t.old.name} reason={t.reason.name}"
         return f"{text} error={t.error}" if t.error else text
@@ -43,13 +43,13 @@ class FeedbackEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         values = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
         return f"axis={self.axis} valve={self.following.value} {values}"
 
     @property
     def fault(self) -> FrameFault:
-        """As what it counts; none where the valve follows."""
+        """Fault that the event counts as; none where the valve follows."""
         return FAULT_OF.get(self.following, FrameFault.NONE)
 
 
@@ -68,26 +68,26 @@ class MotionEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         return f"motion={self.motion} axes=" + (f"single {self.why}" if self.why else "together")
 
 
 @dataclass(frozen=True, slots=True)
 class SwaySensorEvent:
-    """A sway sensor is trusted, or no longer, or something else is thought of it."""
+    """Change of the trust state of a sway sensor."""
 
     axis: str
     trust: Trust
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         return f"axis={self.axis} sway_sensor={self.trust.name}"
 
 
 @dataclass(frozen=True, slots=True)
 class SwingLengthEvent:
-    """The grapple swings like a pendulum of another length than that of the file, or as it again.
+    """Change of the measured pendulum length: it differs from the file, or agrees with it again.
 
     Attributes:
         axis: its name in the file.
@@ -101,7 +101,7 @@ class SwingLengthEvent:
 
     @property
     def text(self) -> str:
-        """For the log: what it swings like, what the file says, and the key to set."""
+        """Line for the log: measured pendulum, value of the file, key to set."""
         seen, mode = self.seen, self.file.mode()
         key, value, says = "length_m", seen.length_m, self.file.length_m
         if says is None:
@@ -128,7 +128,7 @@ class DisagreementEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         return f"decoders=disagree axis={self.axis} {_shown(self.frame)}"
 
 
@@ -141,5 +141,5 @@ class RefusalEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         return f"output=refused {_shown(self.frame)} {self.why}"

@@ -28,7 +28,7 @@ class Guarded:
         self._quiet_until_ns: dict[MessageKey, int] = {}
 
     def carry_over(self, before: "Guarded") -> None:
-        """Go on where the one before a reload has ended; see ``Gate.carry_over``."""
+        """Continue from the state before a reload; see ``Gate.carry_over``."""
         buses = self._controller.deployment.config.buses
         open_before = before._controller.deployment.config.buses.values()
         reopened = frozenset(name for name, bus in buses.items() if bus not in open_before)
@@ -46,7 +46,7 @@ class Guarded:
         return self._instead(passed, why, now_ns, frame[3]) if why else passed
 
     def demand(self, axis: str, part: float) -> None:
-        """A measurement has a demand in the place of the joystick's; see ``Gate.measure``."""
+        """Set the demand of a measurement in place of the joystick's; see ``Gate.measure``."""
         self._gate.measure(axis, part)
 
     @property
@@ -122,7 +122,7 @@ class Guarded:
                 self._controller.events.append(event)
 
     def _loud(self, frame: Frame, now_ns: int) -> bool:
-        """Whether something of this message has not just been logged."""
+        """Whether a message may be logged now; it is then quiet for ``QUIET_NS``."""
         key = frame[:3]
         loud = now_ns >= self._quiet_until_ns.get(key, 0)
         if loud:
@@ -144,7 +144,7 @@ class Guarded:
 
 
 def _same(demand: float | None, command: object) -> bool:
-    """Whether two decoders say the same, be it that there is no demand."""
+    """Whether two decoders agree, also when both say that there is no demand."""
     if not isinstance(command, float) or demand is None:
         return not isinstance(command, float) and demand is None
     return abs(demand - command) <= EPSILON

@@ -131,14 +131,14 @@ class MotionRunner:
         return None if apart == self._apart else self._changed(apart)
 
     def _changed(self, apart: str) -> MotionEvent:
-        """Something else keeps the axes apart, or nothing any more."""
+        """Take what keeps the axes apart now, or "" where nothing does; return the event."""
         self._apart = apart
         states = {one.runner.bound.name: one.runner.axis.state.name for one in self._members}
         why = f"{apart}={states.get(apart, 'lost')}" if apart else ""
         return MotionEvent(self._name, why)
 
     def on_trip(self, tripped: AxisControl) -> None:
-        """An axis has tripped: where it is one of these, nothing is added any more, at once."""
+        """End what is added at once, if the tripped axis is one of these."""
         if any(member.runner is tripped for member in self._members):
             self._end()
 

@@ -28,7 +28,7 @@ STEADY_NS = 200_000_000
 
 
 class SetChooser:
-    """Keeps sway data and filter of one axis at what load state and operator ask for.
+    """Selects sway data and filter of one axis by load state and the operator's profile.
 
     Args:
         bound: the axis.
@@ -111,7 +111,7 @@ def profile_by_number(bound: BoundAxis) -> list[str]:
 
 
 def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[ParameterSet]]]:
-    """What an axis can run, by the name of the profile ("" without one)."""
+    """Return the parameter sets of an axis by the name of the profile ("" without one)."""
     config = bound.config
     assert config.sway is not None  # checked with the deployment
     mode = config.sway.mode()

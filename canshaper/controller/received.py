@@ -101,7 +101,7 @@ class MachineInputs:
 
 
 def received_by(bound: Iterable[BoundHandler]) -> dict[MessageKey, MessageInput]:
-    """What receives each message that is known by its identifier."""
+    """Map each message that is known by its identifier to its input."""
     return {key: one for message, one in bound if not message.any_source for key in message.keys}
 
 

@@ -94,7 +94,7 @@ class AxisControl:
         self._trip = reason
 
     def trip_in_motion(self, reason: Reason) -> None:
-        """The same, for what does not matter to an axis that is neutral."""
+        """Trip like ``trip``, unless the axis is neutral."""
         if not self.axis.neutral:
             self._trip = reason
 
@@ -113,16 +113,16 @@ class AxisControl:
         return self._added
 
     def add_velocity(self, added: float, *, damps: bool) -> None:
-        """What a two-axis motion adds to this axis from now on, see ``Axis.act``."""
+        """Take the velocity that a two-axis motion adds from now on, see ``ShapedAxis.act``."""
         self._added, self._damps = added, damps
 
     def drop_added(self) -> None:
-        """Nothing is added any more, and the next output is not faster for what was."""
+        """Add nothing from now on; the next output is not faster for what was added."""
         self.add_velocity(0.0, damps=False)
         self.axis.drop_added()
 
     def add_interlock(self, interlock: Interlock) -> None:
-        """Let something else agree before the axis may move."""
+        """Add an interlock: it has to agree before the axis may move."""
         self._interlocks.append(interlock)
 
     def add_chooser(self, load_state: ValueInput | None, profile: ProfileChoice | None) -> None:
@@ -139,7 +139,7 @@ class AxisControl:
         self.axis.sensed = SensedSway(sway, bound.timing, bound.limits, bound.gains, damps=damps)
 
     def add_radius(self, radius: ValueInput | None) -> None:
-        """Of an axis that turns: the speed of its tip is by this radius, where it is measured."""
+        """Take the measured radius of a slewing axis, by which the speed of its tip is computed."""
         self._radius = radius
 
     def measured_by(self, node: SensorNode) -> None:
@@ -300,7 +300,7 @@ class AxisControl:
 
     @property
     def trust(self) -> Trust:
-        """What is thought of the sway sensor."""
+        """Trust state of the sway sensor; NO_DATA without one."""
         return self.axis.sensed.state if self.axis.sensed else Trust.NO_DATA
 
     @property

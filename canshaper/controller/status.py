@@ -68,7 +68,7 @@ LENGTH_NEWS = 1.1
 
 
 class SensorReport:
-    """Of one axis with a sway sensor.
+    """Reports changes of the sway sensor of one axis: its trust state, the pendulum length.
 
     Args:
         name: name of the axis.
@@ -82,7 +82,7 @@ class SensorReport:
         self._reported_m = 0.0
 
     def events(self) -> Iterator[SwaySensorEvent | SwingLengthEvent]:
-        """What has changed since the last call: what is thought of the sensor, the length."""
+        """Yield changes since the last call: trust state of the sensor, pendulum length."""
         trust = self._runner.trust
         if trust is not self._trust:
             self._trust = trust

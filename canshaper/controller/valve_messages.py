@@ -95,7 +95,7 @@ class ValveOutputs:
 
 
 class Counters:
-    """What went wrong so far, by the signal names of the status message."""
+    """Counters of faults, by the signal names of the status message."""
 
     __slots__ = ("last_fault", "values")
 
