@@ -19,7 +19,7 @@ def kalman_gains(
     noise: Sequence[float],
     first: Sequence[float],
 ) -> tuple[tuple[float, ...], ...]:
-    """Gains for one measurement after the other; the last ones are those of the steady state.
+    """Return Kalman gains for successive measurements; the last ones are the steady state's.
 
     Args:
         step: what the states become until the next measurement, a row for each.
@@ -64,7 +64,7 @@ QUICKNESS_OF_TWO, SECOND_QUICKNESS = 0.4, 5.0
 FIRST_SECOND_DEG, FIRST_SECOND_DEG_S = 2.0, 20.0
 
 Gains = tuple[tuple[float, ...], ...]
-"""For one measurement after the other; the last ones are those of the steady state."""
+"""Gains for successive measurements; the last ones are those of the steady state."""
 
 
 class SensorGains(NamedTuple):
@@ -109,7 +109,7 @@ class FreeSwing:
         self.rate = rate + by[2] * angle + by[3] * rate
 
     def error(self, unexplained: float) -> float:
-        """What a measurement shows beyond what is known; ``unexplained`` by the late model."""
+        """Return ``unexplained`` (by the late model) less free swing and offset."""
         return unexplained - (self.rate if self._rates else self.angle) - self.offset
 
     def glide(self, tick_s: float) -> None:
@@ -117,7 +117,7 @@ class FreeSwing:
         self.angle += tick_s * self.rate
 
     def correct(self, error: float) -> float:
-        """Take over the error of a measurement; what is left of it."""
+        """Correct by the error of a measurement, and return the error that is left."""
         angle, rate, offset = next(self._gains, self._steady)
         self.angle += angle * error
         self.rate += rate * error
@@ -125,7 +125,7 @@ class FreeSwing:
         return error * (1.0 - offset - (rate if self._rates else angle))
 
     def begin(self, unexplained: float) -> None:
-        """The first measurement."""
+        """Start from the first measurement."""
         self.angle = self.rate = 0.0
         self._gains = iter(self._first)
         self.correct(self.error(unexplained))
@@ -160,11 +160,11 @@ class TwoFreeSwings(FreeSwing):
         self._second.step(self._by)
 
     def error(self, unexplained: float) -> float:
-        """As without a second mode."""
+        """Return the error as ``FreeSwing.error`` does."""
         return self._second.error(super().error(unexplained))
 
     def correct(self, error: float) -> float:
-        """As without a second mode."""
+        """Correct as ``FreeSwing.correct`` does."""
         angle, rate = next(self._gains_of_second, self._first_of_second[-1])
         second = self._second
         second.angle += angle * error
@@ -172,7 +172,7 @@ class TwoFreeSwings(FreeSwing):
         return super().correct(error) - error * (rate if self._rates else angle)
 
     def begin(self, unexplained: float) -> None:
-        """The first measurement."""
+        """Start from the first measurement."""
         self._second.angle = self._second.rate = 0.0
         self._gains_of_second = iter(self._first_of_second)
         super().begin(unexplained)

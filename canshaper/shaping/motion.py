@@ -43,7 +43,7 @@ def farthest_m(path_m: float, *, damps: bool) -> float:
 
 
 class TwoAxisMotion:
-    """What both axes add so that the grapple stays on the path of its filters.
+    """Velocities that two axes add to keep the grapple on the path of its filters.
 
     Args:
         slew: the axis that turns.

@@ -1,4 +1,4 @@
-"""An axis as the motion of two sees it: the path of its grapple, and how far it may be moved."""
+"""One axis of a two-axis motion: path of its grapple, and how far it may be moved."""
 
 import math
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ GrapplePath = tuple[float, float, float, float]
 
 @dataclass(slots=True)
 class MovingAxis:
-    """One of the two axes, as the motion sees it.
+    """One of the two axes of a motion.
 
     Attributes:
         full_speed: rad/s of slew, m/s of near-far.

@@ -1,4 +1,4 @@
-"""What a sway sensor adds to the sway model: the swing that own motion does not explain.
+"""Sway observer: the swing that a sensor shows and own motion does not explain.
 
 A second sway model runs late, driven by what the valve made of the velocity at the time of the
 measurement. What is measured beyond it is free swing (it was there before, the pendulum is longer,
@@ -18,11 +18,11 @@ from canshaper.shaping.sway import SwayModel, swing_over
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 
 Errors = tuple[float, float, float, float]
-"""Of a measurement, rad or rad/s, under each idea of what the sensor shows."""
+"""Errors of a measurement, rad or rad/s, one for each hypothesis of what the sensor shows."""
 
 
 class SwayObserver:
-    """Late model and free swing of one axis, under four ideas of what the sensor shows.
+    """Late model and free swing of one axis, under four hypotheses of what the sensor shows.
 
     Args:
         sway: sway model of the axis.
@@ -81,11 +81,11 @@ class SwayObserver:
         self._set_mode(sway)
 
     def restart(self) -> None:
-        """The model of the axis has started again: so does the late one."""
+        """Restart the late model, because the model of the axis has restarted."""
         self.late.restart()
 
     def begin(self, value: float, scale: float) -> None:
-        """The first measurement, see ``errors``."""
+        """Take the first measurement, see ``errors``."""
         own = self.own(scale)
         self.free.begin(value - own)
         self.negated.begin(-value - own)
@@ -94,7 +94,7 @@ class SwayObserver:
         self.dragged.begin(value - scale * self.late.speed if self._rates else value)
 
     def errors(self, value: float, scale: float) -> Errors:
-        """What a measurement shows beyond what was expected, under each of the four ideas.
+        """Return the errors of a measurement under each of the four hypotheses.
 
         To be called once for each.
 
@@ -116,18 +116,18 @@ class SwayObserver:
         )
 
     def acceleration(self, error: float) -> float:
-        """What a lasting error bends the free swing by, rad/s^2."""
+        """Return the acceleration of the free swing that a lasting error causes, rad/s^2."""
         return error * self._bend
 
     def correct(self, errors: Errors) -> float:
-        """Take over the errors of a measurement; what is left of the first one."""
+        """Correct by the errors of a measurement, and return what is left of the first one."""
         self.dragged.correct(errors[3])
         self.negated.correct(errors[1])
         self.alone.correct(errors[2])
         return self.free.correct(errors[0])
 
     def own(self, scale: float) -> float:
-        """What the sensor would show if own motion were all."""
+        """Return the measurement that own motion alone would give."""
         return scale * (self.late.rate if self._rates else self.late.angle)
 
     def step(self, velocity: float, added: float) -> None:

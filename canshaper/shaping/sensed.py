@@ -178,7 +178,7 @@ class SensedSway:
         self.length.add(value, offset, speed_m_s, pressed=commanded, free=free)
 
     def _doubt(self, why: Trust, *, again: bool = False) -> None:
-        """It is trusted no longer, or not yet; perhaps the observer has to begin again."""
+        """Distrust the sensor for a reason; ``again``: the observer has to begin again."""
         if self.state is Trust.TRUSTED:
             self._needed = PROVED_AGAIN
             self._evidence.clear()

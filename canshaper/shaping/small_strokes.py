@@ -38,11 +38,11 @@ class SmallStrokes:
         self._left = self._most  # until what was commanded is no longer small; the same
 
     def clear(self) -> None:
-        """The axis rests: nothing is due."""
+        """Forget the travel that is due: the axis rests."""
         self._due, self._left = 0.0, self._most
 
     def lose(self) -> None:
-        """The filter goes on with what was commanded past it: until the axis rests, none counts."""
+        """Treat no stroke as small until the axis rests: the filter did not see its commands."""
         self._left = -math.inf
 
     def hold(self, command: float, applied: float, ticks: int) -> None:
@@ -82,7 +82,7 @@ class SmallStrokes:
         return self._forth(target, due, high)
 
     def _forth(self, target: float, due: float, most: float) -> float:
-        """The same for a stroke in positive direction."""
+        """Return the velocity of a small stroke in positive direction."""
         least = self._least
         return max(min(least, most), min(target, due)) if due > LEFT * least else 0.0
 

@@ -76,7 +76,7 @@ class Reason(IntEnum):
 
 
 class Reaction(Enum):
-    """What a reason does to an axis."""
+    """Reaction of an axis to a reason."""
 
     NONE = "none"
     """The reason is no fault: the driver did something, or the axis waits for something."""

@@ -111,7 +111,7 @@ class SwayMode:
 
 
 def swing_over(mode: SwayMode, time_s: float) -> tuple[float, float, float, float]:
-    """What an undriven swing changes by: F = Ad - I of (angle, rate), row by row."""
+    """Return the change of an undriven swing over a time: F = Ad - I of (angle, rate), by rows."""
     pole = mode.pole
     decay = math.exp(pole.real * time_s)
     sine = decay * math.sin(pole.imag * time_s) / pole.imag

@@ -1,4 +1,4 @@
-"""What a sway sensor measures, when, and what it may show."""
+"""Sway sensor: measured quantity, timing and limits."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +10,7 @@ TICK_OF_NOISE_S = 0.02
 
 
 class Measured(Enum):
-    """What a sensor measures."""
+    """Quantity that a sensor measures."""
 
     ANGLE = "angle"
     RATE = "rate"
@@ -18,7 +18,7 @@ class Measured(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SensorTiming:
-    """When a sensor measures what.
+    """Quantity and timing of a sensor's measurements.
 
     Attributes:
         measured: angle or rate.
@@ -39,7 +39,7 @@ class SensorTiming:
 
 @dataclass(frozen=True, slots=True)
 class SensorLimits:
-    """What a sensor may show.
+    """Limits of a sensor's measurements, and of the pendulum that they show.
 
     Attributes:
         noise: standard deviation, rad or rad/s.

@@ -35,7 +35,7 @@ DAMPING_WEIGHT = 0.05
 
 @dataclass(frozen=True, slots=True)
 class SwingLength:
-    """What a window has shown.
+    """Length and damping of the pendulum from one window of measurements.
 
     Attributes:
         length_m: of the pendulum.
@@ -64,7 +64,7 @@ class Derivatives:
         self.value = self.first = self.second = self._last = 0.0
 
     def add(self, signal: float) -> None:
-        """The next value; it went there in a straight line."""
+        """Take the next value; the signal is straight between two values."""
         corner, step, decay = self._corner, self._period_s, self._decay
         slope = (signal - self._last) / step
         # In steady state the answer to a ramp is the ramp, two time constants late.
@@ -117,7 +117,7 @@ class SwingLengthEstimate:
     def add(
         self, value: float, offset: float, speed_m_s: float, *, pressed: bool, free: bool
     ) -> None:
-        """A measurement.
+        """Take a measurement.
 
         Args:
             value: rad or rad/s.
@@ -160,7 +160,7 @@ class SwingLengthEstimate:
         sums[5] += bend * bend
 
     def _solved(self) -> SwingLength | None:
-        """Least squares of bend = drive / length + damping drag, the damping near that of file."""
+        """Solve bend = drive / length + damping drag by least squares, damping near the file's."""
         aa, ab, bb, ax, bx, xx = self._sums
         weight = DAMPING_WEIGHT * bb
         determinant = aa * (bb + weight) - ab * ab

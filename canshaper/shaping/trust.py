@@ -1,4 +1,4 @@
-"""May the sway sensor be believed? Named states, from what it shows and the model does not.
+"""Trust in the sway sensor: named states, by measurements that the model does not explain.
 
 It is believed once driven motion has proved that it shows the swing of this axis with this sign,
 and no longer when it contradicts motion, stands still, jumps, or the load does not hang free.
@@ -13,7 +13,7 @@ from canshaper.shaping.sway_sensor import TICK_OF_NOISE_S, Measured
 
 
 class Trust(IntEnum):
-    """What is thought of a sway sensor; codes of the status message.
+    """Trust state of a sway sensor; codes of the status message.
 
     After a fault its name stays until the sensor is trusted again.
     """
@@ -26,7 +26,7 @@ class Trust(IntEnum):
     LOST = 3
     """Measurements do not come any more."""
     STUCK = 4
-    """The same value again and again while the model swings."""
+    """The value repeats while the model swings."""
     JUMP = 5
     """It has jumped further than a grapple can; until the axis is at rest."""
     WRONG_SIGN = 6
@@ -66,7 +66,7 @@ RESTLESS_S, RESTLESS_SHARE, RESTLESS_MORE = 2.0, 1.5, 1.0
 
 
 class Evidence:
-    """Which idea of the sensor explains its measurements: a sequential likelihood ratio test.
+    """Sequential likelihood ratio test of the hypotheses of what a sensor shows.
 
     Args:
         measured: angle or rate.
@@ -91,7 +91,7 @@ class Evidence:
         self._energies = 0.0, 0.0, 0.0, 0.0
 
     def add(self, errors: Errors) -> None:
-        """A measurement: its errors under the four ideas, see ``SwayObserver.errors``."""
+        """Take a measurement by its errors under the hypotheses, see ``SwayObserver.errors``."""
         fade = self._fade
         known, negated, alone, dragged = self._energies
         known += fade * (errors[0] * errors[0] - known)
@@ -127,7 +127,7 @@ class Evidence:
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:
-        """Which of the others is the better one, by a ratio below ``least``."""
+        """Return the fault whose hypothesis is the better one, by a ratio below ``least``."""
         contact = min(self.own, self.free)
         if min(self.sign, contact) >= least:
             return None
@@ -147,7 +147,7 @@ def largest_jump(measured: Measured, noise: float, period_s: float) -> float:
 
 
 class Standstill:
-    """Finds a sensor, or a grapple, that stands still.
+    """Detects a sensor, or a grapple, that stands still.
 
     Args:
         measured: angle or rate.
@@ -170,7 +170,7 @@ class Standstill:
         self._held.clear()
 
     def check(self, value: float, bent: float, *, command_active: bool) -> Trust | None:
-        """What a measurement says.
+        """Return STUCK or CONTACT where the measurement shows a standstill, else None.
 
         Args:
             value: the measurement.
@@ -184,7 +184,7 @@ class Standstill:
 
 
 class Still:
-    """A value that stays where it is, though a swing would not.
+    """Detects a value that stays constant while a swing would change it.
 
     Args:
         least_s: for how long; at least so many measurements as ``LEAST_STILL``.
@@ -224,7 +224,7 @@ class Still:
 
 
 class Restlessness:
-    """Does the velocity go to and fro far more than the operator's command?
+    """Detects a velocity that goes to and fro far more than the operator's command.
 
     Args:
         tick_s: time between two ticks.
@@ -238,7 +238,7 @@ class Restlessness:
         self._commanded = Path(round(2.0 * RESTLESS_S / tick_s))
 
     def add(self, velocity: float, command: float) -> bool:
-        """A tick with this velocity and this command; whether they differ too much."""
+        """Take velocity and command of a tick; return whether they differ too much."""
         moved = self._moved.add(velocity)
         return moved > RESTLESS_SHARE * self._commanded.add(command) + RESTLESS_MORE
 

@@ -1,4 +1,4 @@
-"""What a valve makes of its command: dead band, gain and asymmetry of both directions, a table."""
+"""Valve curve: dead band, gain and asymmetry of both directions, as a table."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence

@@ -20,7 +20,7 @@ _RESERVED = {"kind", "parameters", "sway", "tick_s", "valve_rate_per_s"}
 
 
 class Shaper(Protocol):
-    """What the axis asks of a filter.
+    """Interface that every filter implements.
 
     A filter with a memory also has ``reset_to_steady_state(command)``: as if the command had long
     been there; and, where it can go on from another one of its class, ``copy_state(old)``. One
