@@ -1,1 +1,1 @@
-"""What is known of each received message: is it valid, in sequence, fresh?"""
+"""Checked inputs: validity, sequence and age of each received message."""

@@ -1,4 +1,4 @@
-"""Does the valve follow its command? Its own feedback, compared with the commands."""
+"""Feedback of a valve, compared with its commands."""
 
 import math
 from collections import deque
@@ -11,10 +11,10 @@ from canshaper.machine.inputs import BoundValue
 
 
 class Following(Enum):
-    """What the feedback of a valve says."""
+    """State of a valve by its feedback."""
 
     UNKNOWN = "unknown"
-    """Nothing was received of it yet, and it is not late."""
+    """Nothing was received yet, and it is not late."""
     YES = "following"
     NO = "not-following"
     """The spool is elsewhere than any command of the last moments asked for."""
@@ -47,7 +47,7 @@ class Feedback(ValueInput):
         return self.value / self._full
 
     def check(self, sent: float, now_ns: int) -> bool:
-        """Compare with the commands so far and this one; whether ``following`` has changed.
+        """Compare with recent commands and this one; return whether ``following`` has changed.
 
         Args:
             sent: the command as a part of full, without the deadband of the valve.

@@ -1,4 +1,4 @@
-"""A message that is received: is it whole, right, in sequence, and still fresh?"""
+"""A received message: its length, protection, sequence and age."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
@@ -22,7 +22,7 @@ class Part(Protocol):
 
 
 def carry_over(before: Mapping[Key, Part], parts: Mapping[Key, Part]) -> None:
-    """Give every part the state of the one with its key; one that is new or another stays new.
+    """Copy the state of each part from the part with the same key and type; others start new.
 
     Args:
         before: parts of the controller that ran before, by what they are on the machine.
@@ -44,18 +44,18 @@ class Receiver(Protocol):
     """Receives the frames of one message."""
 
     def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
-        """Receive one; what is wrong with it."""
+        """Receive a frame, and return its fault."""
 
     def invalidate(self) -> None:
         """Nothing received so far counts any more."""
 
 
 class MessageInput(Receiver, Part, Protocol):
-    """The same, with a state that a reload carries over."""
+    """Receiver with a state that a reload carries over."""
 
 
 class Input(ABC):
-    """What is known of one message now.
+    """State of one received message.
 
     Its age begins with the arrival of its frame. What is bad news in a frame counts from when the
     frame is read: it is numbered, not dated, so that none is too old to be seen.
@@ -138,7 +138,7 @@ class Input(ABC):
 
 
 class Switch:
-    """A switch that has to agree, in a message that has others or other things too.
+    """Switch that has to agree, in a message that may carry other signals.
 
     Args:
         source: the message.
@@ -198,7 +198,7 @@ class SwitchInput(Input):
         self.switches = {name: Switch(self, *one) for name, one in switches.items()}
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Each of them looks at it."""
+        """Give the frame to each switch."""
         for switch in self.switches.values():
             switch.on_frame(raw, accepted)
         return GOOD

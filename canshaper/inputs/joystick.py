@@ -1,4 +1,4 @@
-"""What is known of one joystick now: its last good frame, and what an axis may use of it."""
+"""State of one joystick: its last good frame, and the input that an axis may use."""
 
 from typing import Protocol, Self
 
@@ -11,12 +11,12 @@ _new = tuple.__new__  # CommandInput(...) in half the time
 
 
 class CommandSource(Protocol):
-    """Where an axis gets its joystick from."""
+    """Source of the joystick command of an axis."""
 
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> CommandInput:
-        """What the axis may use now, see ``JoystickInput``."""
+        """Return the input that the axis may use now, see ``JoystickInput``."""
 
     @property
     def releases(self) -> int:
@@ -99,7 +99,7 @@ class JoystickInput(Input):
         return GOOD if valid else FrameFault.INVALID_SIGNAL
 
     def _press(self, code: int, arrived_ns: int) -> None:
-        """A press is seen to begin: of what is held after a gap no one knows when."""
+        """Count a press whose beginning was seen; one held after a gap does not count."""
         received_ns = self._received_ns
         if received_ns is None or arrived_ns - received_ns > self._timeout_ns:
             self._next_held = True

@@ -31,7 +31,7 @@ class SwaySensorInput(Input):
         self.values: dict[str, float | None] = {}
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """What is no value is a fault, and no measurement."""
+        """Take the values of all signals; a code that is no value is a fault."""
         values = {one.name: self._value(one, raw) for one in self._signals}
         if accepted:
             self.number += 1
@@ -39,7 +39,7 @@ class SwaySensorInput(Input):
         return FrameFault.INVALID_SIGNAL if None in values.values() else GOOD
 
     def _value(self, signal: MeasuredSignal, raw: Raw) -> float | None:
-        """What a signal measures; nothing where its figure of merit is another than good."""
+        """Return the value of a signal; None without one, or where its figure of merit is bad."""
         merit = self._merits.get(signal.name)
         return None if merit and raw[merit] != GOOD_MERIT else signal.value(raw)
 
@@ -50,15 +50,15 @@ class SwaySensorInput(Input):
 
 
 class SensorNode(Protocol):
-    """The node of a sensor."""
+    """Node of a sensor."""
 
     @property
     def works(self) -> bool:
-        """Whether what it sends means something."""
+        """Whether the node works, so that its measurements count."""
 
 
 class SwaySignal:
-    """What one axis reads of it.
+    """Signal of a sway sensor, as one axis reads it.
 
     Args:
         message: the message.
@@ -75,7 +75,7 @@ class SwaySignal:
         self._number = message.number
 
     def new_value(self) -> float | None:
-        """A measurement that is new, rad or rad/s with the sign of the model; None without one."""
+        """Return a new measurement, rad or rad/s with the sign of the model; None without one."""
         message = self._message
         if message.number == self._number:
             return None

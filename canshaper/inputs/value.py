@@ -66,7 +66,7 @@ class ValueInput(Input):
         self.measured_ns: int | None = None
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """What is no value is a fault."""
+        """Take the value; a code that is no value is a fault."""
         value = self._signal.value(raw)
         if value is None:
             return FrameFault.INVALID_SIGNAL
@@ -87,7 +87,7 @@ class ValueInput(Input):
 
 
 def measurable(signal: Signal) -> tuple[float, float]:
-    """What of a signal can be a measurement; a millionth more, for the rounding of decimals."""
+    """Return the range of valid measurements of a signal, a millionth wider for rounding."""
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or high <= low:
         return -LARGEST, LARGEST
@@ -95,7 +95,7 @@ def measurable(signal: Signal) -> tuple[float, float]:
 
 
 OWN = "normal"
-"""What people read for the axes' own filters, whose name is ""."""
+"""Name shown for the axes' own filters, whose name in the program is ""."""
 
 
 class ProfileChoice(Protocol):
