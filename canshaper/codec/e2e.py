@@ -22,7 +22,7 @@ COUNTER = 0x0F
 
 
 class E2e:
-    """What the profiles share.
+    """Common part of all profiles.
 
     Attributes:
         counts: values of the counter.
@@ -33,7 +33,7 @@ class E2e:
     bits = 12
 
     def count(self, data: bytes) -> int:
-        """The counter of a frame."""
+        """Return the counter of a frame."""
         return data[1] & COUNTER
 
     def __eq__(self, other: object) -> bool:
@@ -49,7 +49,7 @@ class E2e:
         return count < self.counts and data[0] == self.crc(data, count)
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """The same frame with its header."""
+        """Return the frame with its header."""
         data = bytes((0, self.second(data[1], count))) + data[2:]
         return bytes((self.crc(data, count),)) + data[1:]
 
@@ -145,7 +145,7 @@ class Profile5(E2e):
         self._id = data_id.to_bytes(2, self._order)
 
     def count(self, data: bytes) -> int:
-        """The counter of a frame."""
+        """Return the counter of a frame."""
         return data[2]
 
     def verify(self, data: bytes) -> bool:
@@ -153,7 +153,7 @@ class Profile5(E2e):
         return data[:2] == self.crc(data, 0).to_bytes(2, self._order)
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """The same frame with its header."""
+        """Return the frame with its header."""
         data = data[:2] + bytes((count,)) + data[3:]
         return self.crc(data, count).to_bytes(2, self._order) + data[2:]
 
@@ -163,13 +163,13 @@ class Profile5(E2e):
 
 
 class Profile6(Profile5):
-    """The same with the high byte first; bytes 2 and 3 are the length, byte 4 is the counter."""
+    """Profile 5 with the high byte first; bytes 2 and 3 are the length, byte 4 is the counter."""
 
     bits = 40
     _order = "big"
 
     def count(self, data: bytes) -> int:
-        """The counter of a frame."""
+        """Return the counter of a frame."""
         return data[4]
 
     def verify(self, data: bytes) -> bool:
@@ -177,7 +177,7 @@ class Profile6(Profile5):
         return data[2:4] == len(data).to_bytes(2, "big") and super().verify(data)
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """The same frame with its header."""
+        """Return the frame with its header."""
         data = data[:2] + len(data).to_bytes(2, "big") + bytes((count,)) + data[5:]
         return self.crc(data, count).to_bytes(2, "big") + data[2:]
 
@@ -202,7 +202,7 @@ class Profile4(E2e):
         self._id = data_id.to_bytes(4, "big")
 
     def count(self, data: bytes) -> int:
-        """The counter of a frame."""
+        """Return the counter of a frame."""
         return int.from_bytes(data[2:4], "big")
 
     def verify(self, data: bytes) -> bool:
@@ -210,22 +210,22 @@ class Profile4(E2e):
         return self.protect(data, self.count(data)) == data
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """The same frame with its header."""
+        """Return the frame with its header."""
         head = len(data).to_bytes(2, "big") + count.to_bytes(2, "big") + self._id
         return head + CRC32_P4.of(head + data[12:]).to_bytes(4, "big") + data[12:]
 
 
 class Profile7(Profile4):
-    """The same with a CRC-64, which comes first, and length and counter of 32 bits."""
+    """Profile 4 with a CRC-64, which comes first, and length and counter of 32 bits."""
 
     counts = 1 << 32
     bits = 160
 
     def count(self, data: bytes) -> int:
-        """The counter of a frame."""
+        """Return the counter of a frame."""
         return int.from_bytes(data[12:16], "big")
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """The same frame with its header."""
+        """Return the frame with its header."""
         rest = len(data).to_bytes(4, "big") + count.to_bytes(4, "big") + self._id + data[20:]
         return CRC64.of(rest).to_bytes(8, "big") + rest

@@ -18,7 +18,7 @@ new_frame = tuple.__new__
 
 
 class FrameFault(IntEnum):
-    """What was wrong with a frame or with the bus; the numbers are those of the status message."""
+    """Fault of a frame or of the bus; the numbers are those of the status message."""
 
     NONE = 0
     WRONG_LENGTH = 1

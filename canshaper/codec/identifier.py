@@ -49,7 +49,7 @@ def pgn_of(can_id: int) -> int:
 
 
 def with_source(can_id: int, source: int) -> int:
-    """The same message from another address."""
+    """Return the identifier with another source address."""
     return can_id & ~0xFF | source
 
 
@@ -85,7 +85,7 @@ NO_EMERGENCY = 0x0000
 GENERIC_ERROR = 0x1000
 
 STATE_MASK = 0x7F
-"""Of a heartbeat; the bit above is that of node guarding."""
+"""State bits of a heartbeat; the bit above is that of node guarding."""
 
 
 class NodeState(IntEnum):
@@ -107,9 +107,9 @@ class ValveState(IntEnum):
 
 
 STATE_BITS = 4
-"""Of control and status word."""
+"""State bits of control and status word."""
 READY_BIT = 0x8
-"""Of the status word; a valve that has a fault clears it."""
+"""Bit of the status word that a valve with a fault clears."""
 RESET_FAULT = 0x3
 """Control word that resets a fault."""
 

@@ -53,7 +53,7 @@ class Protector:
             self._count = before._count
 
     def protect(self, raw: dict[str, Any]) -> bytes:
-        """The next frame.
+        """Return the next frame, protected.
 
         Args:
             raw: raw value of every signal, by name; that of the counter is changed.
@@ -64,7 +64,7 @@ class Protector:
         return self.add_check(self.without_check(raw))
 
     def without_check(self, raw: dict[str, Any]) -> bytes:
-        """The next frame, as ``protect``, without its check."""
+        """Return the next frame, as ``protect``, without its check."""
         if self._counts:
             self._count = (self._count + 1) % self._counts
             if self._counter is not None:
@@ -72,11 +72,11 @@ class Protector:
         return self._encode(raw)
 
     def take_back(self) -> None:
-        """The last frame did not leave: the next one has its count."""
+        """Reuse the count of the last frame, which did not leave, for the next one."""
         self._count = (self._count - 1) % self._counts if self._counts else 0
 
     def add_check(self, data: bytes) -> bytes:
-        """The same frame with the check of the count it has come to."""
+        """Return the frame with the check for the present count."""
         return data if self._check is None else self._check.protect(data, self._count)
 
 
@@ -116,7 +116,7 @@ class SequenceChecker:
         self._requalify()
 
     def check(self, data: bytes, count: int) -> FrameFault:
-        """What is wrong with a frame of the right length.
+        """Check a frame of the right length, and return its fault.
 
         Args:
             data: its bytes.

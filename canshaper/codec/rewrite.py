@@ -74,7 +74,7 @@ class RewrittenMessage(SentMessage):
 
 
 class RewritingSender(Sender):
-    """Sends it: in the place of frames of the joystick, and where none comes."""
+    """Sender of the rewritten message: in place of joystick frames, and where none comes."""
 
     def __init__(self, message: RewrittenMessage) -> None:
         super().__init__(message)
@@ -82,19 +82,19 @@ class RewritingSender(Sender):
         self._enable, self._start = message.enable, message.fields.start[message.enable]
 
     def onto(self, data: bytes) -> Frame:
-        """The next frame: this one of the joystick with our velocities, protected again."""
+        """Return the next frame: the joystick's with our velocities, protected again."""
         ours = int.from_bytes(self.protector.without_check(self.raw), "little") & self._mask
         word = int.from_bytes(data, "little") & ~self._mask | ours
         protected = self.protector.add_check(word.to_bytes(self._length, "little"))
         return new_frame(Frame, (*self.key, protected))
 
     def instead(self, frame: Frame) -> Frame:
-        """The same frame with what the axes have put in now, and with the same count."""
+        """Return the frame again, with the axes' present velocities and the same count."""
         self.protector.take_back()
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:
-        """The next frame without one of the joystick: nothing in it is older than the axes."""
+        """Return a frame without one of the joystick: nothing in it is older than the axes."""
         self.raw[self._enable] = 1 if enabled else self._start
         return self.frame()
 

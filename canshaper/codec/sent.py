@@ -67,7 +67,7 @@ class Sender:
         self.raw = dict(message.start)
 
     def frame(self, values: Mapping[str, Any] | None = None) -> Frame:
-        """The next frame, protected.
+        """Return the next frame, protected.
 
         Args:
             values: raw values for this frame alone, by signal.

@@ -21,7 +21,7 @@ ROUNDING = 1e-6
 LEAST_STEPS = 10
 """Raw steps to full command that a valve can be moved with."""
 FULL_SET_POINT = 0x4000
-"""Of a valve of CiA 408; +-0x7FFF would be float, in which it drops its load."""
+"""Full set point of a valve of CiA 408; +-0x7FFF would be float, in which it drops its load."""
 
 # Names that the tables of a DBC give to raw values, as words in small letters: SensorError is
 # "sensor error". In a name without any gap, such as sensorerror, those of an error are found too,
@@ -72,7 +72,7 @@ def full_scale(signal: Signal) -> float:
 
 
 def magnitude_range(signal: Signal) -> str | None:
-    """The same for a magnitude, whose direction is in other signals: its range begins at 0."""
+    """Why the DBC range of a magnitude cannot serve as full scale, or None; it begins at 0."""
     if fault := _no_range(signal):
         return fault
     if signal.minimum != 0.0:

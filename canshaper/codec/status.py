@@ -84,7 +84,7 @@ class ReportedAxis(Protocol):
 
     @property
     def trust(self) -> Trust:
-        """What is thought of the sway sensor."""
+        """Trust state of the sway sensor."""
 
     @property
     def swing_length_m(self) -> float:
@@ -139,7 +139,7 @@ def _field(name: str) -> StatusField[Any]:
 
 
 class StatusCodec(Generic[Source]):
-    """A status message: what its frames carry.
+    """Status message with the fields that its frames carry.
 
     Args:
         message: where it is sent.

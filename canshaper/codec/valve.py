@@ -11,13 +11,13 @@ from canshaper.codec.signals import full_scale, valve_steps
 
 
 class Direction(Protocol):
-    """What carries the direction of a magnitude."""
+    """Signals that carry the direction of a magnitude."""
 
     def put(self, raw: dict[str, Any], sign: int) -> None:
         """Write a sign: 0 for neutral, 1 or -1."""
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """The sign it carries; None where it is none."""
+        """Return the sign; None where the code is no direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class DirectionCodec:
         raw[self.signal] = self.codes[sign]  # the last one is that of -1
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """The sign it carries; None where it is none."""
+        """Return the sign; None where the code is no direction."""
         return dict(zip(self.codes, (0, 1, -1), strict=True)).get(raw[self.signal])
 
 
@@ -57,7 +57,7 @@ class FlagsCodec:
             raw[name] = int(of == sign)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """The sign it carries; None where it is none."""
+        """Return the sign; None where the flags are no direction."""
         signs = [of for n, of in zip(self.signals, (0, 1, -1), strict=True) if raw[n] == 1]
         return signs[0] if len(signs) == 1 else None
 
@@ -122,7 +122,7 @@ class ValveCodec:
             raw[name] = zero + round(full * size / self.steps)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """Steps of a command from the raw values of a message; None where it is no command."""
+        """Return the steps of a command from raw values; None where they are no command."""
         steps = self._sign * (int(raw[self._signal]) - self._zero)
         if self._direction is not None:
             sign = self._direction.read(raw)
