@@ -93,7 +93,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
 
 
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
-    """The switch that says which profile is in force, where there is one."""
+    """Bind the switch that says which profile is in force, where there is one."""
     config = lookup.config.profile
     profile = bind_switch(lookup, ("profile",), config) if config else None
     if profile and config:
@@ -103,7 +103,7 @@ def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
 
 
 def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
-    """Which packages make checksums and filters that may run.
+    """Return lines that name the packages whose checksums and filters may run.
 
     The filters of breakpoints are of the kind of their axis or profile.
     """
@@ -118,7 +118,7 @@ def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
 def _check_values(
     lookup: Lookup, switch: BoundValue[Choosing], values: Mapping[Place, float]
 ) -> None:
-    """A value that the DBC names as an error is never used, so it can choose nothing."""
+    """Report values that the DBC names as an error: they are never used, so they choose nothing."""
     signal = switch.signal
     for place, value in values.items():
         if name := special_name(signal, value):

@@ -35,7 +35,7 @@ UNTYPED = {"host": str, "port": int}
 
 
 def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
-    """What is wrong with interface and options of a bus: the key in its section, and what.
+    """Yield the faults of interface and options of a bus: the key in its section, and why.
 
     An interface whose module cannot be imported here is left to the daemon that opens it.
     """
@@ -75,7 +75,7 @@ def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
 
 
 def _fd_faults(bus: Bus, parameters: Container[str]) -> Iterator[tuple[Place, str]]:
-    """Whether an interface with these parameters carries CAN FD as a bus has it."""
+    """Yield why an interface with these parameters cannot carry CAN FD as a bus has it."""
     if bus.interface in ALWAYS_FD | UNNAMED_FD:
         return
     for key, used in (("fd", bus.fd), ("data_bitrate", bus.fd and bus.data_bitrate)):
@@ -139,7 +139,7 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, bus: Bus) -> None:
-    """What can be known of a device without it."""
+    """Check what can be known of a device while it is not there."""
     if bus.match is None:
         return
     place = ("buses", name, "match")
@@ -232,7 +232,7 @@ def longest_frame_bits(extended: bool, length: int) -> int:
 
 
 def longest_fd_bits(extended: bool, length: int) -> tuple[int, int]:
-    """The same of a frame of CAN FD: bits at the rate of the bus, and at that of the data."""
+    """Return the bits of a CAN FD frame at the rate of the bus, and at that of the data."""
     head = 36 if extended else 17
     stuffed_head = (head - 1) // 4
     content = 5 + 8 * length

@@ -1,4 +1,4 @@
-"""What a deployment file says where the DBC has nothing, or something wrong."""
+"""Corrections of the deployment file, where the DBC has nothing, or something wrong."""
 
 from collections.abc import Iterable, Mapping
 from copy import copy

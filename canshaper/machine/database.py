@@ -154,7 +154,7 @@ def _checked(file: DbcFile, *, named: bool) -> tuple[DbcFile | None, list[Proble
 
 
 def _faults(path: Path, entries: list[Entry], used: set[int]) -> Iterator[Problem]:
-    """What is wrong with the messages that are not used."""
+    """Yield the faults of messages that are not used."""
     for entry in entries:
         if entry.fault and entry.number not in used:
             yield Problem(str(path), entry.line, entry.name, entry.fault)

@@ -1,4 +1,4 @@
-"""What is wrong with the signals of a message that no one uses, from its text in a DBC file.
+"""Faults of the signals of a message that no one uses, from its text in a DBC file.
 
 Messages that are used are checked by cantools.
 """

@@ -63,7 +63,7 @@ class Deployment:
 
     @cached_property
     def routing(self) -> Routing:
-        """What each frame on the buses is, looked up by everybody who receives or sends."""
+        """Routing of every frame on the buses, for all who receive or send."""
         used = {bus for bus, messages in self.on_bus.items() if any(map(is_j1939, messages))}
         return build_routing(
             self.config,
@@ -99,7 +99,7 @@ class Deployment:
         return list({one.key: one for one in (*valves, *statuses)}.values())
 
     def listening(self) -> "Deployment":
-        """The same machine for one who only listens, and reports what it would do.
+        """Return the machine for a program that only listens, and reports what it would do.
 
         What valves say of themselves, and a swing, answers another controller's commands, so it is
         not compared with ours. A node of ours on J1939 stays where a status message needs its
@@ -119,7 +119,7 @@ class Deployment:
 
     @cached_property
     def unreported(self) -> "Deployment":
-        """The same machine where no one reads the status: it is not sent."""
+        """The machine where no one reads the status: it is not sent."""
         axes = {
             name: replace(axis, status=None, status_ticks=0) for name, axis in self.axes.items()
         }

@@ -1,4 +1,4 @@
-"""What runs, by content: the deployment file, its DBC files and the program.
+"""Identity of what runs, by content: the deployment file, its DBC files and the program.
 
 They are noted when a machine is signed off; a changed file or program shows in log, status and
 bundle.
@@ -67,7 +67,7 @@ def filter_lines(kinds: Iterable[str]) -> Iterator[str]:
 
 @cache
 def program_sha256() -> str:
-    """Of the modules of canshaper as they lie on the disk, by path: the same however installed."""
+    """Return the SHA-256 of the modules of canshaper on the disk, however they were installed."""
     total = sha256()
     for path in sorted(_modules()):
         total.update(f"{path.relative_to(PACKAGE).as_posix()}\n".encode())

@@ -221,7 +221,7 @@ def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Ch
 def bind_feedback(
     lookup: Lookup, place: Place, config: FeedbackSection
 ) -> BoundValue[FeedbackSection] | None:
-    """What a valve reports of itself."""
+    """Bind the feedback message of a valve."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result

@@ -31,7 +31,7 @@ from canshaper.machine.used_message import NamedCode, StartValue, UsedMessage, k
 
 @dataclass(frozen=True)
 class Lookup:
-    """What the parts of a deployment are bound with.
+    """Shared data with which the parts of a deployment are bound.
 
     Attributes:
         diagnostics: gets every problem.

@@ -1,4 +1,4 @@
-"""What each frame on the buses of a deployment is to us: one table, built once when it is bound.
+"""Routing: the role of each frame on the buses, one table, built once when they are bound.
 
 Sockets are filtered by it, the controller and the tools that only listen look frames up in it.
 """
@@ -30,18 +30,18 @@ Key = tuple[str, int, bool]
 
 
 class Role(Enum):
-    """What a frame with a certain id is."""
+    """Role of a frame with a certain id."""
 
     RECEIVED = "received"
     """An input."""
     NODE = "node"
     """Heartbeat or emergency of a node of CANopen."""
     VALVE = "valve"
-    """Our command to a valve; from others it is that of a foreign sender."""
+    """Our command to a valve; from others it is that of a second sender."""
     SENT = "sent"
-    """What we send besides; from others the same."""
+    """Any other message that we send; from others it is that of a second sender."""
     CLAIM = "claim"
-    """What our node of J1939 says about its address: others say it too."""
+    """Message of our J1939 node about its address: other nodes send it too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class GroupRoute:
 
 @dataclass(frozen=True)
 class BusRoutes:
-    """The same of one bus as sets of (id, extended), for its sockets.
+    """Routes of one bus as sets of (id, extended), for its sockets.
 
     Attributes:
         received: what is received by its id.
@@ -119,7 +119,7 @@ class Routing:
 
     @property
     def sent(self) -> frozenset[Key]:
-        """What we send, and no one else may."""
+        """Messages that we send, and no one else may."""
         return frozenset(k for k, r in self.routes.items() if r.role in (Role.VALVE, Role.SENT))
 
     def received(self, key: Key) -> bool:
@@ -212,7 +212,7 @@ def _ids(routes: Mapping[Key, Route], bus: str, *roles: Role) -> frozenset[tuple
 
 
 def _node_routes(name: str, bus: Bus, listen_only: bool) -> Iterator[tuple[Key, Route]]:
-    """What our node and others send on a bus of J1939 or CANopen about themselves."""
+    """Yield what our node and others send on a bus of J1939 or CANopen about themselves."""
     if bus.canopen:
         for node in bus.canopen.nodes.values():
             for base in (HEARTBEAT, EMERGENCY):

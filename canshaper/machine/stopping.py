@@ -19,7 +19,7 @@ MOST_UNSTATED_M = 2.0
 
 @dataclass(frozen=True, slots=True)
 class FullSpeed:
-    """What full speed of an axis is.
+    """Full speed of an axis.
 
     Attributes:
         m_s: speed of the tip; None where the file does not say.

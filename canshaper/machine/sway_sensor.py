@@ -187,7 +187,7 @@ def _merit(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> str | Non
 
 
 def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensorSection) -> None:
-    """What cannot work on an axis."""
+    """Report settings of a sway sensor that cannot work on its axis."""
     add, axis = lookup.diagnostics.add, lookup.config.axes[name]
     if axis.sway is None:
         add(_place(name), f"expected an axis with sway, got {name!r} without")
@@ -214,7 +214,7 @@ def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensorSecti
 
 
 def _fusion_fault(sensor: SwaySensorSection, swing_s: float) -> str | None:
-    """Why an inclinometer shows nothing of a swing, or why this is none."""
+    """Why ``fusion_s`` does not suit the sensor; None where it does."""
     fusion_s, least_s = sensor.fusion_s, LEAST_FUSION * swing_s
     if sensor.kind != "inclination":
         text = f"expected it with the kind inclination only, got it with {sensor.kind}"
