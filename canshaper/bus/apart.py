@@ -39,7 +39,7 @@ SIOCOUTQNSD, TIOCOUTQ = 0x894B, 0x5411
 
 
 class BusApart:
-    """What a port uses of ``can.BusABC``, of a bus whose calls may block.
+    """The methods of ``can.BusABC`` that a port uses, of a bus whose calls may block.
 
     Args:
         bus: the bus; nothing else may call it any more.
@@ -202,7 +202,7 @@ class BusApart:
                 self._readable(LOOK_S)
 
     def _readable(self, timeout_s: float) -> bool:
-        """Whether the line has something to read, or will within so long."""
+        """Whether the line has something to read, or will have within a time."""
         if self._descriptor >= 0:
             with suppress(OSError, ValueError):  # closed meanwhile
                 return bool(select([self._descriptor], [], [], timeout_s)[0])

@@ -37,7 +37,7 @@ LinkQuery = Callable[[int], KindAndBitrates]
 
 @dataclass(frozen=True)
 class Device:
-    """What is behind an interface; None where it has no such thing.
+    """Device behind an interface; None for each property that it does not have.
 
     Attributes:
         name: of the interface.
@@ -176,7 +176,7 @@ def device_fault(bus: Bus, device: Device) -> str | None:
 
 
 def expected(bus: Bus, device: Device) -> dict[str, str | int]:
-    """What a device has to have, by its fields.
+    """Return the values that a device has to have, by its fields.
 
     The bit rates of the bus count too, for an interface that has them.
     """

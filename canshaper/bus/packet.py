@@ -1,4 +1,4 @@
-"""One received packet: its frame, its arrival, the clock that stamps it, errors that it reports."""
+"""Received packet: its frame, its arrival, the clock that stamps it, errors that it reports."""
 
 import socket
 import struct
@@ -40,7 +40,7 @@ BRS, FDF = 0x01, 0x04
 
 
 class Packet(NamedTuple):
-    """What a socket of SocketCAN carries, unpacked.
+    """Unpacked packet of a SocketCAN socket.
 
     Attributes:
         word: id with its flags.
@@ -54,7 +54,7 @@ class Packet(NamedTuple):
 
     @classmethod
     def unpack(cls, packet: bytes) -> Self:
-        """From the bytes of the socket, of which there are ``FD_SIZE`` at most.
+        """Unpack the bytes of the socket, ``FD_SIZE`` at most.
 
         Raises:
             struct.error: it has not the size of a frame.
@@ -66,7 +66,7 @@ class Packet(NamedTuple):
         return cls(word, data[:length])
 
     def pack(self) -> bytes:
-        """The bytes for a socket."""
+        """Return the bytes for a socket."""
         if self.flags is None:
             return CAN_FRAME.pack(self.word, len(self.data), self.data)
         return FD_FRAME.pack(self.word, len(self.data), self.flags, self.data)
@@ -141,7 +141,7 @@ class Arrivals:
         return self._empty_ns
 
     def of(self, ancillary: Sequence[tuple[int, int, bytes]]) -> int:
-        """Arrival of a frame that this read has found; the earliest where it has no stamp.
+        """Return the arrival of a frame of this read; the earliest possible one without a stamp.
 
         Args:
             ancillary: what ``recvmsg`` returned, of a socket that carries nothing but stamps.

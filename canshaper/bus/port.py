@@ -29,7 +29,7 @@ class Port(Protocol):
 
     @property
     def state(self) -> BusState:
-        """How the bus is."""
+        """State of the bus."""
 
     @property
     def arrived_ns(self) -> int:
@@ -42,7 +42,7 @@ class Port(Protocol):
         """Every frame that waits, in order; ends when there is none or the bus fails."""
 
     def background(self) -> Iterator[Frame]:
-        """What can wait until the valve frames are out: other senders with our ids, and so on."""
+        """Yield frames that can wait until the valve frames are out, as of senders with our ids."""
 
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; False when the frame did not go out."""
@@ -135,7 +135,7 @@ class ListeningPort:
         return self._port.frames()
 
     def background(self) -> Iterator[Frame]:
-        """What can wait."""
+        """Yield frames that can wait."""
         return self._port.background()
 
     def send(self, frame: Frame) -> bool:

@@ -117,7 +117,7 @@ class PythonCanPort:
                     yield frame
 
     def background(self) -> Iterator[Frame]:
-        """Nothing: ``frames`` hands out everything."""
+        """Yield nothing: ``frames`` hands out everything."""
         return iter(())
 
     def send(self, frame: Frame) -> bool:

@@ -137,7 +137,7 @@ class RawPort:
             yield frame
 
     def background(self) -> Iterator[Frame]:
-        """What can wait until the valves have their frames: our own, seen back, are taken in.
+        """Take our own frames, seen back; yield frames that can wait until the valves have theirs.
 
         Frames of other senders with our ids, and of ids that no one knows, are handed out.
         """

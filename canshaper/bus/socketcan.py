@@ -109,7 +109,7 @@ def dropped_frames(sockets: list[socket.socket]) -> int:
 
 
 def readable(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
-    """What says whether a socket has something to read, asked within so many ms."""
+    """Return a function that says whether a socket has something to read within so many ms."""
     poll = select.poll()
     poll.register(one, select.POLLIN)
     return poll.poll
@@ -133,7 +133,7 @@ MOST_CLAIMS = 32
 
 
 class UnderWay:
-    """How many there are of each id, and since when more than one.
+    """Counts of our frames under way by id, and since when there is more than one.
 
     Attributes:
         counts: number of frames, by the kernel's id.
