@@ -1,4 +1,4 @@
-"""What the controller needs of a protocol, and what a protocol may do with an axis."""
+"""Interface between controller and protocols, and between protocols and axes."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Protocol
@@ -23,7 +23,7 @@ class Event(Protocol):
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
 
 
 class DrivenAxis(Protocol):
@@ -43,7 +43,7 @@ class DrivenAxis(Protocol):
 
     @property
     def feedback(self) -> Feedback | None:
-        """What its valve says of itself."""
+        """Feedback of its valve."""
 
     @property
     def tripping(self) -> bool:
@@ -69,7 +69,7 @@ class FrameHandler(Protocol):
     """Receives frames that are known by more than their identifier."""
 
     def receive(self, frame: Frame, arrived_ns: int, /) -> FrameFault:
-        """Receive one; what is wrong with it."""
+        """Receive a frame, and return its fault."""
 
 
 class ForwardingRule(Protocol):
@@ -89,7 +89,7 @@ class ForwardingRule(Protocol):
         """A frame of our own, where the axes have just moved and the joystick sends none."""
 
     def last(self) -> list[Frame]:
-        """What is sent before we go."""
+        """Return the last frames before we go."""
 
 
 class BusProtocol:
@@ -109,7 +109,7 @@ class BusProtocol:
         return frozenset()
 
     def handler(self, frame: Frame) -> FrameHandler | None:
-        """What receives a frame that is none of ``inputs``."""
+        """Return the handler of a frame that is none of ``inputs``."""
 
     def usual(self, frame: Frame) -> bool:
         """Whether such a frame is no fault though no DBC file knows it."""
@@ -120,11 +120,11 @@ class BusProtocol:
         return FrameFault.NONE
 
     def frames(self, now_ns: int) -> Iterable[Frame]:
-        """What is due now, besides commands and status."""
+        """Return the frames due now, besides commands and status."""
         return ()
 
     def changes(self) -> Iterable[Event]:
-        """What is to be logged since the last call."""
+        """Return the events for the log since the last call."""
         return ()
 
     def stalled(self) -> None:
@@ -143,5 +143,5 @@ class BusProtocol:
         """The next frame of every valve is the last one."""
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
-        """What a reload carries over besides ``inputs``; ``places`` is what the buses are."""
+        """Yield parts that a reload carries over besides ``inputs``; ``places``: keys of buses."""
         yield from ()

@@ -76,12 +76,12 @@ class CanopenNetwork(BusProtocol):
         return FrameFault.HEARTBEAT_LOST if lost else FrameFault.NONE
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """Our boot-up messages and heartbeats, and commands to start others."""
+        """Yield our boot-up messages and heartbeats, and commands to start others."""
         for nodes in self.nodes.values():
             yield from nodes.frames(now_ns)
 
     def changes(self) -> Iterator[NodeEvent]:
-        """What other nodes say else than at the last call."""
+        """Yield events of other nodes that have changed since the last call."""
         for nodes in self.nodes.values():
             yield from nodes.changes()
 
@@ -91,6 +91,6 @@ class CanopenNetwork(BusProtocol):
             control.hold()
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
-        """What a reload carries over: our heartbeats."""
+        """Yield the parts that a reload carries over: our heartbeats."""
         for bus, nodes in self.nodes.items():
             yield ("canopen", *places[bus], nodes.own), nodes

@@ -34,7 +34,7 @@ class NodeEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         return f"bus={self.bus} node={self.node} {self.status}"
 
 
@@ -102,7 +102,7 @@ class RemoteNode:
         self.state = None
 
     def copy_state(self, before: Self) -> None:
-        """What the same node said last, and when."""
+        """Copy the last message of the same node, and its time."""
         self.state, self.emergency = before.state, before.emergency
         self._last_frame_ns, self._start_ns = before._last_frame_ns, before._start_ns
 
@@ -115,7 +115,7 @@ class RemoteNode:
 
     @property
     def works(self) -> bool:
-        """Whether what it sends and takes means something."""
+        """Whether the node is operational without an emergency, so that its data count."""
         return self.state == NodeState.OPERATIONAL and self.emergency == NO_EMERGENCY
 
 
@@ -191,7 +191,7 @@ class CanopenBus:
         self._due_ns = before._due_ns
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """What is due now: our boot-up message or heartbeat, and commands to start."""
+        """Yield the frames due now: our boot-up message or heartbeat, and commands to start."""
         if self._due_ns is None:
             self._due_ns = now_ns + self._cycle_ns
             yield Frame(self._bus, HEARTBEAT + self.own, False, BOOT_UP)
@@ -209,7 +209,7 @@ class CanopenBus:
         return sum(node.lost(now_ns) for node in self.nodes.values())
 
     def changes(self) -> Iterator[NodeEvent]:
-        """What the nodes say else than at the last call."""
+        """Yield events of nodes that have changed since the last call."""
         for name, node in self.nodes.items():
             state = "lost" if node.state is None else _name(node.state)
             status = f"state={state} emergency={node.emergency:#06x}"

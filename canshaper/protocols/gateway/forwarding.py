@@ -79,7 +79,7 @@ class ForwardedJoystick:
         return self._message.own(enabled=stopping)
 
     def last(self) -> list[Frame]:
-        """What is sent before we go: neutral, where the last frame was not."""
+        """Return the last frames before we go: neutral, where the last frame was not."""
         return [self._message.own(enabled=False)] if self.moves else []
 
     def _any_moves(self) -> bool:
@@ -116,7 +116,7 @@ class Gateway(BusProtocol):
             self.forwarding[key] = ForwardedJoystick(message, cycle_ms, joystick, runners)
 
     def usual(self, frame: Frame) -> bool:
-        """What no one knows there is what is passed on."""
+        """Whether the frame is forwarded traffic, and so no unknown id."""
         return frame.bus in self._buses
 
 
@@ -157,7 +157,7 @@ def all_but(excluded: Iterable[Pattern]) -> list[Pattern]:
 
 
 def _without(whole: Pattern, hole: Pattern) -> list[Pattern]:
-    """What of ``whole`` is left: for each bit that only ``hole`` cares about, the other value."""
+    """Return what is left of ``whole``: for each bit that only ``hole`` tests, the other value."""
     if (whole.value ^ hole.value) & whole.mask & hole.mask:
         return [whole]  # they do not meet
     left = []

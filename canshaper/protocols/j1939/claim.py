@@ -147,7 +147,7 @@ class AddressClaim:
         self._due_ns = time_ns if self._due_ns is None else min(time_ns, self._due_ns)
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """What is due now: claims, and answers to requests for what we do not have."""
+        """Yield the frames due now: claims, and answers to requests for what we do not have."""
         if self._due_ns is not None and now_ns >= self._due_ns:
             lost = self.state is ClaimState.LOST
             if self._request_first and not lost:
@@ -174,7 +174,7 @@ class AddressClaim:
         self._refused.clear()
 
     def repeat(self) -> None:
-        """Something did not go out; what we are is said once more."""
+        """Claim once more, unless the address is lost: something did not go out."""
         if self.state is not ClaimState.LOST:
             self._claim_at(self._again_ns)
 
@@ -241,7 +241,7 @@ class Node:
         return FrameFault.ADDRESS_LOST if lost else FrameFault.NONE
 
     def frames(self, active: Sequence[tuple[int, int]], now_ns: int) -> Iterator[Frame]:
-        """What is due now; ``active`` are (SPN, FMI) of the faults that are there."""
+        """Yield the frames due now; ``active``: (SPN, FMI) of the present faults."""
         yield from self._claim.frames(now_ns)
         if self._guest:
             return

@@ -85,7 +85,7 @@ class ActiveFaults:
     def frames(
         self, active: Sequence[tuple[int, int]], now_ns: int, *, requested: bool = False
     ) -> Iterator[Frame]:
-        """What is due now.
+        """Yield the frames due now.
 
         Args:
             active: (SPN, FMI) of every fault that is there now.

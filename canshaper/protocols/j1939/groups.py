@@ -21,7 +21,7 @@ class SourceEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         text = f"bus={self.bus} message={self.message} source={self.source:#04x}"
         return (
             text

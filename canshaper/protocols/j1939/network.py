@@ -31,7 +31,7 @@ class AddressEvent:
 
     @property
     def text(self) -> str:
-        """For the log."""
+        """Line for the log."""
         return f"bus={self.bus} address={self.address:#04x} state={self.state.value}"
 
 
@@ -98,7 +98,7 @@ class J1939Network(BusProtocol):
         self._any[bus, group_of(can_id)] = entry.rest, one
 
     def handler(self, frame: Frame) -> FrameHandler | None:
-        """What receives a frame, by its group."""
+        """Return the handler of the group of a frame."""
         if not frame.extended:
             return None
         return self._groups.get((frame.bus, group_of(frame.can_id)))
@@ -114,12 +114,12 @@ class J1939Network(BusProtocol):
         return frozenset(n for n, node in self.nodes.items() if node.state is not claimed)
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """What the nodes have to send now."""
+        """Yield the frames that the nodes have to send now."""
         for bus, node in self.nodes.items():
             yield from node.frames(self._active_faults(bus), now_ns)
 
     def changes(self) -> Iterator[AddressEvent | SourceEvent]:
-        """What became of our addresses since the last call, and which others are new."""
+        """Yield changes of our addresses since the last call, and new addresses of others."""
         for bus, node in self.nodes.items():
             if node.state is not self._reported[bus]:
                 self._reported[bus] = node.state
@@ -144,13 +144,13 @@ class J1939Network(BusProtocol):
             node.on_bus_off()
 
     def invalidate(self, bus: str | None = None) -> None:
-        """Of inputs from any address nothing received so far counts; of one bus, or of all."""
+        """Invalidate inputs from any address, of one bus or of all."""
         for (where, _), (one, _) in self._any.items():
             if bus in (None, where):
                 one.invalidate()
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
-        """What a reload carries over, see ``parts``; ``places`` is what the buses are, by name."""
+        """Yield parts that a reload carries over, see ``parts``; ``places``: keys of buses."""
         for (bus, group), (source, received) in self._any.items():
             yield ("source", *places[bus], group), source
             yield ("input", *places[bus], group), received
