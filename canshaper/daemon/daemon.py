@@ -209,7 +209,7 @@ class Daemon:
         self._follower = tick_follower(deployment, self._controller)
 
     def _in_line(self, deployment: Deployment) -> "InlineGateway | None":
-        """What passes frames on, where we stand in a line."""
+        """Return the gateway that forwards frames, if this machine stands in a line."""
         if not deployment.config.gateway or deployment.listen_only:
             return None
         from canshaper.daemon.gateway import InlineGateway

@@ -83,7 +83,7 @@ class Bridge:
         self.sockets = opened
 
     def pass_on(self) -> int:
-        """Pass on what waits, but no more than a few; how many there were."""
+        """Pass on the waiting frames, but only a few; return how many there were."""
         if not self.sockets:
             self._reopen()
         count = 0
@@ -124,7 +124,7 @@ class Bridge:
 
 
 class InlineGateway:
-    """What a gateway asks of the daemon besides its ticks.
+    """Forwarding of an inline gateway by the daemon, and its check of the kernel's rules.
 
     Args:
         deployment: one with a gateway.
@@ -156,7 +156,7 @@ class InlineGateway:
         ports: Mapping[str, Port],
         standstill: Standstill,
     ) -> None:
-        """Until a deadline pass on what comes; frames of the joysticks first.
+        """Pass on incoming frames until a deadline; frames of the joysticks first.
 
         What comes later is left to the tick, which knows whether the loop stood still: it must not
         leave with the velocities from before.
@@ -184,7 +184,7 @@ class InlineGateway:
         return self._bridge.pass_on() if self._bridge else 0
 
     def check(self, now_ns: int, *, neutral: bool) -> None:
-        """Tell when the rules of the kernel are not those that they should be.
+        """Log when the rules of the kernel are not those that they should be.
 
         Looked at now and then, and only while nothing moves: it takes a part of a tick.
         """

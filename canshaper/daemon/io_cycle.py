@@ -80,7 +80,7 @@ class FrameProcessor(Protocol):
         """The loop stood still for too long: what comes before the next tick has waited."""
 
     def tick(self, now_ns: int, missed: int) -> Iterator[Frame]:
-        """One tick: the frames to send now."""
+        """Run one tick, and yield the frames to send now."""
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus."""
@@ -90,7 +90,7 @@ class FrameProcessor(Protocol):
 
 
 class FramePort(Protocol):
-    """What a cycle needs of a bus, see ``Port``; or of what stands for one."""
+    """Bus as a cycle needs it, see ``Port``; or a substitute for one."""
 
     @property
     def arrived_ns(self) -> int:
@@ -100,7 +100,7 @@ class FramePort(Protocol):
         """Every frame that waits, in order."""
 
     def background(self) -> Iterator[Frame]:
-        """What can wait until the valves have their commands."""
+        """Yield frames that can wait until the valves have their commands."""
 
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; whether the frame went out."""

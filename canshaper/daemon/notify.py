@@ -43,7 +43,7 @@ class ServiceManager:
         self._send_surely(f"READY=1\nSTATUS={status}{limit}")
 
     def reloading(self) -> None:
-        """What was read is being put to work, and the loop waits; ``ready`` ends it.
+        """Report that a reload is being applied, and the loop waits; ``ready`` ends it.
 
         Until then the watchdog has more patience. systemd ends this state after TimeoutStartSec, so
         waiting for neutral is no part of it.

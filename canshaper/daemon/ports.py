@@ -53,12 +53,12 @@ def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Por
 
 
 def waiting(ports: Iterable[Port]) -> list[Frame]:
-    """What waits in ports that are about to be closed."""
+    """Return the frames that wait in ports that are about to be closed."""
     return [frame for port in ports for frame in (*port.frames(), *port.background())]
 
 
 def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame]:
-    """What new ports receive at first, without what we send: that is our own from the ports before.
+    """Return the first frames of new ports, without our own from the ports before.
 
     They cannot know it for ours, and it would look like a second sender of every valve's id.
     """

@@ -1,4 +1,4 @@
-"""What people read of the daemon: the journal, and the service manager's line."""
+"""Reports of the daemon: the journal, and the service manager's line."""
 
 import logging
 from collections.abc import Mapping
@@ -84,7 +84,7 @@ class Reporter:
         self._status_ns = boottime_ns() + SECOND_NS
 
     def refused(self, why: str) -> None:
-        """Why a reload changes nothing."""
+        """Log why a reload changes nothing."""
         lines = why.splitlines()
         for line in lines:
             log.error("reload=refused %s", line)
@@ -92,7 +92,7 @@ class Reporter:
         self.hold_status()
 
     def identity(self) -> None:
-        """What runs, by its hashes: a machine that was signed off is compared with these."""
+        """Log the hashes of what runs: a machine that was signed off is compared with these."""
         deployment = self._controller.deployment
         for line in deployment.identity.lines():
             log.info("identity %s", line)
