@@ -39,7 +39,7 @@ class BoxSegment(NamedTuple):
 
 @dataclass
 class Box:
-    """What a black box has.
+    """Content of a black box.
 
     Attributes:
         path: the file.

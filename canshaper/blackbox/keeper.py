@@ -60,7 +60,7 @@ class BlackBox:
         self._done, self._fault = 0, ""
 
     def around(self, guarded: Guarded, controller: Controller) -> Recorder:
-        """What records all that goes into a controller and comes out; ``begin`` starts it."""
+        """Return a recorder of all calls to a controller and their results; ``begin`` starts it."""
         deployment = controller.deployment
         self._flush()
         self._ring.pause()
@@ -82,7 +82,7 @@ class BlackBox:
         self._keep_state(now_ns, follows=False)
 
     def after_tick(self, now_ns: int, events: Iterable[object], *, neutral: bool) -> None:
-        """What can wait until the frames are out.
+        """Do what can wait until the frames are out.
 
         Args:
             now_ns: time of the tick.

@@ -16,7 +16,7 @@ CHUNK = 8  # bytes of a text in one record
 
 
 class Kind(IntEnum):
-    """What a record says. The numbers stand in files."""
+    """Kind of a record. The numbers stand in files."""
 
     TICK = 1
     """A tick begins; ``number`` deadlines were missed before it."""
@@ -80,7 +80,7 @@ KEPT_NS = 60_000_000_000
 
 
 class Segment:
-    """What happened from one state of the controller on.
+    """Records from one saved state of the controller on.
 
     Attributes:
         state: of the controller when it begins, see ``canshaper.blackbox.state``.

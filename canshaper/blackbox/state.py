@@ -96,7 +96,7 @@ class States:
         self._packages = {name for name in packages if name.startswith("canshaper.")}
 
     def save(self) -> bytes:
-        """What the controller knows now.
+        """Return what the controller knows now.
 
         Raises:
             StateError: something in it cannot be kept.
@@ -137,7 +137,7 @@ class States:
         return number
 
     def _find(self, module: str, name: str) -> Any:
-        """What a state may name."""
+        """Return the class or function of a name; a state may name only some."""
         if name == _fixed.__name__ and module == __name__:
             return self._fixed.__getitem__
         value = getattr(sys.modules.get(module), name, None)

@@ -63,7 +63,7 @@ def write_box(folder: Path, deployment: Deployment, segments: Iterable[Segment],
 
 
 def header_of(deployment: Deployment, why: str) -> dict[str, Any]:
-    """What a replay has to know before it begins.
+    """Return the header, which a replay needs before it begins.
 
     Returns:
         ``buses``: their names by the numbers in the records; ``listen_only``; ``identity`` of
@@ -106,7 +106,7 @@ def carried(deployment: Deployment) -> tuple[str, dict[str, str | bytes]]:
 
 
 def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
-    """What ``about.json`` of a bundle says.
+    """Return the content of ``about.json`` of a bundle.
 
     Args:
         deployment: whose bundle it is.
@@ -124,7 +124,7 @@ def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """What ran here: program, interpreter, packages, kernel."""
+    """Return the versions of program, interpreter, packages and kernel."""
     installed = {"canshaper": version("canshaper"), "python": platform.python_version()}
     for name in PACKAGES:
         try:
