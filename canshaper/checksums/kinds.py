@@ -55,7 +55,7 @@ class Checksum:
         return self.protect(data, 0) == data
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """The same frame with its checksum; the counter is one of its signals."""
+        """Return the frame with its checksum; the counter is one of its signals."""
         row, first, order = CHECKSUMS[self.kind], self.byte, self.order
         bits = row.bits
         size = (bits + 7) // 8
@@ -111,7 +111,7 @@ class ChecksumKind:
 
     @property
     def kernel(self) -> Xor | Crc8 | None:
-        """What can-gw of the kernel computes the same from; None where it cannot."""
+        """Algorithm by which can-gw of the kernel computes the same; None where it cannot."""
         algorithm = self.algorithm
         return algorithm if isinstance(algorithm, Xor | Crc8) else None
 
@@ -201,9 +201,9 @@ deployment names them."""
 
 _OURS = frozenset(CHECKSUMS)
 _NUMBERS: dict[str, tuple[int, int, int, int, bool]] = {}
-"""What ``crc_kind`` made a row from, by its name."""
+"""Numbers from which ``crc_kind`` made a row, by its name."""
 _SHA256: dict[str, str] = {}
-"""Of the modules that added a kind, by kind."""
+"""SHA-256 of the modules that added a kind, by kind."""
 
 
 def known_checksum(kind: object) -> str:
@@ -254,7 +254,7 @@ def checksum_table() -> Iterator[str]:
 
 @cache
 def _packages() -> dict[str, list[EntryPoint]]:
-    """What packages declare, by name: read once, and when a deployment has a checksum."""
+    """Return the entry points of packages by name: read once, when a deployment has a checksum."""
     declared: dict[str, list[EntryPoint]] = {}
     for entry in entry_points(group=GROUP):
         declared.setdefault(entry.name, []).append(entry)
