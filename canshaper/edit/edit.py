@@ -169,7 +169,7 @@ def _replace(path: Path, before: str, text: str, expected: Any) -> None:
 
 
 def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | None]]:
-    """What a file's sections get: numbers by their keys, such as ``axes.slew.sway.period_s``.
+    """Return the numbers of each section of a file, by keys such as ``axes.slew.sway.period_s``.
 
     What says where a sway model was measured is taken out: it is no longer what was measured.
     """
