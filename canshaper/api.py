@@ -36,7 +36,7 @@ def load_machine(file: str | Path) -> Deployment:
 
 
 class AxisState(NamedTuple):
-    """What an axis does.
+    """State, reason and output of an axis.
 
     Attributes:
         state: its state.
@@ -109,14 +109,14 @@ class Controller:
         return self._guarded.neutral_frames()
 
     def axes(self) -> dict[str, AxisState]:
-        """What each axis does, by its name."""
+        """Return the state of each axis by its name."""
         runners = self._inner.axes.items()
         return {
             name: AxisState(one.axis.state, one.axis.reason, one.axis.sent) for name, one in runners
         }
 
     def events(self) -> list[Event]:
-        """What has happened since the last call: changes of states, valves, other nodes.
+        """Return the events since the last call: changes of states, valves, other nodes.
 
         Returns:
             Events, oldest first; each has a ``text`` as in the log of the daemon.
