@@ -125,7 +125,7 @@ class NodeError(CanshaperError):
 
 
 class PageMessageError(CanshaperError, ValueError):
-    """What a page sent is no message; says what was expected and what came."""
+    """A page sent something that is no message; says what was expected and what came."""
 
 
 class LogError(CanshaperError, ValueError):
