@@ -1,4 +1,4 @@
-"""What is installed: the version, and the files that come with it (deployments, DBC files)."""
+"""The installation: its version, and the files that come with it (deployments, DBC files)."""
 
 from importlib.metadata import version as _version_of
 from pathlib import Path
