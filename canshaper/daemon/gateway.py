@@ -203,7 +203,7 @@ class InlineGateway:
 
 
 def rules_fault(expected: list[Rule]) -> str:
-    """What is wrong with the kernel's rules while the daemon runs; empty where nothing is."""
+    """Return the faults of the kernel's rules while the daemon runs; empty without any."""
     try:
         present = between({rule.source for rule in expected}, rules())
     except GatewayError as error:
