@@ -1,4 +1,4 @@
-"""What several verbs share: deployments by name, bus options, pictures, errors for people."""
+"""Shared parts of the verbs: deployments by name, bus options, pictures, errors for people."""
 
 import shlex
 import signal
@@ -128,7 +128,7 @@ def fail(error: Exception, code: int | None = None) -> typer.Exit:
 
 @contextmanager
 def os_errors(path: Path) -> Iterator[None]:
-    """What the system refuses in the block is an error for the person: which file, and why."""
+    """Report an OSError in the block as an error for the person: which file, and why."""
     try:
         yield
     except OSError as error:

@@ -77,7 +77,7 @@ def run_fleet(
     folders: Sequence[Path],
     on_progress: Callable[[float], object],
 ) -> list[Log]:
-    """Do the same with every log; in the order of machines and logs.
+    """Do the work with every log; return the logs in the order of machines and paths.
 
     Args:
         engine: who does it.
@@ -218,7 +218,7 @@ _PERIODS = {"period_s": "{:.3f}", "damping_ratio": "{:.4f}"}
 
 
 def show_replays(logs: Sequence[Log], results: SafeConsole) -> None:
-    """Of each deployment a row for each log and axis; then all logs together.
+    """Show a table of each deployment with a row for each log and axis; then all logs together.
 
     Log and axis are one column: the first one stands in every part of a table that is cut.
     """

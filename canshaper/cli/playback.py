@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from canshaper.studio.playback_app import Choice
 
 MOST_DEPLOYMENTS = 2
-"""Besides the recorded crane, or the raw one: the page shows three."""
+"""Deployments besides the recorded crane, or the raw one: the page shows three."""
 BUNDLE = ".zip"
 
 
@@ -37,7 +37,7 @@ def opened_drives(
     window: "Window",
     changes: Sequence[str],
 ) -> "list[Choice]":
-    """What can be chosen in the page; the first one is made, so that its errors are reported here.
+    """Return the drives to choose from in the page; the first is made, to report its errors here.
 
     Args:
         file: log, black box or recording; of seeds the deployment.

@@ -1,4 +1,4 @@
-"""What a verb shows: lines and tables on the terminal, pictures, and all of it as one HTML file."""
+"""Output of a verb: lines and tables on the terminal, pictures, and all of it as one HTML file."""
 
 import io
 import shlex

@@ -1,4 +1,4 @@
-"""What a person knows of a new machine, from which its first deployment file is written."""
+"""Knowledge of a person about a new machine, for its first deployment file."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -74,7 +74,7 @@ class Stopwatch:
 
     @property
     def sway(self) -> Sway:
-        """The same as sway data of an axis."""
+        """Sway data of an axis, as measured by the stopwatch."""
         period, decay = (float(rounded(v)) for v in (self.period_s, self.decay_per_swing))
         speed = self.full_speed_m_s
         return Sway(period_s=period, decay_per_swing=decay, full_speed_m_s=speed)
@@ -89,7 +89,7 @@ class FirstSlewing:
 
     @property
     def full_speed_m_s(self) -> float:
-        """Of the tip, farthest out."""
+        """Full speed of the tip, farthest out."""
         return self.full_speed_rad_s * self.largest_radius_m
 
 
@@ -138,7 +138,7 @@ class FirstCia408:
 
 @dataclass(frozen=True)
 class FirstScaling:
-    """What a signal means where the DBC does not say it.
+    """Meaning of a signal where the DBC does not give it.
 
     ``flags`` are those of neutral, negative and positive, ``negative`` is the second signal of a
     rocker.
@@ -171,7 +171,7 @@ class FirstAxis:
     cycle_ms: int | None = None
     cia408: FirstCia408 | None = None
     node: str | None = None
-    """Of a valve on CANopen without CiA 408."""
+    """CANopen node of a valve without CiA 408."""
     codes: Mapping[str, str] = field(default_factory=dict)
     """Codes of its command, see ``NamedCodes``."""
 
@@ -191,7 +191,7 @@ class FirstMachine:
     interface: str = "socketcan"
     canopen: FirstCanopen | None = None
     data_bitrate: int | None = None
-    """Of a bus of CAN FD."""
+    """Bit rate of the data of a bus of CAN FD."""
     notes: Sequence[str] = field(default=())
 
 

@@ -184,7 +184,7 @@ def _joystick(
 def _switch_elsewhere(
     message: "Message", messages: "list[Message]", before: "Sequence[FirstJoystick]"
 ) -> tuple[str | None, str | None, str | None, int | None]:
-    """Of a joystick without a switch in its own message that enables it.
+    """Ask for the enable switch of a joystick that has none in its own message.
 
     Returns:
         message and signal of its enable switch, or None and None and the joystick that shares its;

@@ -82,7 +82,7 @@ class Nodes:
         return self._pdos[message][0] if message in self._pdos else None
 
     def supervised(self, message: str) -> str | None:
-        """The same, of a node that has a heartbeat."""
+        """Name of the node that a message is of, if that node has a heartbeat."""
         if (name := self.name_of(message)) is None:
             return None
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
@@ -132,7 +132,7 @@ class Nodes:
         return FirstCanopen(ours, master, nodes)
 
     def parameters(self, uses: "dict[str, MessageTiming]") -> "list[Parameter]":
-        """What has to be set in the nodes of messages that are used so."""
+        """Return the parameters that have to be set in the nodes of messages with these timings."""
         if not self.named:
             return []
         from canshaper.commissioning.nodes.parameters import parameters
@@ -144,7 +144,7 @@ class Nodes:
         ]
 
     def missing(self, uses: "dict[str, MessageTiming]") -> Iterator[str]:
-        """What they do not have."""
+        """Yield what the nodes of messages with these timings do not have."""
         if not self.named:
             return
         from canshaper.commissioning.nodes.parameters import missing

@@ -15,7 +15,7 @@ MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
 
 
 def command_scaling(signal: "Signal", message: "Message") -> "FirstScaling":
-    """What the signal of a joystick means: around a value, with flags, or with a second signal."""
+    """Ask how a joystick signal gives a command: around a value, with flags, or by two signals."""
     from canshaper.cli.interview.first import FirstScaling
     from canshaper.codec.signals import magnitude_range, symmetrical_range
     from canshaper.commissioning import suggest
@@ -42,7 +42,7 @@ def command_scaling(signal: "Signal", message: "Message") -> "FirstScaling":
 
 
 def valve_scaling(signal: "Signal") -> "FirstScaling":
-    """What the signal of a valve means."""
+    """Ask for the scaling of a valve's signal."""
     from canshaper.cli.interview.first import FirstScaling
     from canshaper.codec.signals import symmetrical_range
     from canshaper.commissioning import suggest

@@ -46,7 +46,7 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
 def sensor_of(
     axis: str, swing_s: float, others: "list[Message]", bound: "list[FirstAxis]"
 ) -> "FirstSensor | None":
-    """What measures the swing of an axis; ``others`` are messages left, ``bound`` axes have one."""
+    """Ask for the sway sensor of an axis; ``others``: messages left; ``bound``: axes with one."""
     from canshaper.cli.interview.first import FirstSensor
     from canshaper.commissioning import suggest
     from canshaper.config.inputs import SwaySensorSection

@@ -206,7 +206,7 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
 
 
 def _load(deployment: "Deployment", bus: str) -> str:
-    """What its messages make of a bus, in words."""
+    """Return the load of a bus by its messages, in words."""
     from canshaper.machine.buses import BUSY
 
     load = deployment.load(bus)

@@ -126,7 +126,7 @@ def _residuals(table: "list[Row]") -> "Table":
 
 
 def _felt(table: "list[Row]") -> "Table":
-    """What the operator feels of each filter."""
+    """Return a table of what the operator feels of each filter."""
     from canshaper.report.console import new_table
 
     heads = ["rise\ns", "stop\ns", "stop\nm", "slew\nm", "dip\n%", "re-\nrise", "peak\ndeg"]
@@ -156,7 +156,7 @@ def _worst(table: "list[Row]") -> "Table":
 
 
 def _limits(limits: "list[Least]") -> "Table":
-    """What no shaper of near-far can beat, by duration."""
+    """Return a table of limits that no shaper of near-far can beat, by duration."""
     from canshaper.report.console import new_table
 
     heads = ("ours\n±15 %", "no dip\n±15 %", "any\n±15 %", "no dip\n±30 %")

@@ -96,7 +96,7 @@ def _log_folder() -> Path | None:
 def _changed(
     load: "Callable[[], Deployment]", *, listen_only: bool, simulated: bool, control: str | None
 ) -> "Callable[[], Deployment]":
-    """The same with these options put in."""
+    """Return a loader of the deployment with these options put in."""
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError, Problem
     from canshaper.machine.stopping import rehearsed_valves, unstated

@@ -136,7 +136,7 @@ def _task(
     required: dict[str, Any],
     **options: Any,
 ) -> "Task":
-    """What the options ask, with what the deployment says of the axis where they say nothing."""
+    """Return the task of the tuner: the options, else the values of the deployment."""
     from canshaper.design.tuning.formulation import Requirements, Task, Weights
 
     limits = bound.config.limits
