@@ -14,7 +14,7 @@ ANSWER_S = 5.0
 
 
 def table(path: Path) -> dict[str, dict[str, float]]:
-    """What is adjustable: by its key the value ``now``, that of the ``file``, ``low``, ``high``.
+    """Return the adjustable numbers by key, with ``now``, ``file``, ``low`` and ``high``.
 
     Raises:
         ControlError: no daemon answers.

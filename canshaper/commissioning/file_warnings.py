@@ -1,4 +1,4 @@
-"""What may be meant otherwise than it stands in a good deployment file."""
+"""Warnings about a valid deployment file, whose numbers may be meant otherwise."""
 
 from canshaper.config.source import Source
 from canshaper.errors import Problem

@@ -1,4 +1,4 @@
-"""What was designed or measured into the deployment file: a filter with its tail, any section."""
+"""Writing of results into the deployment file: a filter with its tail, any section."""
 
 from collections.abc import Iterator, Mapping
 from difflib import unified_diff
@@ -81,7 +81,7 @@ def write_filter(
 def _with_origin(
     config: AxisSection, filter_values: Mapping[str, FileValue], verb: str
 ) -> dict[str, FileValue]:
-    """The same with the origin of the design."""
+    """Return the values with the origin of the design."""
     designed_for = filter_values["designed_for"]
     assert isinstance(designed_for, Mapping)
     swing = config.sway.origin if config.sway else None
@@ -102,7 +102,7 @@ def _set_checked(path: Path, place: Place, values: Mapping[str, FileValue], comm
 
 
 def written_line(path: Path) -> str:
-    """What to do next."""
+    """Return the next thing to do, after the file was written."""
     return f"Written to {path}; a running daemon takes it with SIGHUP."
 
 

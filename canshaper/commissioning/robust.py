@@ -123,7 +123,7 @@ def summary_line(one: RobustDesign) -> str:
 
 
 def print_design(deployment: Deployment, one: RobustDesign, console: Console) -> None:
-    """What it does, what it costs, how far the tip travels with it."""
+    """Print the residuals of a shaper, its cost, and the stopping distance with it."""
     axis = one.bound.name
     console.print(summary_line(one))
     console.print(_table(one.measured))
@@ -172,7 +172,7 @@ def figure(one: RobustDesign) -> "Figure":
 
 
 def _evaluated(bound: BoundAxis, mode: SwayMode, tick_s: float, shaper: RobustShaper) -> Evaluation:
-    """What it does on the axis, with the taps as they stand in the file."""
+    """Measure the shaper on the axis, with the taps as they stand in the file."""
 
     rate = bound.config.limits.slowest_per_s
     taps = [round(tap, _DIGITS) for tap in shaper.taps]
@@ -187,7 +187,7 @@ def _evaluated(bound: BoundAxis, mode: SwayMode, tick_s: float, shaper: RobustSh
 def _second(
     text: str | None, first: SwayMode, tick_s: float, rate_per_s: float
 ) -> SecondMode | None:
-    """What --second asks for."""
+    """Return the second mode of the option --second."""
 
     if text is None:
         return None
@@ -253,7 +253,7 @@ def _table(measured: Evaluation) -> Table:
 
 
 def _second_table(one: RobustDesign) -> Table:
-    """What a second mode costs and gains."""
+    """Return a table of what a second mode costs and gains."""
     assert one.second
     second, without = one.second
     table = new_table("", "run-on, s", "mean delay, s", "first mode, %", "second mode, %")

@@ -53,7 +53,7 @@ def stopping(deployment: Deployment) -> list[Stopping]:
 
 
 def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: float | None) -> str:
-    """What another filter of an axis, and a longer tail, make of its stopping distance."""
+    """Return the stopping distance with another filter of an axis, and a longer tail, in words."""
     bound = deployment.axes[name]
     changes: dict[str, Any] = {"filter": chosen, "gain_schedule": [], "profiles": {}}
     one = _stopping(deployment, replace(bound, config=bound.config.model_copy(update=changes)))

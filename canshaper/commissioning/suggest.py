@@ -1,4 +1,4 @@
-"""What the messages of a DBC file look like: joysticks, valves, switches. Only a first guess."""
+"""Guesses from the messages of a DBC file: joysticks, valves, switches."""
 
 import math
 import re
@@ -35,7 +35,7 @@ def axes(message: Message) -> list[Signal]:
 
 
 def velocities(message: Message) -> list[Signal]:
-    """The same, and those that are with what the deployment file adds."""
+    """Return signals as ``axes``, and those that can be one with a scaling of the file."""
     return [s for s in message.signals if two_sided(s)]
 
 
@@ -155,7 +155,7 @@ def commands(message: Message) -> list[Signal]:
 
 
 def valve_signals(message: Message) -> list[Signal]:
-    """The same, or where there is none those that can with what the deployment file adds."""
+    """Return signals as ``commands``, or where there is none those that can with a scaling."""
     fine = [
         s
         for s in message.signals
@@ -186,7 +186,7 @@ def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
 
 
 def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Message, Signal]]:
-    """What can measure a swing of so many seconds, the likely ones first.
+    """Return signals that can measure a swing of so many seconds, the likely ones first.
 
     Not of J1939 where the sender is to be named besides.
     """

@@ -47,7 +47,7 @@ class _RampJoystick:
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> CommandInput:
-        """What the axis may use now."""
+        """Return the input that the axis may use now."""
         given = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
         usable = given.fault is None and given.enabled
         self.moved = usable and abs(given.command) > neutral_band
@@ -117,7 +117,7 @@ class CalibrationDrive:
 
     @property
     def waiting_for(self) -> str:
-        """What the axis still waits for, before the ramp begins."""
+        """Condition that the axis still waits for before the ramp begins; empty afterwards."""
         if self._begun_ns is not None:
             return ""
         axis = self._runner.axis
@@ -134,7 +134,7 @@ class CalibrationDrive:
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last is one of a valve, and any moves."""
+        """Whether the frame that was handed out last is that of a valve, and any axis moves."""
         return self._guarded.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
@@ -198,7 +198,7 @@ class CalibrationDrive:
         return self._guarded.neutral_frames()
 
     def result(self) -> Calibration:
-        """What was measured.
+        """Return the measured valve.
 
         Raises:
             CalibrationError: it did not go to its end, or makes no curve.

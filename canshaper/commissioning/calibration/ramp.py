@@ -68,7 +68,7 @@ class Ramp:
         return min(self.top, max(0.0, min(rising, falling))) * (1.0 if half == 0 else -1.0)
 
     def part(self, time_s: float) -> str:
-        """What the time belongs to: settling, rest, up, hold, held or down, and the direction.
+        """Return the part of the ramp: settling, rest, up, hold, held or down, and the direction.
 
         A rest, and the largest command, are measured in their second half, when all has settled.
         """

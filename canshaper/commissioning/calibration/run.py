@@ -92,7 +92,7 @@ def run_live(
 
 
 def _restore(handlers: dict[signal.Signals, Any]) -> None:
-    """What signals did before the measurement."""
+    """Restore the signal handlers from before the measurement."""
     for number, handler in handlers.items():
         signal.signal(number, handler)
 

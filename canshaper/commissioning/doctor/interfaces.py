@@ -150,7 +150,7 @@ def fd(link: Link, bus: Bus) -> list[Finding]:
 
 
 def fd_options(bus: Bus) -> str:
-    """What ``ip link set ... type can`` needs for CAN FD, with a blank behind it."""
+    """Return the CAN FD options of ``ip link set ... type can``, with a blank behind them."""
     if not bus.fd:
         return ""
     return f"dbitrate {bus.data_bitrate or bus.bitrate or 2_000_000} fd on "

@@ -55,7 +55,7 @@ class Link:
         return self._rate("data_bittiming")
 
     def _rate(self, timing: str) -> int | None:
-        """Of a timing; of an adapter without timings, what it says itself."""
+        """Return the rate of a timing; of an adapter without timings, the rate that it reports."""
         rate = self.data.get(timing, {}).get("bitrate", self.data.get(f"{timing}_bitrate"))
         return int(rate) if rate else None
 

@@ -134,7 +134,7 @@ class Loop:
         self._collector.pause(now_ns)
 
     def record(self) -> dict[str, Any]:
-        """What happened: the fields of ``Record``."""
+        """Return the record of the run: the fields of ``Record``."""
         return {
             "late_ns": list(self._late),
             "began_ns": list(self._began),

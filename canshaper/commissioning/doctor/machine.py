@@ -167,7 +167,7 @@ def idle_states(root: Path, tick_ms: int) -> Finding:
 
 
 def clock_source(root: Path) -> Finding:
-    """What the kernel reads the time from."""
+    """Check how quickly the kernel reads the time."""
     directory = root / "sys/devices/system/clocksource/clocksource0"
     name = _read(directory / "current_clocksource")
     if name is None:
@@ -237,7 +237,7 @@ def processors(root: Path, number: int) -> Finding:
 
 
 def others(load: float, number: int) -> Finding:
-    """What else was running before the first run: the run called idle has it too.
+    """Check what else was running before the first run: the run called idle has it too.
 
     Args:
         load: processes that ran or waited for a processor, mean of a minute.

@@ -22,7 +22,7 @@ PATIENCE_S = 120.0
 
 @dataclass(frozen=True)
 class Run:
-    """What was measured in one run; times in ns.
+    """Measurements of one run; times in ns.
 
     Attributes:
         late_ns: how late each tick began after its deadline; without the first, which sets them.

@@ -92,7 +92,7 @@ def ready(process: "subprocess.Popen[str]") -> None:
 
 
 def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
-    """What a child printed until its end.
+    """Wait for the end of a child, and return its output.
 
     Raises:
         MeasurementError: it failed.
@@ -105,7 +105,7 @@ def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
 
 
 def be() -> None:
-    """What a child does: tie itself to its parent, however that ends; then its ``main``."""
+    """Run a child: tie it to its parent, however that ends; then call its ``main``."""
     options: dict[str, Any] = json.loads(sys.argv[1])
     end_with_parent(signal.SIGKILL)
     if os.getppid() != options["parent"]:  # it ended before that call

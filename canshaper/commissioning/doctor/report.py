@@ -1,4 +1,4 @@
-"""What the doctor found, for people and as numbers."""
+"""Report of the doctor, for people and as numbers."""
 
 import platform
 from collections.abc import Iterator

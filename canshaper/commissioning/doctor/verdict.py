@@ -59,7 +59,7 @@ def histogram(times_ns: Sequence[int]) -> dict[int, int]:
 
 
 class Level(Enum):
-    """What a finding means for the deployment."""
+    """Severity of a finding for the deployment."""
 
     OK = "ok"
     NOTE = "note"
@@ -116,7 +116,7 @@ def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Find
 
 
 def waiting(deployment: Deployment) -> list[Finding]:
-    """That joystick frames wait for the tick where they need not; measured is without that."""
+    """Note that joystick frames wait for the tick unnecessarily; measured without that wait."""
     config = deployment.config
     subject = "wait for the tick"
     if config.tick:
@@ -148,7 +148,7 @@ def _share_finding(
 
 
 def _held_up(run: Run) -> str:
-    """What helps where others kept the loop from running."""
+    """Return a remedy where other processes kept the loop from running."""
     return AS_ROOT if run.policy else REAL_TIME
 
 

@@ -48,7 +48,7 @@ class Samples:
 def joystick_commands(
     joystick: BoundJoystick, axes: Mapping[str, BoundAxis], data: bytes
 ) -> tuple[dict[str, Any], dict[str, float]]:
-    """Raw values of a joystick's frame, and the command of each axis that it has one of.
+    """Decode a joystick's frame: its raw values, and the command of each of its axes.
 
     Both are empty for a frame of another length; a command that is no value is left out.
     """
@@ -118,7 +118,7 @@ class Commands:
 
     @staticmethod
     def _of(axis: str, kinds: Sequence[Mapping[str, Samples]]) -> Command | None:
-        """Of the first kind that the log has."""
+        """Return the command of the first kind that the log has."""
         for kind in kinds:
             if (samples := kind.get(axis)) and samples.value:
                 time, speed = samples.arrays()
@@ -166,7 +166,7 @@ def _while(command: Command, is_so: NDArray[np.bool_]) -> list[tuple[float, floa
 def _common(
     one: list[tuple[float, float]], other: list[tuple[float, float]]
 ) -> list[tuple[float, float]]:
-    """What two lists of stretches, each in order, have in common."""
+    """Return the intersection of two lists of stretches, each in order."""
     common, i, j = [], 0, 0
     while i < len(one) and j < len(other):
         start, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])

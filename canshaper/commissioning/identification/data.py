@@ -1,4 +1,4 @@
-"""What ``canshaper identify`` was given: logs and tables, or a stopwatch, to findings."""
+"""Input of ``canshaper identify``, logs and tables or a stopwatch, to findings."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -32,7 +32,7 @@ UNNAMED = "swing"
 
 
 def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) -> Finding:
-    """What a stopwatch shows."""
+    """Return the finding of a stopwatch."""
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
         got = f"none of {', '.join(missing)}" if missing else f"the log {logs[0]}"
@@ -90,7 +90,7 @@ def logged(
     about_s: float | None,
     on_progress: OnProgress,
 ) -> list[Finding]:
-    """What logs show, by axis and label."""
+    """Return the findings of logs, by axis and label."""
     if not logs:
         raise UsageError(
             "expected a log or a stopwatch, got neither; see canshaper identify --help"
@@ -127,7 +127,7 @@ def logged(
 
 
 def measured_in(logs: Sequence[str], messages: Messages) -> dict[str, Any]:
-    """Origin of what logs show, or a stopwatch: no one knows what that was held at."""
+    """Origin of values from logs or a stopwatch; whether those are simulated may be unknown."""
     if not logs:
         return written_by("identify", simulated=None, log="stopwatch")
     paths = [_labelled(text)[1] for text in logs]

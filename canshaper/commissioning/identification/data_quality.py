@@ -1,4 +1,4 @@
-"""What makes a swing doubtful: a sensor at its end, two directions mixed in one signal."""
+"""Quality of the data of a swing: a sensor at its end, two directions mixed in one signal."""
 
 import math
 

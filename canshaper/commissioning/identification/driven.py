@@ -69,7 +69,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class DrivenFit:
-    """What the driven swing shows.
+    """Result of fitting the driven swing.
 
     Attributes:
         full_speed_m_s: speed of the tip at full command; None where the signal is no angle.
@@ -165,14 +165,14 @@ class _Problem:
         self._known_bases = bases_of(data, *known) if known else None
 
     def parts(self, x: Array) -> list[tuple[Array, Array, Array]]:
-        """Of each stretch: swing by commands at unit speed, free columns, commanded speed."""
+        """Return for each stretch: swing by unit commands, free columns, commanded speed."""
         omega, sigma = self.known or (float(x[2]), float(x[3]))
         driven = responses(self.data, omega, sigma, float(x[0]), float(x[1]))
         columns = [free_columns(one, omega, sigma) for one in self.data]
         return [(swing, free, speed) for (swing, speed), free in zip(driven, columns, strict=True)]
 
     def projected(self, x: Array) -> list[tuple[Array, Array]]:
-        """Of each stretch: unit swing and data, both without what free swings explain."""
+        """Return for each stretch: unit swing and data, both without what free swings explain."""
         omega, sigma = self.known or (float(x[2]), float(x[3]))
         driven = responses(self.data, omega, sigma, float(x[0]), float(x[1]))
         bases = self._known_bases or bases_of(self.data, omega, sigma)
@@ -194,7 +194,7 @@ class _Problem:
         return np.concatenate([y - gain * h for h, y in projected])
 
     def solved(self, start: Array) -> Any:
-        """What SciPy finds from a start."""
+        """Return the solution of SciPy from a start."""
         bounds, scale = (self._low, self._high), self._high
         return least_squares(self.residual, start, bounds=bounds, x_scale=scale, max_nfev=60)
 
@@ -210,7 +210,7 @@ class _Problem:
         return 1.0 - left / max(total, 1e-30)
 
     def result(self, x: Array) -> DrivenFit:
-        """What was found."""
+        """Return the fit at a solution."""
         projected = self.projected(x)
         gain = self.speed(projected)
         omega, sigma = self.known or (float(x[2]), float(x[3]))
@@ -258,7 +258,7 @@ class _Problem:
         return max(own, math.sqrt(spread * count / (count - 1)) / sum(squares))
 
     def _swing_deviations(self, x: Array) -> tuple[float, float]:
-        """Of period and damping ratio, by the noise at the frequency of the swing."""
+        """Return the deviations of period and damping ratio, by the noise around the swing."""
         columns = []
         for j, value in enumerate(x):
             step = np.zeros(len(x))

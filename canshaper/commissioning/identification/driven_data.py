@@ -74,7 +74,7 @@ def stretches(series: Series, period: float) -> list[Driven]:
 
 
 def _between(command: Command, first_s: float, last_s: float) -> Command:
-    """What is commanded in a time, with the command that holds at its start."""
+    """Return the commands in a time, with the command that holds at its start."""
     low = max(0, int(np.searchsorted(command.time_s, first_s, side="right")) - 1)
     part = slice(low, int(np.searchsorted(command.time_s, last_s, side="right")))
     return Command(command.time_s[part], command.speed[part])
@@ -84,7 +84,7 @@ SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
 
 
 def free_columns(one: Driven, omega: float, sigma: float) -> Array:
-    """What a stretch may show without a command: a free swing, an offset, a drift."""
+    """Return the columns of a stretch without a command: free swing, offset, drift."""
     t = one.time_s
     decay = np.exp(-sigma * t)
     return np.stack(
@@ -93,7 +93,7 @@ def free_columns(one: Driven, omega: float, sigma: float) -> Array:
 
 
 def bases_of(data: Sequence[Driven], omega: float, sigma: float) -> list[tuple[Array, Array]]:
-    """Of each stretch: an orthonormal basis of the free columns, and the data without them."""
+    """Return for each stretch: orthonormal basis of the free columns, and the data without them."""
     bases = []
     for one in data:
         q, _ = np.linalg.qr(free_columns(one, omega, sigma))
@@ -104,7 +104,7 @@ def bases_of(data: Sequence[Driven], omega: float, sigma: float) -> list[tuple[A
 def responses(
     data: Sequence[Driven], omega: float, sigma: float, delay: float, lag: float
 ) -> list[tuple[Array, Array]]:
-    """Of each stretch: swing by its commands at a full speed of 1 m/s, and the commanded speed."""
+    """Return for each stretch: swing by its commands at 1 m/s full speed, and commanded speed."""
     filters = {
         kind: swing_filter(omega, sigma, max(lag, SHORTEST_LAG_S), kind)
         for kind in {one.kind for one in data}

@@ -17,7 +17,7 @@ SAME_PCT = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do with the findings of an axis.
+    """Recommendation from the findings of an axis.
 
     Attributes:
         axis: its name.

@@ -1,4 +1,4 @@
-"""What was identified: its report, and its lines in the file."""
+"""Report of an identification, and its lines in the file."""
 
 import math
 import statistics
@@ -43,7 +43,7 @@ def heading(finding: Finding) -> str:
 
 
 def _basis(finding: Finding) -> list[str]:
-    """What the numbers rest on."""
+    """Return the data that the numbers rest on, for people."""
     texts = []
     if (fit := finding.free) is not None:
         first = max(float(s.envelope[0]) for s in fit.segments)
@@ -121,7 +121,7 @@ def _value(value: Value | None) -> dict[str, float] | None:
 
 
 def advice_on(findings: Sequence[Finding], deployment: Deployment | None) -> list[Advice]:
-    """What to do, of each axis."""
+    """Return the advice on each axis."""
     return [
         advise(
             name,

@@ -128,7 +128,7 @@ def _alike(swing: Swing, best: Swing) -> bool:
 
 
 def _joined(swings: Sequence[Swing], wholes: dict[float, Segment], period: float) -> list[Swing]:
-    """The same with neighbours put together that are one swing, which noise had parted."""
+    """Return the swings, with neighbours joined that are one swing parted by noise."""
     result: list[Swing] = []
     for swing in swings:
         if result and swing.start_s - result[-1].end_s < 1.5 * period:
@@ -152,7 +152,7 @@ def _overlap(one: Run, other: Swing) -> float:
 
 
 def _idle(series: Series, start: float, end: float) -> list[tuple[float, float]]:
-    """What of a stretch is without commands; all of it where they are not known."""
+    """Return the parts of a stretch without commands; all of it where commands are not known."""
     if series.idle is None:
         return [(start, end)]
     inside = [(max(a + SETTLING_S, start), min(b, end)) for a, b in series.idle]

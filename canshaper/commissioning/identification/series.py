@@ -19,7 +19,7 @@ BIN_S = 0.02
 
 
 class Kind(Enum):
-    """What a signal is of the swing."""
+    """Quantity of a signal in the swing."""
 
     ANGLE = "angle"
     """In rad."""

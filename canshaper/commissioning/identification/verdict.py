@@ -1,4 +1,4 @@
-"""What the signals of an axis show of its swing, and whether that is enough to use."""
+"""Verdict on the signals of an axis: its swing, and whether the data is enough to use."""
 
 import math
 from collections.abc import Sequence
@@ -124,7 +124,7 @@ def _useless(finding: Finding, series: Series) -> bool:
 
 
 def _no_swing(series: Sequence[Series]) -> str:
-    """What to do where no swing was found."""
+    """Return what to do where no swing was found."""
     if not series:
         return "no signal that could be used"
     flat = clipped(series[0], None)
@@ -242,7 +242,7 @@ def _faults(finding: Finding) -> list[str]:
 
 
 def _noise_text(fit: DecayFit | None) -> str:
-    """What is in the way of a better result."""
+    """Return what stands in the way of a better result."""
     if fit is None:
         return SWING_FREELY
     best = max(fit.segments, key=lambda s: float(s.envelope[0]))

@@ -25,7 +25,7 @@ SECOND_NS = 1_000_000_000
 
 
 class Ear:
-    """Hears the buses of a deployment; one that goes away is used again when it is back.
+    """Listens to the buses of a deployment; one that goes away is used again when it is back.
 
     Raises:
         BusError: a bus cannot be opened at the start.
@@ -61,7 +61,7 @@ class Ear:
             self._again_s = time.monotonic() + REOPEN_S
 
     def close(self) -> None:
-        """Hear no more."""
+        """Stop listening."""
         if self._listener is not None:
             self._listener.close()
             self._listener = None

@@ -1,4 +1,4 @@
-"""What is known of a machine by the frames on its buses."""
+"""State of a machine by the frames on its buses."""
 
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ MOST_SAMPLES = 2000  # of an axis: its status comes ten times a second or more o
 
 
 class Sample(NamedTuple):
-    """What the status of an axis said at a time: what is sent to the valve, predicted sway."""
+    """Setpoint and predicted sway in one status message of an axis."""
 
     time_ns: int
     valve_pct: float
@@ -53,7 +53,7 @@ class MessageRate:
         self.invalidate(time_ns)
 
     def invalidate(self, now_ns: int) -> None:
-        """What is older than the window does not count."""
+        """Drop frames that are older than the window."""
         while self.times and self.times[0] <= now_ns - WINDOW_NS:
             self.times.popleft()
 
@@ -163,7 +163,7 @@ class Monitor:
         return self.messages[bound.message.key].silent_s(now_ns) if bound else None
 
     def counters_stale_s(self, now_ns: int) -> float | None:
-        """The same of the service's counters."""
+        """Return for how long the service's counters are missing; None where they are not."""
         status = self.deployment.status
         return self.messages[status.message.key].silent_s(now_ns) if status else None
 

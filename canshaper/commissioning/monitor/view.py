@@ -19,7 +19,7 @@ HELP = "p pause, a axis, q end"
 
 
 class Keys:
-    """What a person has pressed.
+    """Choices of a person by keys.
 
     Args:
         axes: their names, in the order in which they are chosen.
@@ -139,7 +139,7 @@ def screen(
 
 
 def _events(monitor: Monitor, only: str | None, width: int) -> list[Text]:
-    """What has changed, of everything or of the one axis that is shown."""
+    """Return the changes of everything, or of the one axis that is shown."""
     shown = [e for e in monitor.events if only is None or f"axis={only} " in f"{e.text} "]
     lines = (Text(f"{clock(event.time_ns)} {event.text}") for event in shown)
     return [part for line in lines for part in _wrapped(line, width)]
@@ -244,7 +244,7 @@ def _rate(rate: MessageRate, now_ns: int) -> tuple[str, str]:
 
 
 def _wrong(rate: MessageRate, now_ns: int) -> str:
-    """What is wrong with how a message comes; empty when nothing is."""
+    """Return the fault of a message's rate; empty without one."""
     if rate.last_ns is None:
         return "NEVER"
     if (silent_s := rate.silent_s(now_ns)) is not None:

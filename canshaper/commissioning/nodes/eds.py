@@ -103,7 +103,7 @@ class Eds:
         return ConfigError([Problem(str(self.path), line, "", f"{text}, got {got!r}")])
 
     def _check(self, section: str) -> None:
-        """What canopen would answer with an error that names no section."""
+        """Check what canopen would report with an error that names no section."""
         match = _OBJECT.fullmatch(section)
         assert match
         options = self._file[section]

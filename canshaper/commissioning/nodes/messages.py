@@ -11,7 +11,7 @@ from canshaper.codec.signals import FULL_SET_POINT
 from canshaper.commissioning.nodes.node import Mapped, Node, Pdo
 
 CYCLE_MS = 20
-"""Of what we send: how often nodes of RPDOs want it is in no EDS."""
+"""Cycle of messages that we send: how often nodes of RPDOs want them is in no EDS."""
 IO, VALVE, INCLINOMETER = 401, 408, 410  # numbers of device profiles
 CONTROL_WORD, STATUS_WORD = (0x6040, 0), (0x6041, 0)
 DEVICE_MODE, BY_CAN = (0x6042, 0), 1

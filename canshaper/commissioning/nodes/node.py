@@ -119,7 +119,7 @@ class Node:
         return entry if isinstance(entry, ODVariable) else None
 
     def value(self, index: int, subindex: int) -> int | None:
-        """What an object has: of a DCF its ParameterValue, else its DefaultValue; None for none.
+        """Return the value of an object: ParameterValue of a DCF, else DefaultValue; None for none.
 
         Raises:
             ConfigError: it is no number.
@@ -189,7 +189,7 @@ class Node:
         return tuple(objects), bits
 
     def _entry(self, entry: int, start: int, section: str) -> tuple[Mapped | None, int]:
-        """What one entry of a mapping maps, None for a gap; its length."""
+        """Return the object of a mapping entry, None for a gap; and its length."""
         index, subindex, length = entry >> 16, entry >> 8 & 0xFF, entry & 0xFF
         if not length or index < _FIRST_OBJECT:
             return None, length

@@ -1,4 +1,4 @@
-"""What a node has to be set to, so that canshaper can work with it; written by SDO where asked."""
+"""Parameters that a node needs to work with canshaper; written by SDO where asked."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,9 +25,9 @@ from canshaper.config.bus import Bus
 from canshaper.errors import NodeError
 
 HEARTBEAT_MS = 200
-"""Of a node that is set to send heartbeats."""
+"""Heartbeat period of a node that is set to send heartbeats."""
 HEARTBEATS = 2.5
-"""Of a node in the time after which it is lost."""
+"""Heartbeats of a node in the time after which it is lost."""
 _EMCY, _GUARD_TIME, _HEARTBEAT, _STORE = (0x1014, 0), (0x100C, 0), (0x1017, 0), (0x1010, 1)
 _ANALOGUE_ON = (0x6423, 0)
 _SAVE = int.from_bytes(b"save", "little")
@@ -68,7 +68,7 @@ def heartbeat_ms(node: Node) -> int | None:
 
 
 def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> list[Parameter]:
-    """What has to be set in a node, in this order.
+    """Return the parameters to set in a node, in this order.
 
     Args:
         name: its name.
@@ -88,7 +88,7 @@ def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]])
 
 
 def missing(node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> Iterator[str]:
-    """What a node does not have, and what that means."""
+    """Yield what a node does not have, and the consequence of that."""
     if node.variable(*_HEARTBEAT) is None:
         yield "has no heartbeat (1017h); it is not supervised"
     if node.variable(*_EMCY) is None:

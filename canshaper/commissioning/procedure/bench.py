@@ -32,7 +32,7 @@ class Mode(Enum):
     LISTEN = "listen"
     """The person who moves them, without us."""
     DRY = "dry"
-    """The same; the daemon computes, and sends no valve frame."""
+    """The person moves them without us; the daemon computes, and sends no valve frame."""
     RAW = "raw"
     """We, without filters."""
     SHAPED = "shaped"
@@ -41,7 +41,7 @@ class Mode(Enum):
 
 @dataclass(frozen=True)
 class Task:
-    """What a person does while a step listens.
+    """Task of a person while a step listens.
 
     Attributes:
         words: what to do, for the person.

@@ -28,7 +28,7 @@ from canshaper.machine.deployment import Deployment
 
 @dataclass
 class Proposal:
-    """What came out of a run of a step, and what it would write; nothing is written yet.
+    """Result of a run of a step, and what it would write; nothing is written yet.
 
     Attributes:
         step: name of the step.

@@ -23,7 +23,7 @@ VERSION = 1
 
 
 class Status(StrEnum):
-    """Of a step."""
+    """Status of a step."""
 
     OPEN = "open"
     DONE = "done"
@@ -32,7 +32,7 @@ class Status(StrEnum):
 
 @dataclass
 class Record:
-    """What is kept of a step.
+    """Record of a step in the state file.
 
     Attributes:
         status: of the step.
@@ -90,7 +90,7 @@ def now() -> str:
 
 
 def stamped(record: Record) -> Record:
-    """The same with time and program of now."""
+    """Return the record with the time and the program version of now."""
     record.at, record.version = now(), canshaper.__version__
     return record
 
@@ -138,7 +138,7 @@ FILE = "file"
 
 @dataclass(frozen=True)
 class Context:
-    """What a step works with.
+    """Surroundings of a step: machine, bench, folder, state.
 
     Attributes:
         deployment: the machine, as its file is now; the bus options of the command are in it.
@@ -154,14 +154,14 @@ class Context:
 
     @property
     def numbers(self) -> dict[str, Mapping[str, Any]]:
-        """Of the steps that are done, by their names."""
+        """Numbers of the steps that are done, by their names."""
         steps = self.state.steps.items()
         return {name: one.numbers for name, one in steps if one.status is Status.DONE}
 
 
 @dataclass
 class Outcome:
-    """What came out of a run of a step.
+    """Result of a run of a step.
 
     Attributes:
         sheet: its lines and tables.

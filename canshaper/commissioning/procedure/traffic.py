@@ -1,4 +1,4 @@
-"""What the log of a step has of the deployment: its messages, joysticks, valves and states."""
+"""Traffic in the log of a step: messages, joysticks, valves and states of the deployment."""
 
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -142,7 +142,7 @@ def possible_joysticks(deployment: Deployment) -> list[Message]:
 
 
 def read_traffic(log: Path, deployment: Deployment) -> Traffic:
-    """What a log of a step has; its channels are those of the deployment.
+    """Read the traffic of a step from its log; its channels are those of the deployment.
 
     Raises:
         LogError: the log cannot be read.

@@ -1,1 +1,1 @@
-"""What a sway sensor shows: its sign, delay, offset and noise, out of a log of a drive."""
+"""Sign, delay, offset and noise of a sway sensor, from the log of a drive."""

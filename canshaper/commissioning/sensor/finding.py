@@ -1,4 +1,4 @@
-"""What a log shows of a sway sensor, whether that may be used, and what it makes of the file."""
+"""Finding on a sway sensor: what a log shows, whether it may be used, and keys for the file."""
 
 import math
 from collections.abc import Sequence
@@ -100,7 +100,7 @@ class Finding:
 
 
 def examine(axis: BoundAxis, series: Series) -> Finding:
-    """What a log shows of the sensor of an axis, which has one."""
+    """Examine the log of an axis that has a sensor."""
     assert axis.config.sway and axis.sway_sensor
     finding = Finding(axis.name, series, notes=list(series.notes))
     mode = axis.config.sway.mode()
@@ -208,7 +208,7 @@ def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
 
 
 def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
-    """What else is worth knowing."""
+    """Return further notes for the person."""
     assert finding.fit
     assert axis.config.sway
     notes, period_s = [], axis.config.sway.mode().period_s
@@ -223,7 +223,7 @@ def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
 
 
 def changes(axis: BoundAxis, finding: Finding) -> dict[str, bool | float]:
-    """What the section of the sensor has to say, by key."""
+    """Return the values for the section of the sensor, by key."""
     assert axis.sway_sensor
     config = axis.sway_sensor.config
     delay_ms = round(1000.0 * finding.delay_s.value)

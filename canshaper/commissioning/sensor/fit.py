@@ -39,7 +39,7 @@ STARTS_S = (0.0, 0.15, 0.3)
 
 @dataclass(frozen=True, slots=True)
 class SensorFit:
-    """What explains the measurements best.
+    """Best fit of the measurements.
 
     Attributes:
         gain: measured per swing of the model at a full speed of 1 m/s; negative with another sign.
@@ -96,14 +96,14 @@ class _Problem:
         self._commands = [_held(one) for one in data]
 
     def solved(self, delay_s: float) -> Any:
-        """What SciPy finds from a delay."""
+        """Return the solution of SciPy from a delay."""
         start = np.array([delay_s, *self._start])
         scale = [0.1, 0.1 * self._start[0], 0.05 * self._start[0]]
         bounds = self._bounds
         return least_squares(self._residual, start, bounds=bounds, x_scale=scale, max_nfev=60)
 
     def _parts(self, x: Array) -> list[tuple[Array, Array]]:
-        """Of each stretch: swing by its commands at 1 m/s, and free swing with an offset."""
+        """Return for each stretch: swing by commands at 1 m/s, and free swing with an offset."""
         delay_s, omega, sigma = map(float, x)
         filters = {
             kind: swing_filter(omega, sigma, self._lag_s, kind, GRID_S)
@@ -117,7 +117,7 @@ class _Problem:
         return parts
 
     def _projected(self, x: Array) -> list[tuple[Array, Array]]:
-        """Of each stretch: driven swing and data, both without what free swings explain."""
+        """Return for each stretch: driven swing and data, both without what free swings explain."""
         pairs = []
         for one, (driven, free) in zip(self._data, self._parts(x), strict=True):
             q, _ = np.linalg.qr(free)
@@ -130,7 +130,7 @@ class _Problem:
         return np.concatenate([y - gain * h for h, y in projected])
 
     def result(self, x: Array) -> SensorFit:
-        """What was found."""
+        """Return the fit at a solution."""
         projected = self._projected(x)
         gain = _gain(projected)
         total = sum(float(y @ y) for _, y in projected)
@@ -199,7 +199,7 @@ def _held(one: Driven) -> tuple[Array, Array]:
 
 
 def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dict[str, Series]:
-    """What the sensors of some axes measured.
+    """Read the measurements of the sensors of some axes.
 
     Raises:
         IdentificationError: a sensor is not in the log, or from two senders.

@@ -19,7 +19,7 @@ from canshaper.report.table import axis_title
 
 
 def heading(finding: Finding) -> str:
-    """What was looked at, and whether it is good."""
+    """Return a heading: what was examined, and whether the data is enough."""
     text = f"{axis_title(finding.axis)}, {finding.series.source}"
     if finding.fit is None:
         return f"{text}: nothing found"
@@ -30,7 +30,7 @@ def heading(finding: Finding) -> str:
 
 
 def table(axis: BoundAxis, finding: Finding) -> Table:
-    """What was found, next to what the file has."""
+    """Return a table of the finding next to the values of the file."""
     assert axis.sway_sensor
     assert axis.config.sway
     config, sway = axis.sway_sensor.config, axis.config.sway

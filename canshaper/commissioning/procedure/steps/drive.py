@@ -1,4 +1,4 @@
-"""The same work without and with the filters: what they are worth."""
+"""Comparison of the same work without and with the filters."""
 
 from functools import partial
 from pathlib import Path

@@ -113,7 +113,7 @@ def _other_signal(deployment: Deployment, name: str, moved: list[str]) -> tuple[
 
 
 def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str]) -> str | None:
-    """What is missing, and what to do; None where it is as it should be."""
+    """Return the fault of a joystick, and what to do; None where it is as it should be."""
     command = deployment.axes[name].config.command
     own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
     least, most = _extremes(axis)

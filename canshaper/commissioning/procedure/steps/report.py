@@ -61,7 +61,7 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
 
 
 def _result(steps: dict[str, Record]) -> list[tuple[str, str]]:
-    """What the day was for, where it was measured: the swing that is left."""
+    """Return the result of the day, where it was measured: the swing that is left."""
     drive = steps.get(DRIVE.name)
     crane = drive.numbers.get("crane") if drive and drive.status is Status.DONE else None
     if not crane:

@@ -32,7 +32,7 @@ NONE = "-"
 
 @dataclass
 class _Sources:
-    """What shows the swing of each axis.
+    """Sources of the swing of each axis.
 
     Attributes:
         signals: MESSAGE.SIGNAL on a bus, by axis.
@@ -92,7 +92,7 @@ _TIMED = ("swings", "seconds", "first", "last")
 
 
 def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
-    """What shows the swing, by the person; of the simulated crane its own message."""
+    """Ask what shows the swing of each axis; of the simulated crane it is its own message."""
     sources = _Sources()
     for name in axes:
         sensor = deployment.axes[name].sway_sensor

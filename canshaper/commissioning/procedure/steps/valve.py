@@ -1,4 +1,4 @@
-"""What each valve makes of its command, measured."""
+"""Valve curve of each axis, measured."""
 
 from functools import partial
 
