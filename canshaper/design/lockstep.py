@@ -28,14 +28,14 @@ Received = Callable[[Key], bool]
 
 
 class Joysticks(Protocol):
-    """Those who hold joysticks, as ``JoystickNode`` does."""
+    """Source of joystick frames, as ``JoystickNode`` is."""
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> Sequence[Frame]:
         """Frames that came since the last tick, in order."""
 
 
 class PlantPort:
-    """All buses of a machine at once, between the plant and those who hold its joysticks.
+    """All buses of a machine at once, between the plant and the joysticks.
 
     Args:
         plant: the crane, which gets what is sent.
@@ -147,7 +147,7 @@ class LockStep:
 
 
 def _sends(deployment: Deployment) -> frozenset[Key] | None:
-    """What a deployment that only listens may send; None for one that drives."""
+    """Return the messages that a listening deployment may send; None for one that drives."""
     if not deployment.listen_only:
         return None
     buses = deployment.routing.buses.items()
@@ -155,7 +155,7 @@ def _sends(deployment: Deployment) -> frozenset[Key] | None:
 
 
 class DriveOptions(TypedDict, total=False):
-    """What may be said of a drive besides its deployment and script.
+    """Options of a drive besides its deployment and script.
 
     Attributes:
         bypass: drive with anti-sway switched off.

@@ -138,7 +138,7 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
 
 
 def _begin(parent: int) -> None:
-    """What a process of the pool does first.
+    """Set up a process of the pool.
 
     Args:
         parent: number of the process that started it.

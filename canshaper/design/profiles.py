@@ -1,4 +1,4 @@
-"""What each profile of a deployment does with a full press, on the simulated crane."""
+"""Measures of each profile of a deployment with a full press, on the simulated crane."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ _DRIVE_S = 10.0
 
 @dataclass(frozen=True)
 class Figures:
-    """What a profile does with one axis after a full press of 3 s.
+    """Measures of a profile on one axis after a full press of 3 s.
 
     Attributes:
         axis: the axis.
@@ -55,7 +55,7 @@ class Chosen:
 
 
 def figures(deployment: Deployment) -> Iterator[Figures]:
-    """What every profile does with every axis that has it, and the axis' own filter.
+    """Yield the measures of every profile on every axis that has it, and of the axis' own filter.
 
     Raises:
         DesignError: the deployment has no profiles.

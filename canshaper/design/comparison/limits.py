@@ -27,7 +27,7 @@ _LAGS_TO_STOP = 1.5
 
 @dataclass(frozen=True)
 class Least:
-    """What the best shaper of a duration leaves at worst, parts of the unshaped swing.
+    """Least worst residual of a duration that the best shaper leaves, parts of the unshaped swing.
 
     Attributes:
         duration_s: from the first to the last change of the output after a step.

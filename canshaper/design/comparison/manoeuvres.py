@@ -1,4 +1,4 @@
-"""What every filter has to do: strokes of one axis and of both, loading, random joysticks."""
+"""Manoeuvres for every filter: strokes of one axis and of both, loading, random joysticks."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

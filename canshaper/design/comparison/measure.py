@@ -26,7 +26,7 @@ STANDS = 0.01
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one candidate left in one manoeuvre at one length error.
+    """Measures of one candidate in one manoeuvre at one length error.
 
     Attributes:
         residual_deg: largest swing after the dwell: tilt of the grapple, of both planes together.
@@ -104,7 +104,7 @@ def _movements(speed: list[float]) -> int:
 def _with_metrics(
     outcome: Outcome, recording: Recording, axis: str, deployment: Deployment
 ) -> Outcome:
-    """What the operator feels of a pulse."""
+    """Add to the outcome what the operator feels of a pulse."""
     of_axis = axis_metrics(recording, axis)
     crane = CraneParameters()
     full_m_s = crane.near_far_full_speed_m_s

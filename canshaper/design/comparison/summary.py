@@ -21,7 +21,7 @@ _OTHER_CRANES = ("load", "gain", "start")
 
 @dataclass(frozen=True)
 class Row:
-    """What a candidate did in all manoeuvres.
+    """Measures of a candidate over all manoeuvres.
 
     Attributes:
         worst_deg: by kind of work, largest residual at the right length.

@@ -40,7 +40,7 @@ class Setting:
 
     @property
     def filter(self) -> Filter:
-        """The same as the filter of an axis."""
+        """The setting as the filter of an axis."""
         return filter_of("gff", a1=self.a1, a2=self.a2, third_pole_rad_s=self.third_pole_rad_s)
 
     def values(self) -> dict[str, float | None]:
@@ -133,7 +133,7 @@ def recommendation(axis: str, setting: Setting, tail: tuple[float, float] | None
 
 
 def optimum_lines(tuning: Tuning) -> list[str]:
-    """What holds an optimum, how flat it is, and how the solver came to it, for people."""
+    """Return what bounds an optimum, how flat it is, and how the solver came to it, for people."""
     held = ", ".join(tuning.active) or "nothing: an optimum between all limits"
     return [
         f"Held by: {held}",

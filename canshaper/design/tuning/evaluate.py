@@ -1,4 +1,4 @@
-"""What a filter setting does: to the joystick and to the swing, also when the sway data is wrong.
+"""Measures of a filter setting: joystick and swing, also with wrong sway data.
 
 Pure and for every filter: the running code is asked, tick by tick. Times in s, speeds as fractions
 of full speed, residual sway as a fraction of what the same movement of the joystick leaves without
@@ -33,7 +33,7 @@ _STILL_S = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What stands between filter and crane.
+    """Valve and limits between filter and crane.
 
     Attributes:
         limits: output limits of the axis.
@@ -51,7 +51,7 @@ class Machine:
 
     @classmethod
     def of(cls, bound: BoundAxis) -> Self:
-        """That of an axis, as its deployment has it."""
+        """Return the machine of an axis, as its deployment has it."""
         limits = bound.config.limits
         return cls(
             limits=limits.output_limits(),
@@ -205,7 +205,7 @@ def press(
 def _press_and_release(
     mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, hold_s: float
 ) -> list[tuple[float, list[float]]]:
-    """What the axis sends: for the press and for the release, (speed before, sent)."""
+    """Return the output of the axis for the press and for the release: (speed before, sent)."""
     sway = SwayModel(mode, tick_s)
     axis = ShapedAxis(
         tick_s,

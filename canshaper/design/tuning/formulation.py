@@ -1,4 +1,4 @@
-"""What is asked of the tuner: weights, requirements and the grid of time of Eq. 14-15.
+"""Task of the tuner: weights, requirements and the grid of time of Eq. 14-15.
 
     minimise   1/N sum_k  x'Q x + R (y - 0.95)^2 + S (y - 1)^2 + P (y_k - y_(k-1))^2        (Eq. 15)
     over       the real poles of G_FF (14d), at a distance from the imaginary axis (14e)
@@ -18,9 +18,9 @@ PoleDistance = Literal["text", "printed", "off"]
 """Sense of Eq. 14e: "text", at least five times as far out as the sway pole; "printed", at most."""
 
 States = Literal["sway", "deviation", "companion", "none"]
-"""What Q weighs, of v = u / (a2 s^2 + a1 s + 1): "sway" (v'/w, v''/w^2), which is swing angle and
-rate in units of full speed times w/g; "deviation" (v - u, v'); "companion" (a2 v, a2 v'); or
-nothing."""
+"""Quantity that Q weighs, of v = u / (a2 s^2 + a1 s + 1): "sway" (v'/w, v''/w^2), which is swing
+angle and rate in units of full speed times w/g; "deviation" (v - u, v'); "companion"
+(a2 v, a2 v'); or nothing."""
 
 # The paper's word for "sufficiently far from the imaginary axis".
 POLE_DISTANCE = 5.0
@@ -77,7 +77,7 @@ PAPER_NEAR_FAR = Weights(r=2.0, s=0.0, p=0.03)
 
 @dataclass(frozen=True, slots=True)
 class Requirements:
-    """What every setting has to keep, besides real poles (14d).
+    """Requirements on every setting, besides real poles (14d).
 
     Attributes:
         pole_distance: sense of Eq. 14e.

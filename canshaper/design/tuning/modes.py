@@ -98,7 +98,7 @@ Responses = NDArray[np.complex128]
 def responses_of(
     mode: SwayMode, range_pct: float, tick_s: float, count: int, lengths: int = LENGTHS
 ) -> Responses:
-    """Of a mode, at lengths over its range."""
+    """Return the responses of a mode, at lengths over its range."""
     poles = np.array([one.pole for one in modes_over_range(mode, range_pct, lengths)])
     return np.exp(-np.outer(poles, np.arange(count)) * tick_s)
 
@@ -106,6 +106,6 @@ def responses_of(
 def second_responses(
     second: SecondMode, tick_s: float, count: int, lengths: int = LENGTHS
 ) -> Responses:
-    """Of a second mode, with its decay until the last tap."""
+    """Return the responses of a second mode, with its decay up to the last tap."""
     responses = responses_of(second.mode, second.range_pct, tick_s, count, lengths)
     return responses / np.abs(responses[:, -1:])

@@ -53,7 +53,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """What one run of IPOPT gave.
+    """Result of one run of IPOPT.
 
     Attributes:
         z: the unknowns, [ln q1, ln(q2/q1), ...].
