@@ -73,7 +73,7 @@ def _frames(reader: can.io.generic.MessageReader, place: Place) -> Iterator[Time
 
 
 def _nanoseconds(time_s: float) -> int:
-    """What a float can hold of a time: nanoseconds of a short one, microseconds of a date."""
+    """Round a time to what a float can hold: ns of a short one, us of a date."""
     return round(time_s * 1e9) if time_s < FINE_S else round(time_s * 1e6) * 1000
 
 

@@ -15,7 +15,7 @@ Key = tuple[str, int, bool]
 
 
 class Kind(Enum):
-    """What a frame is to the daemon of a deployment."""
+    """Kind of a frame for the daemon of a deployment."""
 
     RECEIVED = "received"
     """It waits in the first socket, and is read before the valves have their frames."""
@@ -72,7 +72,7 @@ class Sorter:
         self._kinds = {identity.message.key: Kind.IGNORED} if identity else {}
 
     def kind(self, key: Key) -> Kind:
-        """What a frame is, by bus, id and whether that is extended."""
+        """Return the kind of a frame by bus, id and whether that is extended."""
         kind = self._kinds.get(key)
         if kind is None:
             kind = self._kinds[key] = self._judge(key)
@@ -136,7 +136,7 @@ class Place:
     left_out: Counter[str] = field(default_factory=Counter)
 
     def error(self, got: str, expected: str) -> LogError:
-        """What is wrong here."""
+        """Return an error at this place of the log."""
         return LogError(f"{self}: expected {expected}, got {got}")
 
     def cut_off(self, reason: str) -> CutOffError:

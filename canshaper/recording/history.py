@@ -1,4 +1,4 @@
-"""What the status messages of a daemon report: states with their reasons, counters."""
+"""History of the status messages of a daemon: states with their reasons, counters."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +30,7 @@ class AxisStatus:
 
     @property
     def reason(self) -> str:
-        """The same of the reason."""
+        """Name of the reason, or its number where it is unknown."""
         return self.shown["Reason"]
 
 

@@ -112,7 +112,7 @@ class LogFile:
 
     @staticmethod
     def _empty(place: Place) -> LogError:
-        """What a log had that has no data frame."""
+        """Return the error for a log without a data frame."""
         if place.left_out:
             kinds = ", ".join(f"{n} {kind}" for kind, n in place.left_out.items())
             return place.error(f"other frames only: {kinds}", "a data frame")
@@ -139,7 +139,7 @@ class _UnpackedWithoutEndError(Exception):
 
 
 class _Unpacked(RawIOBase):
-    """What gzip has packed; of a file that is cut off, all that there is before the error."""
+    """Unpacked content of a gzip file; of a file that is cut off, all of it before the error."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._packed = file

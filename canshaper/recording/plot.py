@@ -36,7 +36,7 @@ from canshaper_sim.recording import Recording
 
 
 class _Look(NamedTuple):
-    """Of a deployment; the later ones are thinner and lie above the others."""
+    """Look of a deployment's curves; later ones are thinner and lie above the others."""
 
     colour: str
     width: float

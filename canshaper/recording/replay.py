@@ -1,4 +1,4 @@
-"""What canshaper would have done with a recorded drive, or what it did."""
+"""Replay of a recorded drive: what canshaper would have done with it, or what it did."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -47,7 +47,7 @@ class Verdict:
 
 @dataclass
 class Drive:
-    """What is known of a log before it is replayed.
+    """A log before it is replayed: its channels, and whether it is a black box.
 
     Attributes:
         path: the log.
@@ -179,7 +179,7 @@ class Replay:
         return f"the ticks are those of a clock: {why}"
 
     def warnings(self) -> Iterator[str]:
-        """What is to be known of the log before its replay is believed."""
+        """Yield warnings about the log, to read before its replay is believed."""
         box, program = self._drive.box, self._deployment.identity.lines()[1]
         if self.exact and box and program not in box.header["identity"]:
             yield "the black box is of another program than this one; what is different may be that"

@@ -1,4 +1,4 @@
-"""What a replay shows, for people and as numbers."""
+"""Report of a replay, for people and as numbers."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -54,7 +54,7 @@ class Replayed:
     straight: dict[str, AxisMetrics] = field(default_factory=dict)
 
     def measure(self) -> None:
-        """Measure the drive, and the same with the joystick straight to the valve."""
+        """Measure the drive, and the drive with the joystick straight to the valve."""
         if self.trace.rows < 2:
             return
         recording, straight = self.trace.recording(), self.trace.straight()
@@ -117,7 +117,7 @@ def print_replays(replays: Sequence[Replayed], console: Console) -> None:
 
 
 def verdict_lines(one: Replayed, *, examples: bool) -> Iterator[str]:
-    """What is to be said of the comparison with the log, with the first differences or without."""
+    """Yield the result of the comparison with the log, with the first differences or without."""
     verdict = one.replay.verdict
     if not verdict.compared:
         return

@@ -61,7 +61,7 @@ class Difference:
 
 @dataclass(slots=True)
 class Result:
-    """What a tick has made.
+    """Result of a tick.
 
     Attributes:
         sent: frames, in order.
@@ -168,7 +168,7 @@ class LogPort:
             yield frame
 
     def background(self) -> Iterator[Frame]:
-        """What is read after the valves have their frames."""
+        """Return the frames that are read after the valves have their frames."""
         waiting, self._others = self._others, []
         return iter(waiting)
 
