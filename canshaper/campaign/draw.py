@@ -1,4 +1,4 @@
-"""What is drawn for one drive of a campaign: crane, load, valves, operator, faults.
+"""Draw of one drive of a campaign: crane, load, valves, operator, faults.
 
 Everything comes from the drive's seed by NumPy's SeedSequence, in a fixed order: a drive is the
 same in whatever process and order it is driven, and two files that are driven with the same ranges
@@ -168,7 +168,7 @@ def _loads(
 
 
 def _fault(draw: Draw, ranges: Uncertainty, duration_s: float, *, sensors: bool) -> Fault:
-    """What goes wrong, one thing at most."""
+    """Draw a fault of bus or sensor, or none."""
     of_bus, of_sensor = draw.between(0.0, 100.0), draw.between(0.0, 100.0)
     if of_bus < ranges.bus_fault_pct:
         return bus_fault(draw, duration_s)

@@ -18,7 +18,7 @@ from canshaper_sim.recorder import meant
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 Row = dict[str, Any]
-"""Of one drive: seed, operator, fault, what was drawn, what was measured."""
+"""Row of one drive: seed, operator, fault, what was drawn, what was measured."""
 
 
 def measured_drive(
@@ -49,7 +49,7 @@ def measured_drive(
 
 
 class _Tracks:
-    """What the crane does in each tick, and what is measured of it at the end.
+    """Tracks of the crane, tick by tick, and the measures of them at the end.
 
     Speeds are parts of the nominal full speeds: what the operator expects of a deflection.
     """
@@ -79,7 +79,7 @@ class _Tracks:
             speeds[name].append(crane.speed(name))
 
     def measures(self) -> dict[str, float | None]:
-        """Of the whole drive, by the names of ``MEASURES``; None where there is none."""
+        """Return the measures of the drive by the names of ``MEASURES``; None for a missing one."""
         across = [math.degrees(state.theta5_rad) for state in self._states]
         along = [math.degrees(state.theta6_rad) for state in self._states]
         swing = [*map(math.hypot, across, along)]
@@ -111,7 +111,7 @@ class _Tracks:
         }
 
     def _travel_errors(self, axes: Mapping[str, AxisTrace]) -> Iterator[float]:
-        """Of every axis: its way less what the joystick asked for, s of full speed."""
+        """Yield the travel error of each axis: its way less the joystick's, s of full speed."""
         for name, axis in axes.items():
             most = self._limits[name].maximum
             commanded = math.fsum(min(max(one, -most), most) for one in axis.joystick)

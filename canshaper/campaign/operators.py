@@ -110,7 +110,7 @@ def _swinging(axes: Sequence[str]) -> Sequence[str]:
 def _resting(
     strokes: Callable[[Draw, Sequence[str]], Sequence[Stroke]],
 ) -> "Callable[[Draw, Sequence[str], str], Script]":
-    """The same as a script of that name, with a rest at the end."""
+    """Return a maker of scripts with these strokes and a rest at the end."""
 
     def script(draw: Draw, axes: Sequence[str], name: str) -> Script:
         drawn = tuple(strokes(draw, axes))

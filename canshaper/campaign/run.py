@@ -52,7 +52,7 @@ class Source:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What drives of it are of: only the same go together."""
+        """Identity of the drives: only drives with the same identity go together."""
         content = sha256(b"".join(sha256(data).digest() for _, data in self.files)).hexdigest()
         return {
             "file": f"{Path(self.path).name} sha256:{content[:16]}",

@@ -70,7 +70,7 @@ def most_of(events: int, count: int, confidence: float = CONFIDENCE) -> float:
 
 @dataclass(frozen=True)
 class Influence:
-    """What one factor has to do with a measure.
+    """Influence of one factor on a measure.
 
     Attributes:
         name: the factor.

@@ -155,7 +155,7 @@ def _type(rows: list[dict[str, Any]], name: str) -> Any:
 
 
 def _differs(expected: str, kept: str) -> str:
-    """What a folder should be of, and what it is of."""
+    """Return how a folder differs from the one expected, for an error."""
     ours, theirs = json.loads(expected), json.loads(kept) if kept else {}
     keys = [key for key in ours if ours[key] != theirs.get(key)]
     key = keys[0] if keys else "file"

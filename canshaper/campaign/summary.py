@@ -61,7 +61,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Summary:
-    """Of all drives of a campaign.
+    """Summary of all drives of a campaign.
 
     Attributes:
         quantiles: by measure and quantile, of the drives without a fault of bus or sensor.
@@ -229,7 +229,7 @@ def tables(summary: Summary) -> Iterator[Table]:
 
 
 def lines(summary: Summary) -> Iterator[str]:
-    """What the tables do not say: promises, the verdict."""
+    """Yield the lines that the tables do not have: promises, the verdict."""
     promises = summary.promises
     yield f"In brackets: bounds with {_SURE} confidence; ?: too few drives for one"
     yield (
