@@ -1,4 +1,4 @@
-"""What all text on a terminal shares: names of others are text, one look of tables, one bar."""
+"""Text on a terminal: names of others are text, one look of tables, one bar."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

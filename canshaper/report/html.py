@@ -1,4 +1,4 @@
-"""What a verb has shown as one HTML file: to read without a network, to print on A4, to sign."""
+"""Report of a verb as one HTML file: to read without a network, to print on A4, to sign."""
 
 import socket
 from base64 import b64encode
@@ -63,7 +63,7 @@ def document(title: str, facts: Iterable[tuple[str, str]], parts: Iterable[str])
 
 
 def facts(deployment: "Deployment | None", date: datetime) -> list[tuple[str, str]]:
-    """What a report is of: when, where, by which program, and the deployment with its hashes."""
+    """Return the facts of a report: date, machine, program, and the deployment with its hashes."""
     rows = [
         ("date", f"{date:%Y-%m-%d %H:%M %Z}"),
         ("machine", socket.gethostname()),

@@ -1,4 +1,4 @@
-"""What a pair of drives shows: swing, speed of response and feel of each axis, raw and shaped."""
+"""Metrics of a pair of drives: swing, speed of response and feel of each axis, raw and shaped."""
 
 import math
 from collections.abc import Iterable, Mapping

@@ -162,7 +162,7 @@ def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
 
 
 def gain_and_price(crane: Mapping[str, Any]) -> str:
-    """What the filters give and take, whatever axes were moved: swing left, and run-on."""
+    """Return gain and price of the filters, whatever axes were moved: swing left, and run-on."""
     off, on = crane["raw"], crane["shaped"]
     measure, words = "residual", "residual swing"
     if off["residual_deg"] is None:

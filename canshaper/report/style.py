@@ -1,4 +1,4 @@
-"""What all pictures share: colours, figures and panels."""
+"""Common style of all pictures: colours, figures and panels."""
 
 from collections.abc import Sequence
 from pathlib import Path
