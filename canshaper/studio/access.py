@@ -73,7 +73,7 @@ def _is_address(name: str) -> bool:
 
 
 ANY = {"0.0.0.0": "192.0.2.1", "::": "2001:db8::1"}
-"""What means all addresses of this machine, and one of no machine (RFC 5737, RFC 3849)."""
+"""Hosts that mean all addresses of this machine, each with one of no machine (RFC 5737, 3849)."""
 
 
 def reachable(host: str) -> str:

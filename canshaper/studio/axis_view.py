@@ -1,4 +1,4 @@
-"""What is known of an axis from the buses, and as the page shows it."""
+"""State of an axis by the frames on the buses, and its values for the page."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +8,7 @@ from canshaper.studio.words import reason_words, state_level, state_words
 
 @dataclass
 class AxisView:
-    """What is known of an axis; fractions of full, degrees.
+    """State of an axis; fractions of full, degrees.
 
     ``opening`` is what the valve frame says, ``valve`` the speed that it means.
     """

@@ -22,7 +22,7 @@ RELEASE_S = 3.0
 RESET_S = 0.3
 """How long the reset switch is held: some messages of a joystick."""
 PRESS_S, PAUSE_S = 0.1, 0.1
-"""The same of the button for the next profile, and how long it is let go of after that."""
+"""Press of the button for the next profile, and the pause after it."""
 MOST_PRESSES = 5
 """Presses of it that may wait for those before."""
 NEUTRAL = 0.02
@@ -133,7 +133,7 @@ class Cab:
             self._report(said("on" if on else "off"))
 
     def held(self, now_s: float) -> Held:
-        """What the hand does now."""
+        """Return what the hand holds now."""
         self._watch(now_s)
         reset = now_s < self._reset_until_s
         pressed = any(0.0 <= now_s - begin_s < PRESS_S for begin_s in self._presses_s)

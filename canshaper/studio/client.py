@@ -22,7 +22,7 @@ BURST = 240
 MOST_NONSENSE = 20
 """Refused messages after which a page is closed."""
 MOST_BYTES = 2048
-"""Of one message; joysticks take less than 200."""
+"""Bytes of one message; joysticks take less than 200."""
 
 # RFC 6455, 5.5.1 and 7.4.1
 MOST_REASON = 123

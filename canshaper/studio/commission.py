@@ -37,7 +37,7 @@ class Commission:
         self._process: subprocess.Popen[str] | None = None
 
     def routes(self) -> list[BaseRoute]:
-        """What the server answers."""
+        """Return the routes that the server answers."""
         return [
             Route("/commission", self._page),
             Route("/commission/state", self._state),
@@ -81,7 +81,7 @@ class Commission:
         return FileResponse(Path(self._shown["folder"]) / name)
 
     async def _answer(self, what: str, step: str) -> Response:
-        """What the page shows after it was done; while a step is under way what was before."""
+        """Do what was asked, and return what the page shows; while busy, return what it showed."""
         if self._path and not self._busy:
             self._busy = step or "reading"
             try:

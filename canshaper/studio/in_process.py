@@ -108,7 +108,7 @@ PICTURE_S = 0.04
 MOST_PICTURES = 15_000
 """Ten minutes: as much as the charts of the page keep."""
 LIVE_ONLY = frozenset(("sources", "late_us"))
-"""What is known of a crane while it is listened to only."""
+"""Values of a crane that are known only while it is listened to."""
 
 
 class CraneFilm:

@@ -21,7 +21,7 @@ OTHERS = "another program, or the file was read again"
 
 
 class Change(NamedTuple):
-    """What was changed at once.
+    """Numbers that were changed at once.
 
     Attributes:
         time_s: time of day, seconds of the epoch.
@@ -135,7 +135,7 @@ class LiveNumbers:
             self._before.append({key: now[key] for key in values})
 
     def difference(self) -> dict[str, str]:
-        """What writing would change in the file, and the file's hash; see ``write``.
+        """Return what ``write`` would change in the file, and the file's hash.
 
         Raises:
             CanshaperError: the file cannot be read or changed.

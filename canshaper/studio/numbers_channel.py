@@ -1,4 +1,4 @@
-"""What one page asks of the numbers of a running machine, checked, and what it is answered."""
+"""Requests of one page for the numbers of a running machine, checked, and their answers."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -76,7 +76,7 @@ class NumbersChannel:
                 refuse(str(error))
 
     def news(self) -> dict[str, Any]:
-        """What the page was not shown yet."""
+        """Return what the page was not shown yet."""
         news: dict[str, Any] = {}
         if self._version != self._numbers.version:
             self._version = self._numbers.version

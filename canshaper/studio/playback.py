@@ -20,7 +20,7 @@ from canshaper_sim.crane import CraneParameters
 RECORDED = "recorded"
 """The crane that a log is of, as its frames say."""
 QUIET_S = 1.0
-"""Of a pause of a log the pictures of so long are kept."""
+"""Part of a pause of a log of which pictures are kept, s."""
 
 Window = tuple[float, float | None]
 """From and up to where pictures are kept, s."""

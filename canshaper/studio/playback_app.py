@@ -20,7 +20,7 @@ from canshaper.studio.stage import RAW
 from canshaper.studio.view import SWAY_OF
 
 COLORS = ("--shaped", "--other", "--raw")
-"""Of the cranes but the raw one, by the names in the style."""
+"""Colours of the cranes but the raw one, by the names in the style."""
 
 
 @dataclass

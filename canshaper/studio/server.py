@@ -246,7 +246,7 @@ def listening(host: str, port: int) -> socket.socket:
 
 
 def address(host: str, port: int, token: str | None) -> str:
-    """What to open in the browser."""
+    """Return the address to open in the browser."""
     name = f"[{host}]" if ":" in host else host
     query = f"?token={token}" if token else ""
     return str(URL(f"http://{name}:{port}/{query}"))

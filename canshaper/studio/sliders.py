@@ -87,7 +87,7 @@ def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:
 
 
 def values(numbers: dict[str, list[Number]], name: str, factor: float) -> dict[str, float]:
-    """What the numbers of a slider become.
+    """Return the numbers of a slider at a factor.
 
     Raises:
         ValueError: no such slider, or a factor that is not allowed.

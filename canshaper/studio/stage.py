@@ -211,7 +211,7 @@ class Stage:
                     self.slide(name, 1.0)
 
     def snapshot(self) -> dict[str, Any]:
-        """What a page shows now."""
+        """Return the values that a page shows now."""
         now_s = time.monotonic()
         with self._lock:
             cab = self.cab

@@ -47,11 +47,11 @@ class Swing:
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 LENGTHS_PCT = tuple(range(-50, 101, 5))
-"""Of the length in the file."""
+"""Deviations of the pendulum length from the file, percent."""
 
 
 def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """What is left, by axis; axes without sway data, or with several filters, have none.
+    """Return the residuals by axis; axes without sway data, or with several filters, have none.
 
     Args:
         deployment: the machine.

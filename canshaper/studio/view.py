@@ -130,7 +130,7 @@ class CraneView:
         self._sway_at(sway_deg, now_s)
 
     def report_lateness(self, late_us: int) -> None:
-        """What the daemon reports to its service manager: how late it was in the last second."""
+        """Take the lateness of the daemon in the last second, as its service manager gets it."""
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:

@@ -28,7 +28,7 @@ def _texts() -> dict[str, str]:
 
 
 def said(what: str, **values: object) -> str:
-    """What the studio says, in English; the page has the same text in the language of its reader.
+    """Return a text of the studio in English; the page has it in the language of its reader.
 
     Args:
         what: key of the text behind "said." in the tables of the page.
