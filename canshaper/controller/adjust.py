@@ -17,7 +17,7 @@ MOST_NUMBERS = 16
 
 
 class Adjuster:
-    """Changes what the deployment's ``control`` section allows.
+    """Changes numbers that the deployment's ``control`` section allows to change.
 
     Args:
         controller: the machine.
@@ -84,7 +84,7 @@ class Adjuster:
             low, high = self._ranges[text]
             if isinstance(number, bool) or not isinstance(number, int | float):
                 raise ValueError(f"{text}: expected a number, got {number!r}")
-            if not low <= number <= high:  # nor is one that is no number
+            if not low <= number <= high:  # refuses NaN too
                 raise ValueError(f"{text}: expected {low:g} to {high:g}, got {number:g}")
             yield _key(text), float(number)
 

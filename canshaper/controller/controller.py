@@ -27,12 +27,12 @@ class Controller:
     Attributes:
         counters: what went wrong so far.
         joysticks: the joysticks by name.
-        inputs: what receives a message that is known by its identifier.
+        inputs: input of each message that is known by its identifier.
         events: changes of state since the owner last emptied the list.
         motions: the two-axis motions.
         status: the status messages.
-        moves: whether the frame that was handed out last is one of a valve, and any moves.
-        not_neutral: what was raised in the last ``neutral_frames``.
+        moves: whether the frame that was handed out last is that of a valve, and any axis moves.
+        not_neutral: exception in the last ``neutral_frames``; None without one.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -79,8 +79,8 @@ class Controller:
     def carry_over(self, before: "Controller") -> None:
         """Continue where the controller that ran before a reload has ended.
 
-        What is latched, what other nodes reported and every alive counter stay as they are. A bus
-        that was opened again was not listened to: nothing good that is known of it counts.
+        Latched states, reports of other nodes and alive counters stay as they are. A bus that was
+        opened again has missed frames: the last good values from it no longer count.
         """
         self._overrun.copy_state(before._overrun)
         if before._stop is not None:
@@ -109,7 +109,7 @@ class Controller:
         return NOWHERE.union(*(protocol.silent for protocol in self._protocols))
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """A frame was received.
+        """Take a frame that was received.
 
         Args:
             frame: the frame.
@@ -117,7 +117,7 @@ class Controller:
                 follows.
 
         Returns:
-            What it leaves as on the other bus of a gateway, to be sent at once.
+            The frame for the other bus of a gateway, to be sent at once; else None.
         """
         key = frame[:3]
         entry = self.inputs.get(key)
@@ -158,8 +158,8 @@ class Controller:
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run every axis that is due.
 
-        The frames come one by one, each valve's as soon as its axis has moved and all of them
-        before any status, to be sent at once; all have to be accepted.
+        The frames come one by one: the frame of each valve as soon as its axis has moved, all of
+        them before any status. The caller sends each at once, and has to take all of them.
 
         Args:
             now_ns: monotonic time of this tick.
@@ -235,7 +235,7 @@ class Controller:
         return changed
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
-        """Let load state and operator choose filters, sensors show sway, and axes move as one."""
+        """Connect load state, profile, sway sensors and two-axis motions to the axes."""
         for runner in self.axes.values():
             if switches := inputs.gates.get(runner.bound.config.command.joystick):
                 runner.add_interlock(EnableGate(switches))
@@ -247,7 +247,7 @@ class Controller:
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
 
     def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
-        """Report when valve or sway sensor say something else than before."""
+        """Report changes of the valve's feedback and of the sway sensor."""
         sent, feedback = runner.axis.sent, runner.feedback
         if feedback is not None and feedback.check(sent, now_ns):
             event = FeedbackEvent(name, feedback.following, feedback.part, sent)
@@ -258,13 +258,13 @@ class Controller:
             self.events += sensor.events()
 
     def stalled(self) -> None:
-        """Invalidate every input: the loop stood still for longer than any input may be old.
+        """Distrust every input: the loop stood still for longer than any input may age.
 
         The next tick also discards what has waited in the sockets. A fault or trip among it still
         counts, though it may be over by now.
 
-        Nor does what comes before the next tick, which has waited in the sockets: that tick forgets
-        it. Bad news among it counts like any other, though it may be over by now.
+        Axes in motion trip. The next tick also invalidates the frames that have waited in the
+        sockets until then; a fault or trip in one of them counts, though it may be over by now.
         """
         self._stood_still = True
         for protocol in self._protocols:
@@ -287,23 +287,23 @@ class Controller:
             protocol.on_bus_off(bus)
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus; the axes of a valve frame trip."""
+        """Take note that a frame did not reach its bus; the axes of a valve frame trip."""
         self.counters.add(FrameFault.SEND_FAILED)
         for protocol in self._protocols:
             protocol.send_failed(frame)
         self._outputs.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
-        """A valve frame comes too late: whether it moves one, and so must not leave."""
+        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
         return self._outputs.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
-        """The gate has refused a valve frame: its axes trip; see ``ValveOutputs``."""
+        """Trip the axes of a valve frame that the gate has refused; see ``ValveOutputs``."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
         return self._outputs.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve: the last thing sent; see ``not_neutral``."""
+        """Return a neutral frame for every valve, the last frames sent; see ``not_neutral``."""
         errors: list[Exception] = []
         for protocol in self._protocols:
             try:

@@ -34,7 +34,7 @@ class StateEvent:
 
 @dataclass(frozen=True, slots=True)
 class FeedbackEvent:
-    """The feedback of a valve says something else than before."""
+    """Change of a valve's state by its feedback."""
 
     axis: str
     following: Following
@@ -59,7 +59,7 @@ class MotionEvent:
 
     Attributes:
         motion: its name in the file.
-        why: what keeps them from it: ``radius=lost``, or an axis with its state; empty where
+        why: what keeps the axes apart: ``radius=lost``, or an axis with its state; empty where
             nothing does.
     """
 
@@ -121,7 +121,7 @@ def _shown(frame: Frame) -> str:
 
 @dataclass(frozen=True, slots=True)
 class DisagreementEvent:
-    """The gate and the codecs have read different things in a frame of a joystick."""
+    """Gate and codecs disagree about a frame of a joystick."""
 
     frame: Frame
     axis: str

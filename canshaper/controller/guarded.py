@@ -1,4 +1,4 @@
-"""A controller behind the gate: what every loop drives, with sockets or without."""
+"""Controller behind the gate, as every loop drives it, with sockets or without."""
 
 from collections.abc import Iterator, Mapping
 
@@ -11,12 +11,12 @@ from canshaper.gate.gate import Gate
 from canshaper.gate.received import Received
 from canshaper.protocols.interface import MessageKey
 
-# What is refused, or read in two ways, again and again is logged once in this time.
+# A refusal, or a disagreement of decoders, that repeats is logged once in this time.
 QUIET_NS = 1_000_000_000
 
 
 class Guarded:
-    """Hands frames in to controller and gate, and out what both let pass.
+    """Passes frames to controller and gate, and returns the frames that both allow.
 
     Args:
         controller: what computes the frames.
@@ -35,7 +35,7 @@ class Guarded:
         self._gate.carry_over(before._gate, reopened)
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Take a frame from a bus; see ``Controller``. What it says binds the next frame out."""
+        """Take a frame from a bus, see ``Controller``; it counts for the next frame out."""
         message = self._gate.receive(frame[:3], frame[3], now_ns)
         passed = self._controller.receive(frame, now_ns)
         if message is not None and message.of.checked:
@@ -55,12 +55,12 @@ class Guarded:
         return self._controller.moves
 
     def stalled(self) -> None:
-        """The loop stood still for too long: what comes before the next tick has waited."""
+        """Take note that the loop stood still: frames up to the next tick have waited."""
         self._gate.stalled()
         self._controller.stalled()
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """One tick: the frames to send now; see ``Controller``."""
+        """Run one tick, and yield the frames to send now; see ``Controller``."""
         self._gate.tick(now_ns, missed)
         leaving = self._gate.leaving
         for frame in self._controller.tick(now_ns, missed):
@@ -78,24 +78,24 @@ class Guarded:
         return not why
 
     def set(self, values: Mapping[str, object]) -> None:
-        """Numbers were changed while the machine runs; each stays in the range of the file."""
+        """Take numbers that were changed by hand; each stays in the range of the file."""
         for key, value in values.items():
             self._gate.set(key, float(value))  # type: ignore[arg-type]
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus."""
+        """Take note that a frame did not reach its bus."""
         self._gate.send_failed(frame[:3])
         self._controller.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """A valve frame comes too late: whether it moves one, and so must not leave."""
+        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
         withheld = self._controller.withhold(frame)
         if withheld:
             self._gate.withheld(frame[:3])
         return withheld
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve: the last thing sent. One that is refused is an event."""
+        """Return a neutral frame for every valve, the last frames sent; log a refused one."""
         passed = []
         for frame in self._controller.neutral_frames():
             if why := self._gate.last(frame[:3], frame[3]):
@@ -105,7 +105,7 @@ class Guarded:
         return passed
 
     def _compare(self, message: Received, frame: Frame, now_ns: int) -> None:
-        """Two decoders have read a joystick's frame; where they disagree its axes stop."""
+        """Compare what two decoders read in a joystick's frame; its axes stop if they disagree."""
         name = message.of.name
         joystick, axes = self._controller.joysticks[name], self._gate.moved[name]
         wrong = axes if message.good_ns != joystick.received_ns else []

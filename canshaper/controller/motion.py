@@ -27,7 +27,7 @@ class _Member:
         self.moving = MovingAxis(full_speed, runner.period_s, runner.axis.sway)
 
     def bound(self, config: Motion) -> None:
-        """Let this axis be moved no farther and no faster than the motion says."""
+        """Limit how far and how fast the motion may move this axis."""
         moving, axis = self.moving, self.runner.bound.config
         moving.farthest = farthest_m(config.max_path_m, damps=axis.damps)
         moving.largest = config.max_pct / 100.0

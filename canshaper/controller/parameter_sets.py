@@ -1,4 +1,4 @@
-"""Sway data and filter of an axis in motion: by the load, and by the operator's choice."""
+"""Sway data and filter of an axis, chosen in motion by load state and operator."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -65,7 +65,7 @@ class MachineInputs:
                 self.sway_sensors[name] = messages[key]
 
     def _enable(self, deployment: Deployment) -> dict[str, list[Switch]]:
-        """Switches by the joystick that they enable; the one that is pressed is set in it."""
+        """Return the switches by the joystick that they enable; set the one to press there."""
         named: dict[str, Switch] = {}
         for bound in deployment.switches:
             message = SwitchInput(bound, bound.switches)
@@ -112,7 +112,7 @@ def parts(
     axes: Mapping[str, AxisControl],
     protocols: Iterable[BusProtocol],
 ) -> dict[Key, Part]:
-    """Every part by its key.
+    """Return every part that a reload carries over, by its key.
 
     A bus is known by interface and channel, a message by its id, whatever the file calls them. An
     axis that is renamed is still that of its valve.

@@ -32,7 +32,7 @@ LEAST_RADIUS_M = 0.5
 
 
 class AxisControl:
-    """One axis with its codecs: when it is due, what it sends.
+    """Control of one axis, with its codecs: when it is due, what it sends.
 
     Attributes:
         bound: the axis with its codecs, and with the configuration that is in force.
@@ -90,7 +90,7 @@ class AxisControl:
         return self._trip is not None
 
     def trip(self, reason: Reason) -> None:
-        """Neutral at once and latched with the next tick; a later cause replaces one before."""
+        """Trip with the next tick: neutral at once, latched; a later cause replaces this one."""
         self._trip = reason
 
     def trip_in_motion(self, reason: Reason) -> None:
@@ -99,11 +99,11 @@ class AxisControl:
             self._trip = reason
 
     def invalidate(self) -> None:
-        """The input was lost, though it may be back by the next tick: neutral comes first."""
+        """Take note that the input was lost, though it may be back by the next tick."""
         self._invalid = True
 
     def foreign_sender(self, now_ns: int) -> None:
-        """A frame with the id of this valve came from another sender: neutral at once."""
+        """Trip, because another sender has sent a frame with the id of this valve."""
         self._trip = self._trip or Reason.SECOND_SENDER
         self._foreign_ns = now_ns
 
@@ -130,7 +130,7 @@ class AxisControl:
         self.chooser = SetChooser(self.bound, self.axis, load_state, profile)
 
     def add_sway_sensor(self, message: SwaySensorInput) -> None:
-        """Let a sensor show the swing."""
+        """Add a sway sensor."""
         bound, sway = self.bound.sway_sensor, self.axis.sway
         assert bound is not None
         assert sway is not None  # checked with the deployment
@@ -143,7 +143,7 @@ class AxisControl:
         self._radius = radius
 
     def measured_by(self, node: SensorNode) -> None:
-        """Count what its sway sensor measures only while this node works."""
+        """Use measurements of the sway sensor only while this node works."""
         assert self._sway_signal is not None  # of an axis with a sensor
         self._sway_signal.node = node
 
@@ -168,7 +168,7 @@ class AxisControl:
     def copy_state(self, before: Self) -> None:
         """Stay latched, and trip for what the same axis has not acted on: a reload is no reset.
 
-        Of a lost address it is the way back.
+        After a lost address a reload is the way back.
         """
         latched = before.axis
         if latched.state is State.TRIPPED and latched.reason is not Reason.ADDRESS_LOST:
@@ -192,7 +192,7 @@ class AxisControl:
         self.bound = replace(self.bound, config=config)
 
     def hold(self, last: int, now: int) -> Transition | None:
-        """Deadlines were missed, from one number to another: the last output was held.
+        """Count missed deadlines, in which the last output was held.
 
         Returns:
             The change of state, where the filter failed in them; else None.
@@ -247,11 +247,11 @@ class AxisControl:
         return transition
 
     def put(self, steps: int) -> None:
-        """Put a command into the message of the valve."""
+        """Put a setpoint into the message of the valve."""
         self.bound.valve.put(self.valve.raw, steps)
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
-        """Why the axis has to stop or may not begin; why it has to be neutral at once is noted."""
+        """Return why the axis has to stop or may not begin; note causes for neutral at once."""
         trip = self._trip
         if self._foreign_ns is not None:
             if now_ns - self._foreign_ns <= FOREIGN_NS:

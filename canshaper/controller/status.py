@@ -35,7 +35,7 @@ class StatusMessages:
     def frames(
         self, changed: Collection[AxisControl], counters: Counters, last: int, now: int
     ) -> Iterator[Frame]:
-        """Status of the axes that changed and of all that are due, and of the service.
+        """Yield the status of the axes that have changed or are due, and of the service.
 
         Args:
             changed: axes whose state has just changed.
@@ -53,7 +53,7 @@ class StatusMessages:
             yield self._senders[status.message.key].frame(status.values(counters.status()))
 
     def identity(self, status: StatusCodec[int]) -> Frame:
-        """The digest of what runs, in the message that carries it."""
+        """Return the digest of what runs, in the message that carries it."""
         values = status.values(self._deployment.identity.digest)
         return self._senders[status.message.key].frame(values)
 
@@ -99,7 +99,7 @@ class SensorReport:
     def _is_news(self, length: SwingLength, mode: SwayMode) -> bool:
         """Whether the grapple swings by another length than was reported last, or is in the file.
 
-        Of the load of a breakpoint nothing is: the key that is reported is not that in force.
+        At the load of a breakpoint nothing is news: the key to report is not the one in force.
         """
         model = self._runner.axis.sway
         assert model is not None  # of an axis with a sensor

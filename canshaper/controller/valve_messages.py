@@ -10,7 +10,7 @@ from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
 Turn = tuple[str, AxisControl, Sender | None, ForwardingRule | None]
-"""An axis with its name, and what goes out when it has moved: a message, or by a rule."""
+"""An axis with its name; the last axis of a message with that message, or a forwarding rule."""
 
 
 class ValveOutputs:
@@ -18,7 +18,7 @@ class ValveOutputs:
 
     Args:
         axes: the axes that command each message, by its identifier.
-        forwarding: what leaves in the place of a message, by the same.
+        forwarding: rules by which frames leave in place of a message, by its identifier.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class ValveOutputs:
         self._forwarding = forwarding
 
     def turns(self, order: Iterable[tuple[str, AxisControl]]) -> list[Turn]:
-        """The axes in their order; a message goes out with the last one of its axes."""
+        """Return the axes in their order; a message goes out with the last one of its axes."""
         turns: list[Turn] = []
         for name, runner in order:
             key = runner.valve.key
@@ -41,17 +41,17 @@ class ValveOutputs:
         return turns
 
     def foreign_sender(self, key: MessageKey, arrived_ns: int) -> None:
-        """A frame with this identifier came from another sender."""
+        """Trip the axes of a message that another sender has sent."""
         for runner in self._axes.get(key, ()):
             runner.foreign_sender(arrived_ns)
 
     def send_failed(self, key: MessageKey) -> None:
-        """A frame with this identifier did not reach its bus: axes in motion trip."""
+        """Trip the axes in motion of a message that did not reach its bus."""
         for runner in self._axes.get(key, ()):
             runner.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
-        """A frame comes too late: whether it moves a valve, and so must not leave.
+        """Whether a frame that comes too late moves a valve, and so must not leave.
 
         Its receiver will see no gap in the counter.
         """
@@ -62,7 +62,7 @@ class ValveOutputs:
         return True
 
     def refused(self, frame: Frame) -> Frame:
-        """The gate has refused a frame: its axes trip.
+        """Trip the axes of a frame that the gate has refused.
 
         Returns:
             The same frame with neutral commands, to be sent in its place.
@@ -74,11 +74,11 @@ class ValveOutputs:
         return runners[0].valve.instead(frame)
 
     def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
-        """A neutral frame for every valve whose bus is not silent: the last thing sent.
+        """Return a neutral frame for every valve whose bus is not silent, the last frames sent.
 
         Args:
             silent: names of those buses.
-            errors: takes what was raised; it costs no other valve its frame.
+            errors: gets the exceptions; the other valves still get their frames.
         """
         frames: list[Frame] = []
         for key, runners in self._axes.items():
@@ -154,7 +154,7 @@ class OverrunDetector:
         self.late, self._overrun = before.late, before._overrun
 
     def tick(self, *, late: bool) -> bool:
-        """Whether there is an overrun now; asked of every tick while ``late`` is not 0."""
+        """Count a tick; return whether there is an overrun. Called while ``late`` is not 0."""
         if late:
             self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self.late == LATE_LIMIT
