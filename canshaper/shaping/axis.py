@@ -89,12 +89,12 @@ class ShapedAxis:
 
     @property
     def sent(self) -> float:
-        """The velocity that gives, [-1, 1] of full speed."""
+        """Velocity that these steps give, [-1, 1] of full speed."""
         return self.output.setpoint
 
     @property
     def applied(self) -> float:
-        """The part of it that drives the sway model."""
+        """Part of that velocity that drives the sway model."""
         return self.output.applied
 
     @property
@@ -248,11 +248,11 @@ class ShapedAxis:
 
     @property
     def unattended(self) -> bool:
-        """Whether its joystick rested for longer than the tail; of an axis that may be moved."""
+        """Whether the joystick rested longer than the tail, where a motion may move the axis."""
         return self._unattended > self._stage.tail + UNATTENDED_TICKS
 
     def renew_added_time(self) -> None:
-        """Give it the full time back for which a motion may move it."""
+        """Restore the full time for which a motion may move the axis."""
         self._added_time.renew()
 
     def drop_added(self) -> None:

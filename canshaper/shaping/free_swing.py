@@ -1,4 +1,4 @@
-"""Swing that own motion does not explain, corrected by measurements with Kalman gains."""
+"""Free swing, which own motion does not explain, corrected with Kalman gains."""
 
 import math
 from collections.abc import Sequence
@@ -103,7 +103,7 @@ class FreeSwing:
         self.angle = self.rate = self.offset = 0.0
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Swing on for a tick, in which an undriven swing changes by these."""
+        """Advance a tick, in which an undriven swing changes by these factors."""
         angle, rate = self.angle, self.rate
         self.angle = angle + by[0] * angle + by[1] * rate
         self.rate = rate + by[2] * angle + by[3] * rate
@@ -113,7 +113,7 @@ class FreeSwing:
         return unexplained - (self.rate if self._rates else self.angle) - self.offset
 
     def glide(self, tick_s: float) -> None:
-        """Go on for a tick without gravity."""
+        """Advance a tick without gravity."""
         self.angle += tick_s * self.rate
 
     def correct(self, error: float) -> float:
@@ -132,7 +132,7 @@ class FreeSwing:
 
 
 class TwoFreeSwings(FreeSwing):
-    """Free swing of the first mode, next to a second one that only keeps itself out of it.
+    """Free swing of the first mode; a second mode is estimated to keep it out of the first.
 
     Args:
         measured: angle or rate.
@@ -155,7 +155,7 @@ class TwoFreeSwings(FreeSwing):
         self._second = FreeSwing(measured, [(0.0, 0.0, 0.0)])
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Swing on for a tick."""
+        """Advance a tick."""
         super().step(by)
         self._second.step(self._by)
 

@@ -110,7 +110,7 @@ class TwoAxisMotion:
         near_far.add(path_m if way_m > path_m else max(way_m, -path_m), weight)
 
     def stop(self) -> None:
-        """One of the axes has tripped: nothing is added any more, at once."""
+        """Add nothing from now on, because one of the axes has tripped."""
         self._weight = 0.0
         self._rest()
 

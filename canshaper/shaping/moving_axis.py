@@ -67,14 +67,14 @@ class MovingAxis:
         self.follow(self.sway)
 
     def follow(self, sway: SwayModel) -> None:
-        """The axis has this sway model now."""
+        """Take the sway model of the axis."""
         omega, ratio = sway.mode.omega_rad_s, sway.mode.damping_ratio
         self.sway = sway
         self.stiffness, self.damping = omega * omega, 2.0 * ratio * omega
         self.lag_s = 2.0 * ratio / omega
 
     def held(self, seconds: float) -> None:
-        """The last output was held for so much longer."""
+        """Account for a time in which the last output was held."""
         self.reached += self.added * self.full_speed * seconds
 
     def path(self, after_s: float) -> GrapplePath:

@@ -128,7 +128,7 @@ class SensedSway:
         self._observer.retune(sway)
 
     def restart(self) -> None:
-        """The model has started again, and does not know its swing: nothing is fed back."""
+        """Restart with the model, which does not know its swing: nothing is fed back."""
         self._observer.restart()
         self.weight = 0.0
         self._sway.free_angle = self._sway.free_rate = 0.0

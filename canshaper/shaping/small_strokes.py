@@ -20,7 +20,7 @@ LEFT = 0.5
 
 
 class SmallStrokes:
-    """The travel that is still due to the operator, and what becomes of a small output.
+    """Travel that is still due to the operator, and the output that gives it in small strokes.
 
     Args:
         limits: output limits of the axis.
@@ -46,7 +46,7 @@ class SmallStrokes:
         self._left = -math.inf
 
     def hold(self, command: float, applied: float, ticks: int) -> None:
-        """Ticks were missed, with this command, and this velocity of the axis' own."""
+        """Count missed ticks with this command and this own velocity of the axis."""
         self._due += ticks * (command - applied)
         self._left -= ticks * abs(command)
 

@@ -109,7 +109,7 @@ class Evidence:
         return math.sqrt(self._energies[0])
 
     def _added(self, ratio: float, other: float, known: float) -> float:
-        """The ratio against another idea, with the mean squares of the last errors of both."""
+        """Return the updated ratio against another hypothesis, by mean squares of both errors."""
         # What neither explains, an undriven swing of another period, speaks for none of them.
         if other >= known:
             step = (other - known) / (self._least + COMMON_SHARE * known)
@@ -122,8 +122,7 @@ class Evidence:
         return ratio if ratio > -BOUND else -BOUND
 
     def proved(self, least: float) -> bool:
-        """Whether sign and own motion are beyond ``least``; a dragged grapple begins as one that
-        hangs does."""
+        """Whether the ratios of sign and own motion prove the sensor, by more than ``least``."""
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:

@@ -49,7 +49,7 @@ class ValveCurve:
 
 
 def _faults(commands: Sequence[float], speeds: Sequence[float]) -> Iterator[str]:
-    """Why points are no curve of a valve; each fault takes it that those before were none."""
+    """Yield the faults of the points of a curve; each check relies on those before it."""
     if len(commands) != len(speeds):
         yield f"expected a speed for each command, got {len(commands)} and {len(speeds)}"
     if len(commands) < 4 or commands[0] != -1.0 or commands[-1] != 1.0:
