@@ -73,6 +73,6 @@ class Feedback(ValueInput):
         self.following = before.following
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
         super().invalidate()
         self._waited_for_ns = None

@@ -18,7 +18,7 @@ class Part(Protocol):
     """
 
     def copy_state(self, before: Any, /) -> None:
-        """Take over what the same part of the controller before knew."""
+        """Copy the state of the same part of the controller before."""
 
 
 def carry_over(before: Mapping[Key, Part], parts: Mapping[Key, Part]) -> None:
@@ -47,7 +47,7 @@ class Receiver(Protocol):
         """Receive a frame, and return its fault."""
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
 
 
 class MessageInput(Receiver, Part, Protocol):
@@ -57,8 +57,8 @@ class MessageInput(Receiver, Part, Protocol):
 class Input(ABC):
     """State of one received message.
 
-    Its age begins with the arrival of its frame. What is bad news in a frame counts from when the
-    frame is read: it is numbered, not dated, so that none is too old to be seen.
+    Its age begins with the arrival of its frame. A release or a press of the emergency stop counts
+    when the frame is read: these events are numbered, not dated, so none is too old to be seen.
 
     Attributes:
         raw: raw values of the last frame that counted.
@@ -103,7 +103,7 @@ class Input(ABC):
 
     @abstractmethod
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """A frame with the right checksum came; the last one still stands in ``raw``.
+        """Take a frame with the right checksum; ``raw`` still has the frame before.
 
         Args:
             raw: its raw values.
@@ -111,7 +111,7 @@ class Input(ABC):
             accepted: whether it may be used. A switch may say something without that.
 
         Returns:
-            What is wrong with its content.
+            The fault of its content.
         """
 
     @property
@@ -120,7 +120,7 @@ class Input(ABC):
         return self._received_ns
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
         self._received_ns = self._last_frame_ns = None
 
     def copy_state(self, before: Self) -> None:
@@ -147,8 +147,9 @@ class Switch:
 
     Attributes:
         agrees: the signal, and that value.
-        releases: how often it was seen not to agree: in every frame of right length and checksum.
-        released: whether it does not, by the last frame that says so or says otherwise.
+        releases: number of frames of right length and checksum in which it did not agree.
+        released: whether it is released: since any frame that shows a release, until an accepted
+            frame shows that it agrees.
     """
 
     def __init__(self, source: Input, signal: str, on: int) -> None:
@@ -160,7 +161,7 @@ class Switch:
         self._doubted = 0  # number of the last release in a frame that does not
 
     def on_frame(self, raw: Raw, accepted: bool) -> None:
-        """A released switch needs no trust, however short; only a frame that counts ends it."""
+        """Take a frame: any frame can show a release, only an accepted one ends it."""
         signal, on = self.agrees
         agrees = raw[signal] == on
         if accepted:
@@ -174,10 +175,10 @@ class Switch:
             self.released = False
 
     def doubted(self, releases: int) -> bool:
-        """Whether a frame that does not count said that it is released, and none that does.
+        """Whether only frames that were not accepted have shown a release.
 
         Args:
-            releases: as they were when that was asked last.
+            releases: their number at the last call.
         """
         return self._agreed and (self.released or self._doubted > releases)
 
@@ -212,9 +213,9 @@ class SwitchInput(Input):
 
 
 class EnableGate:
-    """Why an axis may not move, by the switches that enable its joystick, but for the one pressed.
+    """Interlock by the switches that enable a joystick, except the one to press.
 
-    That they agree again is no press: it resets nothing.
+    When they agree again, that is no press: it resets nothing.
 
     Args:
         switches: them.
@@ -225,7 +226,7 @@ class EnableGate:
         self._releases = self._count()
 
     def __call__(self, neutral: bool, now_ns: int) -> Reason | None:
-        """The reason, or None; a release since it was asked last counts, however short it was."""
+        """Return the reason, or None; a release since the last call counts, however short."""
         releases, self._releases = self._releases, self._count()
         agree = releases == self._releases
         if agree and not any(one.released or one.lost(now_ns) for one in self._switches):
@@ -250,7 +251,7 @@ class EmergencyStopInput(Input):
         self._pressed = False
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """A stop needs no trust, however short it is pressed; only a frame that counts frees it."""
+        """Take a frame: any frame can show a press, only an accepted one ends it."""
         if raw[self._signal] != 0:
             self.presses += 1
             self._pressed = True
@@ -272,7 +273,7 @@ class EmergencyStopInput(Input):
 
         Args:
             now_ns: monotonic time.
-            presses: as they were when this was asked last.
+            presses: their number at the last call.
         """
         if self._pressed or self.presses > presses:
             return Reason.EMERGENCY_STOP

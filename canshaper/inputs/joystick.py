@@ -51,7 +51,7 @@ class JoystickInput(Input):
         self._doubted = 0  # number of the last release in a frame that does not count
 
     def watch(self, signal: str) -> Switch:
-        """Another switch in its message, that enables it or another joystick."""
+        """Watch another switch in its message, which enables it or another joystick."""
         return self._switches.setdefault(signal, Switch(self, signal, 1))
 
     @property
@@ -71,7 +71,7 @@ class JoystickInput(Input):
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """Note since when each joystick is where it is; codes that are no measurement are a fault.
 
-        A released enable needs no trust, however short it is; only a frame that counts ends it.
+        Any frame can show a released enable, however short; only an accepted one ends it.
         """
         for switch in self._switches.values():
             switch.on_frame(raw, accepted)

@@ -44,7 +44,7 @@ class SwaySensorInput(Input):
         return None if merit and raw[merit] != GOOD_MERIT else signal.value(raw)
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
         super().invalidate()
         self.values.clear()
 

@@ -81,7 +81,7 @@ class ValueInput(Input):
         return self.value
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
         super().invalidate()
         self.measured_ns = None
 
@@ -142,12 +142,12 @@ class ProfileButtons:
 
 
 def profile_names(config: DeploymentConfig) -> list[str]:
-    """Every profile, in the order of the file, behind "", the axes' own filters."""
+    """Return every profile, in the order of the file, after "", the axes' own filters."""
     return ["", *dict.fromkeys(name for axis in config.axes.values() for name in axis.profiles)]
 
 
 def radius_input(bound: BoundValue[Radius]) -> ValueInput:
-    """A radius that comes in frames; what lies outside its DBC range is none."""
+    """Return the input of a radius; values outside its DBC range do not count."""
     low, high = bound.signal.minimum, bound.signal.maximum
     assert low is not None and high is not None
     return ValueInput(bound, bound.signal, low, high)
