@@ -111,7 +111,7 @@ class SequenceChecker:
             self.qualified = self._good >= self._qualify
 
     def resync(self) -> None:
-        """The sender was silent: its next counter may be any but the last one."""
+        """Accept any counter but the last one next, because the sender was silent."""
         self._resynced = True
         self._requalify()
 

@@ -55,7 +55,7 @@ class Sender:
         key: bus, id and whether that is extended.
         fields: its signals.
         protector: its counter.
-        raw: raw value of every signal, changed by who has something to say.
+        raw: raw value of every signal, changed by those who put values in.
     """
 
     def __init__(self, message: SentMessage) -> None:

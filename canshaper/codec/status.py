@@ -68,7 +68,7 @@ class _Code:
 
 
 class ReportedAxis(Protocol):
-    """An axis, as its status sees it."""
+    """Axis whose status is sent."""
 
     @property
     def axis(self) -> ShapedAxis:
@@ -124,7 +124,7 @@ COUNTERS: list[StatusField[dict[str, int]]] = [
         "SendFailures",
     )
 ]
-"""Those of the service; each stops at its largest value."""
+"""Counters of the service; each stops at its largest value."""
 SERVICE_STATUS = [LAST_FAULT, *COUNTERS]
 IDENTITY: list[StatusField[int]] = [
     StatusField("Digest", int, int, required=True, largest=(1 << DIGEST_BITS) - 1)
