@@ -1,4 +1,4 @@
-"""Axes of a deployment, bound to the DBC: valve, filters, status, and what they ask of others."""
+"""Axes of a deployment, bound to the DBC: valve, filters, status, and what they require."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve, check_
 
 
 def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
-    """The axes without any problem, by name."""
+    """Bind the axes; return those without a problem, by name."""
     shared_valves: SharedValves = {}
     # A slewing axis acts first: where it trips, nothing of it is in the other one's next output.
     slewing = {motion.slew for motion in lookup.config.motion.values()}

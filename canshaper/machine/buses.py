@@ -106,7 +106,7 @@ def _value_fault(kind: Any, value: object) -> str | None:
 
 
 def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Channels, devices, our node on J1939 and the nodes of CANopen are distinct."""
+    """Check that channels, devices, our J1939 node and nodes of CANopen are distinct."""
     add = diagnostics.add
     channels: dict[tuple[str, str], str] = {}
     names: dict[J1939Name, str] = {}
@@ -157,7 +157,7 @@ def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, 
 
 
 def _check_fd(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
-    """CAN FD has a data bit rate that is none below the other, and no protocol on top."""
+    """Check CAN FD: no data bit rate below the bit rate, and no protocol on top."""
     place = ("buses", name)
     if bus.data_bitrate is not None and not bus.fd:
         diagnostics.add((*place, "data_bitrate"), "expected it with fd: true, got it without")
@@ -171,7 +171,7 @@ def _check_fd(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
 
 
 def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
-    """Ids of nodes of CANopen are used once."""
+    """Check that ids of nodes of CANopen are used once."""
     if bus.canopen is None:
         return
     owners = {bus.canopen.node: "node"}
@@ -183,7 +183,7 @@ def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
 
 
 def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[SentMessage]) -> None:
-    """The gateway against the buses, the messages and the valves that it forwards to.
+    """Check the gateway against the buses, the messages and the valves that it forwards to.
 
     Args:
         lookup: what it is bound with.

@@ -49,7 +49,7 @@ def corrected(
     signals: Mapping[str, Correction],
     listings: Iterable[Listing] = (),
 ) -> Message | str:
-    """The message as it is on the bus of this machine, or why it cannot be.
+    """Return the message as it is on the bus of this machine, or why it cannot be.
 
     Args:
         message: that of the DBC.

@@ -68,7 +68,7 @@ class DbcFile:
 def load_dbc(
     path: Path, names: Collection[str] | None = None
 ) -> tuple[DbcFile | None, list[Problem]]:
-    """Load messages of a DBC file strictly; instead of a file its problems, where it is none.
+    """Load messages of a DBC file strictly; return the file, or its problems.
 
     What is wrong with messages that are not loaded is a warning.
 

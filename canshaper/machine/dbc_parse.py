@@ -1,4 +1,4 @@
-"""Messages out of the text of a DBC file by cantools, as far as it has the time and memory."""
+"""Messages parsed from a DBC text by cantools, within limits of time and memory."""
 
 import logging
 import re
@@ -53,7 +53,7 @@ def parsed_messages(path: Path, text: str, *, bounded: bool) -> list[Message] | 
 
 
 def letters(text: str) -> int:
-    """How many there are, but for line ends: those of all other messages stay."""
+    """Return the number of letters without line ends, which other messages leave behind."""
     return len(text) - text.count("\n")
 
 

@@ -52,7 +52,7 @@ class Deployment:
     starts: tuple[StartValue, ...] = ()
     """What valve messages carry in signals that no axis uses."""
     listen_only: bool = False
-    """Nothing is sent but status: another controller drives the machine, or no one does."""
+    """Whether nothing is sent but status: another controller drives the machine, or no one."""
 
     def load(self, bus: str) -> BusLoad | None:
         """Load of a bus by the messages of the deployment; None where its bit rate is not given."""
@@ -88,7 +88,7 @@ class Deployment:
 
     @property
     def stopping_inputs(self) -> list[Bound[InputSection]]:
-        """Those without which nothing may move: joysticks, their switches, emergency stop."""
+        """Inputs without which nothing may move: joysticks, their switches, emergency stop."""
         stop = [self.emergency_stop] if self.emergency_stop else []
         return [*self.joysticks.values(), *self.switches, *stop]
 

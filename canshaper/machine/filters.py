@@ -15,7 +15,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
-    """Every filter that the axis may get has to run at the period of its valve."""
+    """Check that every filter that the axis may get runs at the period of its valve."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
     parts, filters = _parts(place, axis), _filters(place, axis)
     for at, part in parts:
@@ -41,7 +41,7 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: flo
 
 
 def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -> None:
-    """At each end of an adjustable number of the swing the filter, scaled to it, has to run."""
+    """Check that the filter runs, scaled to each end of an adjustable number of the swing."""
     control, rate = lookup.config.control, axis.limits.slowest_per_s
     for text, ends in (control.adjustable if control else {}).items():
         key = Key.parsed(text)
@@ -76,7 +76,7 @@ def _filters(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway 
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Filters that were designed for another swing or valve than the file has now: where, why."""
+    """Yield filters that were designed for another swing or valve than the file has: where, why."""
     for name, axis in config.axes.items():
         for place, chosen, sway in _filters(("axes", name), axis):
             design = chosen.design()
@@ -89,7 +89,7 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
 
 
 def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """A button for the next profile needs profiles, and no switch next to it that says which."""
+    """Check that a button for the next profile has profiles, and no switch that chooses them."""
     for name, joystick in config.joysticks.items():
         if joystick.next_profile:
             place = ("joysticks", name, "next_profile")
@@ -101,7 +101,7 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Every adjustable number has to be one that can be changed in motion."""
+    """Check that every adjustable number can be changed in motion."""
     add, adjustable = diagnostics.add, config.control.adjustable if config.control else {}
     for text, (low, high) in adjustable.items():
         place = ("control", "adjustable", text)

@@ -76,7 +76,7 @@ class Bound(Generic[Section_co]):
         return is_j1939(self.message) and not has_destination(self.message.frame_id)
 
     def sequence_checker(self) -> SequenceChecker:
-        """A new guard of its protection."""
+        """Return a new checker of its protection."""
         config = self.config
         step = config.alive_max_step or min(USUAL_MAX_STEP, self.protection.counts // 2)
         return SequenceChecker(self.protection, step, config.qualify)
@@ -140,7 +140,7 @@ def bind_input(
     enable: Iterable[tuple[Place, str]] = (),
     value: str | None = None,
 ) -> tuple[UsedMessage, Bound[AnySection]] | None:
-    """A message that is received: its switches, its cycle and its protection.
+    """Bind a message that is received: its switches, its cycle and its protection.
 
     Args:
         lookup: what it is bound with.
@@ -174,7 +174,7 @@ def bind_input(
 
 
 def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[EmergencyStop] | None:
-    """The emergency stop."""
+    """Bind the emergency stop."""
     if (result := bind_input(lookup, ("emergency_stop",), config, ("signal",))) is None:
         return None
     used, bound = result
@@ -184,7 +184,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[Emergenc
 
 
 def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radius] | None:
-    """The measured radius of the tip."""
+    """Bind the measured radius of the tip."""
     result = bind_input(lookup, place, config, value=config.signal)
     if result is None:
         return None
@@ -196,7 +196,7 @@ def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radi
 
 
 def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[StatusWord] | None:
-    """The status word of a valve."""
+    """Bind the status word of a valve."""
     if (result := bind_input(lookup, place, config, ("signal",))) is None:
         return None
     used, bound = result
@@ -206,7 +206,7 @@ def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[
 
 
 def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Choosing] | None:
-    """The load state, or the operator's choice."""
+    """Bind the load state, or the operator's choice."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
@@ -234,7 +234,7 @@ def bind_feedback(
 
 
 def check_source(used: UsedMessage, what: str) -> None:
-    """From any source address the first that is received would count, and no other."""
+    """Check that the source address is known; else only the first sender would count."""
     if used.any_source:
         text = f"missing: in the DBC {used.message.name} may come from any source address"
         used.add("source", f"{text}; {what} needs a known one")

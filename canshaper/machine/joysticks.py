@@ -46,7 +46,7 @@ def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
 
 
 def check_conditions(lookup: Lookup) -> None:
-    """Names in the lists that are none."""
+    """Report names in the lists that do not exist."""
     config, add = lookup.config, lookup.diagnostics.add
     for name, section in config.joysticks.items():
         if (of := section.enable_of) is not None:
@@ -65,7 +65,7 @@ def check_conditions(lookup: Lookup) -> None:
 
 
 def bind_switches(lookup: Lookup) -> list[BoundSwitches]:
-    """Every message with switches."""
+    """Bind every message with switches."""
     readers: dict[tuple[str, str], dict[str, SwitchSection]] = {}
     config, add = lookup.config, lookup.diagnostics.add
     needed = {c for joystick in config.joysticks for c in conditions(config, joystick)}
@@ -77,7 +77,7 @@ def bind_switches(lookup: Lookup) -> list[BoundSwitches]:
 
 
 def _bind(lookup: Lookup, switches: dict[str, SwitchSection]) -> BoundSwitches | None:
-    """The switches of one message."""
+    """Bind the switches of one message."""
     first, *others = switches
     config = switches[first]
     for other in others:
@@ -109,7 +109,7 @@ def _place(names: list[str] | None, joystick: str, i: int) -> Place:
 
 
 def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick | None:
-    """A joystick; its velocities are those that the axes name."""
+    """Bind a joystick, with the velocities that its axes name."""
     place: Place = ("joysticks", name)
     switches = ("reset", "anti_sway_off", "next_profile")
     enable = signals_of(lookup, name)
@@ -136,7 +136,7 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
 
 
 def _check_scaling(used: UsedMessage, commands: dict[str, Command]) -> None:
-    """A signal means the same to every axis that reads it."""
+    """Check that a signal means the same to every axis that reads it."""
     first: dict[str, str] = {}
     for axis, command in commands.items():
         before = first.setdefault(command.signal, axis)
@@ -149,7 +149,7 @@ def _check_scaling(used: UsedMessage, commands: dict[str, Command]) -> None:
 def _bind_velocity(
     used: UsedMessage, axis: str, command: Command, moves: dict[str, str]
 ) -> VelocitySignal | FlaggedVelocity | None:
-    """A signal that is positive one way and negative the other way, or with a flag for each.
+    """Bind a signal that is positive one way and negative the other, or has a flag for each.
 
     Args:
         used: the message.
@@ -185,7 +185,7 @@ def _bind_velocity(
 def _bind_rocker(
     used: UsedMessage, axis: str, command: Command, moves: dict[str, str]
 ) -> RockerVelocity | None:
-    """A rocker with a signal for each direction; arguments as for ``_bind_velocity``."""
+    """Bind a rocker with a signal for each direction; arguments as for ``_bind_velocity``."""
     velocities = []
     for key, name, also in (
         ("signal", command.signal, {}),
@@ -213,7 +213,7 @@ def check_following(
     config: DeploymentConfig,
     joysticks: Mapping[str, BoundJoystick | None],
 ) -> None:
-    """The joystick that ``tick`` names is one that can be followed."""
+    """Check that the joystick that ``tick`` names can be followed."""
     if config.tick is None:
         return
     name, place = config.tick.follow, ("tick", "follow")

@@ -52,7 +52,7 @@ class Lookup:
     def message(
         self, place: Place, config: Protected, *, received: bool, source: int | None = None
     ) -> UsedMessage | None:
-        """The message; noted as used on that bus, where no other part may use it.
+        """Return the message, and note it as used on that bus, where no other part may use it.
 
         A message of J1939 that we send gets our address; one that is received the address that the
         file names, else that of the DBC, where 254 means any.
@@ -110,7 +110,7 @@ class Lookup:
         return config.j1939.address if config and config.j1939 else None
 
     def sent(self, bus: str, message: Message, protection: Protection) -> SentMessage:
-        """A message that we send, under our address where it has one."""
+        """Return a message that we send, under our address where it has one."""
         return SentMessage(bus, message, self.own_address(bus), protection)
 
     def fd(self) -> frozenset[tuple[str, int, bool]]:
@@ -133,7 +133,7 @@ class Lookup:
         return messages
 
     def check_timeout(self, used: UsedMessage, timeout_ms: int) -> None:
-        """A message counts as lost only after it, or a tick that looks at it, has missed once."""
+        """Check that a message is lost only after it, or a tick that reads it, was missed once."""
         message, tick = used.message, self.config.tick_ms
         cycle = message.cycle_time or 0
         least = 2 * max(cycle, tick)
@@ -152,7 +152,7 @@ class Lookup:
         return cycle // tick
 
     def check_node(self, place: Place, bus: str, name: str | None) -> None:
-        """A node of CANopen that is named has to be one of its bus."""
+        """Check that a named node of CANopen is one of its bus."""
         config = self.config.buses.get(bus)
         nodes = config.canopen.nodes if config and config.canopen else {}
         if name is not None and name not in nodes:
@@ -161,7 +161,7 @@ class Lookup:
             self.diagnostics.add((*place, "node"), text)
 
     def check_groups(self) -> None:
-        """In a group of J1939 that commands a valve others say nothing: it would be a command."""
+        """Check that no other message is in a J1939 group that commands a valve."""
         commanded: dict[tuple[str, int], UsedMessage] = {}
         read: list[tuple[tuple[str, int], UsedMessage]] = []
         for (bus, _, _), used in self.used.items():
@@ -178,7 +178,7 @@ class Lookup:
                 used.add("message", f"{text}, got that of {key_path(valve.place)}")
 
     def _check_length(self, used: UsedMessage, in_dbc: Message, config: Protected) -> None:
-        """A message fits into one frame of its bus."""
+        """Check that a message fits into one frame of its bus."""
         name, length = in_dbc.name, in_dbc.length
         bus = self.config.buses.get(config.bus)
         most = CLASSICAL_BYTES if is_j1939(in_dbc) else FD_LENGTHS[-1]
@@ -193,7 +193,7 @@ class Lookup:
             used.add("message", f"{text}, {used.message.length} bytes, got {length}")
 
     def _check_pdo(self, used: UsedMessage, bus: str) -> None:
-        """On a bus of CANopen a message is a PDO: a command in an SDO would change a parameter."""
+        """Check that a message on CANopen is a PDO: an SDO would change a parameter."""
         config, message = self.config.buses.get(bus), used.message
         service = None if message.is_extended_frame else service_of(message.frame_id)
         if config and config.canopen and service:
@@ -203,7 +203,7 @@ class Lookup:
     def _check_j1939(
         self, used: UsedMessage, bus: str, *, received: bool, source: int | None
     ) -> None:
-        """Source addresses that cannot be."""
+        """Report impossible source addresses."""
         name, own = used.message.name, self.own_address(bus)
         if not is_j1939(used.message):
             if source is not None:

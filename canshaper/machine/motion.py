@@ -17,7 +17,7 @@ class BoundMotion:
 
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
-    """Every motion, by name; an axis is part of one at most."""
+    """Bind every motion, by name; an axis is part of one at most."""
     moved: dict[str, str] = {}
     motions = {}
     for name, motion in lookup.config.motion.items():
@@ -49,7 +49,7 @@ def _check_axis(
 
 
 def _check_crane(lookup: Lookup, place: Place, motion: Motion) -> None:
-    """Axes with the usual names, as front_slew, say which crane they are of."""
+    """Check that axes with the usual names, such as front_slew, are of the same crane."""
     slew, near_far = motion.slew, motion.near_far
     if near_far is None or not (slew.endswith("slew") and near_far.endswith("near_far")):
         return

@@ -125,7 +125,7 @@ def check_codes(used: UsedMessage, in_dbc: Iterable[Signal], listing: Listing) -
 
 
 def is_guess(signal: Signal, raw: float, name: str) -> bool:
-    """Whether a named value may be a measurement or not, as far as the DBC says it."""
+    """Whether the DBC leaves open if a named value is a measurement."""
     if named_fault(name) or is_neutral(signal, raw, name):
         return False
     return in_range(signal, _value(signal, raw))

@@ -25,7 +25,7 @@ BY_DATA_ID: Mapping[str, Callable[[int], E2e]] = {
 
 
 def bind_protection(used: UsedMessage, config: Protected) -> Protection:
-    """Protection of a message; its signals are noted as used."""
+    """Bind the protection of a message; its signals are noted as used."""
     if config.e2e is not None:
         return _bind_e2e(used, config)
     place: Place = (*used.place, "alive_counter")

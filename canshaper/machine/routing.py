@@ -100,7 +100,7 @@ class BusRoutes:
 
 @dataclass(frozen=True)
 class Routing:
-    """All buses.
+    """Routing table of all buses.
 
     Attributes:
         routes: what ids are, by bus, id and whether that is extended.
@@ -155,7 +155,7 @@ def build_routing(
     fd: Iterable[Key],
     listen_only: bool,
 ) -> Routing:
-    """The table of a deployment.
+    """Build the routing table of a deployment.
 
     Args:
         config: the deployment file.

@@ -115,7 +115,7 @@ class UsedMessage:
                 self.diagnostics.add(place, f'{text}, whose {raw} is "{code.name}" in the DBC')
 
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
-        """A raw value must be a whole number."""
+        """Check that a raw value is a whole number."""
         if signal.is_float or (signal.is_signed and not signed):
             got = "a float" if signal.is_float else "a signed one"
             kind = "an integer" if signed else "an unsigned integer"
@@ -137,7 +137,7 @@ class UsedMessage:
             )
 
     def check_state_bits(self, place: Place, signal: Signal) -> None:
-        """Control and status word of CiA 408 have the state in their low bits."""
+        """Check that control and status word of CiA 408 have the state in their low bits."""
         if signal.length < STATE_BITS:
             text = f"{signal.name}: expected {STATE_BITS} bits or more, got {signal.length}"
             self.diagnostics.add(place, text)

@@ -61,7 +61,7 @@ SharedValves = dict[tuple[str, str], SharedValve]
 def bind_valve(
     lookup: Lookup, shared_valves: SharedValves, place: Place, valve: Valve, command: Command
 ) -> tuple[ValveCodec, int] | None:
-    """The valve of an axis: its codec, and its period in ticks.
+    """Bind the valve of an axis: its codec, and its period in ticks.
 
     Args:
         lookup: what it is bound with.
@@ -135,7 +135,7 @@ def check_start_values(shared: SharedValve) -> None:
 
 
 def _check_cycle(lookup: Lookup, place: Place, valve: Valve, shared: SharedValve) -> None:
-    """Its frames have to come soon and often enough."""
+    """Check that its frames come soon and often enough."""
     cycle_ms = shared.ticks * lookup.config.tick_ms
     least_ms = cycle_ms * FRAMES_PER_TIMEOUT
     if cycle_ms > SLOWEST_VALVE_MS:
@@ -161,7 +161,7 @@ def _rewritten_joystick(config: DeploymentConfig, valve: Valve) -> str | None:
 def _check_rewritten(
     lookup: Lookup, place: Place, valve: Valve, command: Command, name: str
 ) -> None:
-    """In the frames of a joystick only its own axes may be rewritten, and protected as it is."""
+    """Check that only its own axes rewrite a joystick's frames, with the same protection."""
     add, joystick = lookup.diagnostics.add, lookup.config.joysticks[name]
     if command.joystick != name:
         text = f"expected the message of joystick {command.joystick}, or one of no joystick"
@@ -192,7 +192,7 @@ def _check_rewritten(
 def _bind_message(
     lookup: Lookup, shared_valves: SharedValves, place: Place, valve: Valve, joystick: str | None
 ) -> SharedValve | None:
-    """The message of a valve, new or already that of another axis."""
+    """Bind the message of a valve, new or already that of another axis."""
     key = (valve.bus, valve.message)
     if shared := shared_valves.get(key):
         text = f"the other axes of {valve.message}, got another"
@@ -236,7 +236,7 @@ def _rewritten_message(
 
 
 def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -> Signal | None:
-    """A signal that carries the command, or its magnitude where the direction stands apart."""
+    """Bind the signal of the command, or of its magnitude where the direction stands apart."""
     signal = used.find(place, name)
     if signal is None:
         return None
@@ -253,7 +253,7 @@ def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -
 def _bind_direction(
     used: UsedMessage, place: Place, config: DirectionCodes
 ) -> DirectionCodec | None:
-    """The signal that carries the direction of a command."""
+    """Bind the signal that carries the direction of a command."""
     at: Place = (*place, "signal")
     signal = used.integer(at, config.signal, key_path(at), signed=False)
     if signal is None:
