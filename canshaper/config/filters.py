@@ -189,7 +189,7 @@ def restored_filter(kind: str, given: set[str], values: dict[str, Any]) -> Filte
 
 
 def _named_off(section: Any) -> Any:
-    """YAML 1.1 takes ``off`` for false, and so its tools write it back."""
+    """Read false as ``off``: YAML 1.1 takes ``off`` for false, and its tools write it so."""
     if isinstance(section, dict) and section.get("kind") is False:
         return section | {"kind": "off"}
     return section
