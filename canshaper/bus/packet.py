@@ -129,7 +129,7 @@ class Arrivals:
         self.emptied()
 
     def begin(self) -> int:
-        """A read of the port begins.
+        """Begin a read of the port.
 
         Returns:
             Earliest arrival of what is read: when the port was last seen empty.
@@ -156,7 +156,7 @@ class Arrivals:
         return arrived_ns if arrived_ns > self._empty_ns else self._empty_ns
 
     def emptied(self) -> None:
-        """Nothing waits in the port: what comes later arrived after this read began."""
+        """Note that nothing waits in the port: later frames arrive after this read began."""
         self._empty_ns, self._empty_offset_ns = self._now_ns, self._now_offset_ns
 
 
@@ -165,7 +165,7 @@ OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 
 
 def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
-    """The fault to count, and the state in which the bus is; None where it says nothing of that.
+    """Return the fault to count, and the state of the bus; None where the frame does not say.
 
     Args:
         word: id of the frame, with its flags.

@@ -39,7 +39,7 @@ class Port(Protocol):
         """
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits, in order; ends when there is none or the bus fails."""
+        """Yield every frame that waits, in order; end when there is none or the bus fails."""
 
     def background(self) -> Iterator[Frame]:
         """Yield frames that can wait until the valve frames are out, as of senders with our ids."""
@@ -131,7 +131,7 @@ class ListeningPort:
         return self._port.arrived_ns
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits."""
+        """Yield every frame that waits."""
         return self._port.frames()
 
     def background(self) -> Iterator[Frame]:
@@ -139,7 +139,7 @@ class ListeningPort:
         return self._port.background()
 
     def send(self, frame: Frame) -> bool:
-        """Send a status; of anything else only say so."""
+        """Send a status; drop anything else, and return True for it."""
         return frame[1:3] not in self._sent or self._port.send(frame)
 
     def watch(self, name: str, ids: BusRoutes) -> None:

@@ -79,7 +79,7 @@ class PythonCanPort:
         self._lost = 0
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits, in order; ends when there is none or the bus fails."""
+        """Yield every frame that waits, in order; end when there is none or the bus fails."""
         receive, failures = self._bus.recv, 0
         # python-can's own times are those of whatever clock an interface has.
         self.arrived_ns = self._arrivals.begin()

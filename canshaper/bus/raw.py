@@ -110,7 +110,7 @@ class RawPort:
     # -- receiving -----------------------------------------------------------------------------
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits, in order; ends when there is none or the bus fails."""
+        """Yield every frame that waits, in order; end when there is none or the bus fails."""
         if not self._sockets and not self._reopened():
             return
         waiting, receive, arrivals = self._waiting[0], self._receive, self._arrivals
@@ -168,7 +168,7 @@ class RawPort:
                 self._no_frame(data)
 
     def _no_frame(self, data: bytes) -> None:
-        """An error frame says how the bus is; anything else is none of a message."""
+        """Take the state of the bus from an error frame; anything else is of wrong length."""
         word, _length, payload = CAN_FRAME.unpack(data) if len(data) == SIZE else (0, 0, b"")
         if not word & ERR_FLAG:
             self._on_fault(FrameFault.WRONG_LENGTH)
@@ -274,7 +274,7 @@ class RawPort:
             self._on_fault(FrameFault.BUS_ERROR)
 
     def _away(self, state: BusState, fault: FrameFault) -> None:
-        """Take and send nothing until the interface is opened again; report a fault once."""
+        """Stop sending and receiving until the interface is opened again; report a fault once."""
         self.close()
         self._not_before_ns = time.monotonic_ns() + REOPEN_NS
         if self.state is not state:
