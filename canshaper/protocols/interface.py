@@ -53,16 +53,16 @@ class DrivenAxis(Protocol):
         """Put a command into the message of its valve."""
 
     def invalidate(self) -> None:
-        """Its input was lost, though it may be back by the next tick."""
+        """Take note that its input was lost, though it may be back by the next tick."""
 
     def foreign_sender(self, now_ns: int) -> None:
-        """A frame with the id of its valve came from another sender."""
+        """Trip, because another sender has sent a frame with the id of its valve."""
 
     def add_interlock(self, interlock: Interlock) -> None:
-        """Let something else agree before it may move; asked after those that were added before."""
+        """Add an interlock, which has to agree before it may move; called after those before."""
 
     def measured_by(self, node: SensorNode) -> None:
-        """Count what its sway sensor measures only while this node works."""
+        """Use measurements of its sway sensor only while this node works."""
 
 
 class FrameHandler(Protocol):
@@ -83,10 +83,10 @@ class ForwardingRule(Protocol):
         """Whether a valid frame of the joystick came since the last call."""
 
     def forward(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
-        """A frame of the joystick as it leaves; neutral where ``stopped``."""
+        """Return the frame of the joystick as it leaves; neutral where ``stopped``."""
 
     def own(self, now_ns: int) -> Frame | None:
-        """A frame of our own, where the axes have just moved and the joystick sends none."""
+        """Return a frame of our own, where the axes have just moved and the joystick has none."""
 
     def last(self) -> list[Frame]:
         """Return the last frames before we go."""
@@ -112,11 +112,11 @@ class BusProtocol:
         """Return the handler of a frame that is none of ``inputs``."""
 
     def usual(self, frame: Frame) -> bool:
-        """Whether such a frame is no fault though no DBC file knows it."""
+        """Whether such a frame is no fault although no DBC file has it."""
         raise NotImplementedError
 
     def silence(self, now_ns: int) -> FrameFault:
-        """A fault because something has just fallen silent."""
+        """Return a fault where something has just fallen silent."""
         return FrameFault.NONE
 
     def frames(self, now_ns: int) -> Iterable[Frame]:
@@ -128,19 +128,19 @@ class BusProtocol:
         return ()
 
     def stalled(self) -> None:
-        """The loop stood still: frames were missed on all buses."""
+        """Take note that the loop stood still: frames were missed on all buses."""
 
     def on_bus_off(self, bus: str) -> None:
-        """We are not on this bus now: frames are missed there."""
+        """Take note that we are not on this bus now: frames are missed there."""
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus."""
+        """Take note that a frame did not reach its bus."""
 
     def invalidate(self, bus: str | None = None) -> None:
-        """Nothing received so far counts any more; of one bus, or of all. Not for ``inputs``."""
+        """Invalidate what was received so far, of one bus or of all; but for ``inputs``."""
 
     def leave(self) -> None:
-        """The next frame of every valve is the last one."""
+        """Prepare the end: the next frame of every valve is the last one."""
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
         """Yield parts that a reload carries over besides ``inputs``; ``places``: keys of buses."""

@@ -52,7 +52,7 @@ class ValveControl(Input):
         self._go(0, None)
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """The low four bits have the state; that it has left ACTIVE takes no trust."""
+        """Take the state in the low four bits; leaving ACTIVE counts in any frame."""
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
         if accepted:
@@ -60,7 +60,7 @@ class ValveControl(Input):
         return GOOD
 
     def gate(self, neutral: bool, now_ns: int) -> Reason | None:
-        """Why the axis may not move; the control word goes one step on where it is time."""
+        """Return why the axis may not move; move the control word on when it is time."""
         if self._state is None or now_ns - self._state_ns > self._status_timeout_ns:
             self.resync()
         self._next(now_ns)
@@ -71,7 +71,7 @@ class ValveControl(Input):
         return Reason.VALVE_NOT_READY if neutral else Reason.VALVE_FAULT
 
     def _next(self, now_ns: int) -> None:
-        """One step on, back to the beginning, or a reset of the valve's fault."""
+        """Take the next step, start again, or reset the valve's fault."""
         if self._since_ns is None:
             self._since_ns = now_ns
         passed_ns = now_ns - self._since_ns
@@ -92,7 +92,7 @@ class ValveControl(Input):
             self._go(0, now_ns)
 
     def resync(self) -> None:
-        """The valve is not what it was: nothing known of it, and from INIT once more."""
+        """Forget all that is known of the valve, and start from INIT."""
         self._state = None
         self._go(0, None)
 
@@ -110,6 +110,6 @@ class ValveControl(Input):
             self._message.raw[self._control] = int(ValveState.HOLD)
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
         super().invalidate()
         self.resync()

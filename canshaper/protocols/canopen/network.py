@@ -65,13 +65,13 @@ class CanopenNetwork(BusProtocol):
             runner.measured_by(self.nodes[sensor.config.bus].nodes[sensor.config.node])
 
     def usual(self, frame: Frame) -> bool:
-        """Others use services there that no DBC file knows."""
+        """Whether the frame is of a service that other nodes use and no DBC file has."""
         return (
             not frame.extended and frame.bus in self.nodes and service_of(frame.can_id) is not None
         )
 
     def silence(self, now_ns: int) -> FrameFault:
-        """A node has just fallen silent."""
+        """Return a fault if a node has just fallen silent."""
         lost = sum(nodes.lost(now_ns) for nodes in self.nodes.values())
         return FrameFault.HEARTBEAT_LOST if lost else FrameFault.NONE
 
@@ -86,7 +86,7 @@ class CanopenNetwork(BusProtocol):
             yield from nodes.changes()
 
     def leave(self) -> None:
-        """Valves that are active hold."""
+        """Let active valves hold."""
         for control in self.controls.values():
             control.hold()
 

@@ -26,7 +26,7 @@ BOOT_UP, OPERATIONAL = bytes((NodeState.BOOT_UP,)), bytes((NodeState.OPERATIONAL
 
 @dataclass(frozen=True, slots=True)
 class NodeEvent:
-    """Another node says something else than before."""
+    """Change of what another node reports."""
 
     bus: str
     node: str
@@ -120,7 +120,7 @@ class RemoteNode:
 
 
 class NodeGate:
-    """Why an axis may not move, by the node of its joystick or of its valve.
+    """Interlock by the node of an axis' joystick or valve.
 
     Args:
         node: that node.
@@ -137,7 +137,7 @@ class NodeGate:
         self._stops, self._alarms = node.stops, node.alarms
 
     def __call__(self, neutral: bool, _now_ns: int) -> Reason | None:
-        """The reason, or None; a failure since it was asked last counts, however short it was."""
+        """Return the reason, or None; a failure since the last call counts, however short."""
         node = self._node
         stopped, alarmed = node.stops != self._stops, node.alarms != self._alarms
         self._stops, self._alarms = node.stops, node.alarms
@@ -156,7 +156,7 @@ class _NodeMessage:
         self.receive = receive
 
     def invalidate(self) -> None:
-        """Nothing good received so far counts any more."""
+        """Invalidate everything good received so far."""
         self._node.invalidate()
 
     def copy_state(self, before: Self) -> None:

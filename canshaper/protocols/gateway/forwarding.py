@@ -52,7 +52,7 @@ class ForwardedJoystick:
         return self._seen is not before
 
     def forward(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
-        """A frame of the joystick as it leaves; nothing else in it is changed.
+        """Return the frame of the joystick as it leaves; only the velocities are changed.
 
         Args:
             data: the frame.
@@ -68,7 +68,7 @@ class ForwardedJoystick:
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:
-        """A frame of our own, where the axes have just moved and the joystick has none."""
+        """Return a frame of our own, where the axes have just moved and the joystick has none."""
         stopping = any(runner.axis.state in MOVING for runner in self._runners)
         tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
         lost = self._joystick.lost(now_ns) is not None
@@ -149,7 +149,7 @@ def exactly(can_id: int, extended: bool) -> Pattern:
 
 
 def all_but(excluded: Iterable[Pattern]) -> list[Pattern]:
-    """Patterns that fit every id but those that one of ``excluded`` fits; no two of them meet."""
+    """Return patterns that fit every id except those of ``excluded``; no two overlap."""
     left = list(EVERYTHING)
     for pattern in sorted(set(excluded)):
         left = [part for whole in left for part in _without(whole, pattern)]

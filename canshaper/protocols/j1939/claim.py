@@ -140,7 +140,7 @@ class AddressClaim:
             self._refused.append((pgn, source))
 
     def _claim_at(self, time_ns: int) -> None:
-        """A claim is due; one that is due already is not put off by another request."""
+        """Schedule a claim; one that is due already is not put off by another request."""
         if self._requesting:
             return
         time_ns = max(time_ns, self._again_ns)
@@ -179,7 +179,7 @@ class AddressClaim:
             self._claim_at(self._again_ns)
 
     def not_sent(self) -> None:
-        """The last claim did not go out: it is tried again, and the wait begins with it."""
+        """Claim again, because the last claim did not go out; the wait begins with it."""
         self.restart()
         self._claim_at(self._again_ns)
 
@@ -253,7 +253,7 @@ class Node:
             self.faults.interrupt()
 
     def send_failed(self, *, claim: bool) -> None:
-        """A frame did not reach the bus; one that was a claim is no claim."""
+        """Take note that a frame did not reach the bus; a claim is then repeated."""
         if claim:
             self._claim.not_sent()
         else:
@@ -264,5 +264,5 @@ class Node:
         self._claim.copy_state(before._claim)
 
     def on_bus_off(self) -> None:
-        """Claims of others were missed."""
+        """Claim again, because claims of others were missed."""
         self._claim.restart()

@@ -116,7 +116,7 @@ class ActiveFaults:
             yield self._frame(TRANSPORT_DATA, self._packets.pop(0), LOWEST_PRIORITY)
 
     def interrupt(self) -> None:
-        """Nothing may be sent now: a broadcast under way is not gone on with later."""
+        """Drop a broadcast under way, because nothing may be sent now."""
         self._packets.clear()
         self._next_ns = 0
 

@@ -79,11 +79,11 @@ class AnySource:
         return self._input.receive(frame.data, arrived_ns)
 
     def invalidate(self) -> None:
-        """Nothing received so far counts any more."""
+        """Invalidate everything received so far."""
         self._input.invalidate()
 
     def copy_state(self, before: Self) -> None:
-        """The address that counted still does; another one has to wait for its silence."""
+        """Keep the address that counted; another one has to wait for its silence."""
         self._source, self._last_frame_ns = before._source, before._last_frame_ns
         self._ignored = set(before._ignored)
 
@@ -121,7 +121,7 @@ class ReceivedGroup:
 
 
 class CommandedByOthers:
-    """Commands to valves of ours that are not ours: another address, or another priority."""
+    """Commands of others to our valves: from another address, or with another priority."""
 
     def __init__(self, runners: Sequence[DrivenAxis]) -> None:
         self._runners = [
@@ -129,7 +129,7 @@ class CommandedByOthers:
         ]
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Two controllers must not drive one crane; a valve at another destination is not ours."""
+        """Trip our valves that are addressed: two controllers must not drive one crane."""
         to, fault = _destination(frame.can_id), FrameFault.NONE
         for runner, destination in self._runners:
             if to in (destination, GLOBAL):

@@ -104,7 +104,7 @@ class J1939Network(BusProtocol):
         return self._groups.get((frame.bus, group_of(frame.can_id)))
 
     def usual(self, frame: Frame) -> bool:
-        """Others send groups there that no DBC file knows."""
+        """Whether the frame can be of a group that other nodes send and no DBC file has."""
         return frame.extended and frame.bus in self._buses
 
     @property
@@ -129,17 +129,17 @@ class J1939Network(BusProtocol):
             one.events.clear()
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus: who has lost what we say may have inputs our address."""
+        """Let our node claim again where a frame did not reach its bus."""
         if node := self.nodes.get(frame.bus):
             node.send_failed(claim=frame.extended and pgn_of(frame.can_id) == CLAIMED)
 
     def on_bus_off(self, bus: str) -> None:
-        """Claims of others were missed on this bus: claim again before anything else."""
+        """Claim again before anything else, because claims of others were missed on this bus."""
         if node := self.nodes.get(bus):
             node.on_bus_off()
 
     def stalled(self) -> None:
-        """Claims were missed on all buses."""
+        """Claim again on all buses, because claims of others were missed."""
         for node in self.nodes.values():
             node.on_bus_off()
 
