@@ -143,7 +143,7 @@ class Daemon:
         return not (self._stop or applied)
 
     def _wait(self, seconds: float) -> None:
-        """In a gateway: pass frames on until the next deadline."""
+        """Pass frames on until the next deadline, in a gateway."""
         assert self._line is not None  # asked of a gateway only
         self._line.wait(seconds, self._recorder, self._ports, self._standstill)
 
@@ -172,7 +172,7 @@ class Daemon:
         self._collector.pause(now_ns)
 
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
-        """One request from the control socket."""
+        """Answer one request from the control socket."""
         values = request.get("set", {})
         if request.keys() - {"set", "black_box"} or not isinstance(values, dict):
             expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
@@ -217,7 +217,7 @@ class Daemon:
         return InlineGateway(deployment, self._on_fault)
 
     def _open_control(self, deployment: Deployment) -> ControlServer | None:
-        """The control socket, where there shall be one; a machine works without it too."""
+        """Open the control socket, if the file has one; a machine works without it too."""
         control = deployment.config.control
         if control is None:
             return None
@@ -305,7 +305,7 @@ class Daemon:
         return not refused
 
     def _send_identity(self) -> None:
-        """The digest of what runs, where a message carries it and its bus may be used."""
+        """Send the digest of what runs, where a message carries it and its bus may be used."""
         status = self._controller.deployment.identity_status
         if status and status.message.key[0] not in self._controller.silent_buses:
             frame = self._controller.status.identity(status)
@@ -325,7 +325,7 @@ class Daemon:
             self._stop = True
 
     def _leave_at_once(self, number: int) -> NoReturn:
-        """The second signal to stop: neutral is tried once more, and nothing is waited for."""
+        """End at the second signal to stop: try neutral once more, and wait for nothing."""
         for frame in self._recorder.neutral_frames():
             self._ports[frame.bus].send(frame)
         self._reporter.events()

@@ -76,7 +76,7 @@ class TickFollower:
         return max(-self._most_ns, min(self._most_ns, error_ns))
 
     def _measure(self, passed_ns: int) -> None:
-        """Between two frames so much has passed, in which others may be lost."""
+        """Measure the cycle by the time between two frames, in which others may be lost."""
         self._frames += 1
         self._cycles += max(1, round(passed_ns / self._cycle_ns))
         self._span_ns += passed_ns
@@ -95,7 +95,7 @@ class TickFollower:
         )
 
     def news(self) -> str:
-        """For the log: whether the joystick is followed, once where that has changed."""
+        """Return a line for the log where following has begun or ended."""
         news, self._news = self._news, ""
         return news
 

@@ -71,22 +71,22 @@ class FrameProcessor(Protocol):
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last is one of a valve, and any moves."""
+        """Whether the frame that was handed out last is that of a valve, and any axis moves."""
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """A frame was received; what it leaves as on the other bus of a gateway, or None."""
+        """Take a frame; return the frame for the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
-        """The loop stood still for too long: what comes before the next tick has waited."""
+        """Take note that the loop stood still: frames up to the next tick have waited."""
 
     def tick(self, now_ns: int, missed: int) -> Iterator[Frame]:
         """Run one tick, and yield the frames to send now."""
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus."""
+        """Take note that a frame did not reach its bus."""
 
     def withhold(self, frame: Frame) -> bool:
-        """A valve frame comes too late: whether it moves one, and so must not leave."""
+        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
 
 
 class FramePort(Protocol):
@@ -94,10 +94,10 @@ class FramePort(Protocol):
 
     @property
     def arrived_ns(self) -> int:
-        """When the frame arrived that ``frames`` has just handed out."""
+        """Arrival of the frame that ``frames`` has just handed out."""
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits, in order."""
+        """Yield every frame that waits, in order."""
 
     def background(self) -> Iterator[Frame]:
         """Yield frames that can wait until the valves have their commands."""

@@ -38,7 +38,7 @@ class ServiceManager:
         self._unsent: str | None = None
 
     def ready(self, status: str) -> None:
-        """The service is at work, or the reload is over."""
+        """Report that the service is at work, or that the reload is over."""
         limit = f"\nWATCHDOG_USEC={self._limit_us}" if self._limit_us else ""
         self._send_surely(f"READY=1\nSTATUS={status}{limit}")
 
@@ -52,15 +52,15 @@ class ServiceManager:
         self._send_surely(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}{limit}")
 
     def stopping(self) -> None:
-        """The service is about to end."""
+        """Report that the service is about to end."""
         self._send("STOPPING=1")
 
     def status(self, text: str) -> None:
-        """One line for people."""
+        """Report one line for people."""
         self._send(f"STATUS={text}")
 
     def ping(self, now_ns: int) -> None:
-        """The control loop is alive; sent no more often than the watchdog needs it."""
+        """Report that the control loop is alive, no more often than the watchdog needs it."""
         if self._unsent:
             self._send_surely(self._unsent)
         if self._ping_ns and now_ns >= self._next_ping_ns:
@@ -112,7 +112,7 @@ class Collector:
         gc.disable()
 
     def pause(self, now_ns: int) -> None:
-        """The loop has time: collect what came since the start, now and then."""
+        """Collect what came since the start, now and then, while the loop has time."""
         if now_ns >= self._next_ns:
             self._next_ns = now_ns + self.PERIOD_NS
             gc.collect()

@@ -84,7 +84,7 @@ def _read(load: Callable[[], Deployment], file: BinaryIO) -> NoReturn:
 
 
 def _bound() -> None:
-    """Let this process take so much memory and time, no more."""
+    """Limit memory and time of this process."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     most = pages * resource.getpagesize() + MOST_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (most, most))

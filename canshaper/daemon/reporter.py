@@ -63,7 +63,7 @@ class Reporter:
                 log.warning("fault=%s counts=%s", fault.name, counters.values)
 
     def late(self, late_ns: int) -> None:
-        """A tick began so long after its deadline."""
+        """Take the lateness of a tick."""
         self._latest_ns = max(self._latest_ns, late_ns)
 
     def status(self, now_ns: int) -> bool:
