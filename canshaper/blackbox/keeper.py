@@ -77,7 +77,7 @@ class BlackBox:
         return self._recorder
 
     def begin(self, now_ns: int) -> None:
-        """From here on everything is recorded."""
+        """Record everything from here on."""
         self._flush()  # what was before is not
         self._keep_state(now_ns, follows=False)
 
@@ -123,11 +123,11 @@ class BlackBox:
                 "waits": waits}  # fmt: skip
 
     def failed(self, why: str) -> None:
-        """The program failed: what is recorded so far is written at the end."""
+        """Note a failure of the program: what is recorded so far is written at the end."""
         self._why = why
 
     def close(self) -> None:
-        """The daemon ends, with every valve neutral: what is to be written is written now."""
+        """End with the daemon: write now what is to be written; every valve is neutral."""
         self._flush()
         if self._writer:
             self._ended(os.waitpid(self._writer, 0)[1])

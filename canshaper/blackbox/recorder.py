@@ -1,4 +1,4 @@
-"""Stands around the controller and writes down whatever goes in and comes out."""
+"""Recorder around the controller: writes down every call and every result."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -47,7 +47,7 @@ class Recorder:
         return self._controller.moves
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """One tick: the frames to send now."""
+        """Run one tick, and yield the frames to send now."""
         note = self._note
         note((TICK, None, missed, now_ns))
         for frame in self._guarded.tick(now_ns, missed):
@@ -55,22 +55,22 @@ class Recorder:
             note((TX, frame, 0, 0))
 
     def stalled(self) -> None:
-        """The loop stood still for too long."""
+        """Take note that the loop stood still for too long."""
         self._note((Kind.STALLED, None, 0, 0))
         self._guarded.stalled()
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus."""
+        """Take note that a frame did not reach its bus."""
         self._note((Kind.FAILED, frame, 0, 0))
         self._guarded.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """A valve frame comes too late: whether it moves one, and so must not leave."""
+        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
         self._note((Kind.WITHHELD, frame, 0, 0))
         return self._guarded.withhold(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve."""
+        """Return a neutral frame for every valve."""
         self._note((Kind.NEUTRAL, None, 0, 0))
         frames = self._guarded.neutral_frames()
         for frame in frames:
@@ -78,17 +78,17 @@ class Recorder:
         return frames
 
     def on_bus_off(self, bus: str) -> None:
-        """We are not on a bus now."""
+        """Take note that we are not on a bus now."""
         self._note((Kind.OFF_BUS, None, self._bus[bus], 0))
         self._controller.on_bus_off(bus)
 
     def fault(self, fault: FrameFault) -> None:
-        """A bus has a fault."""
+        """Take note that a bus has a fault."""
         self._note((Kind.FAULT, None, fault, 0))
         self._controller.counters.add(fault)
 
     def set(self, values: Mapping[str, object]) -> None:
-        """Numbers have been changed by hand."""
+        """Take note that numbers have been changed by hand."""
         self._guarded.set(values)
         self.flush()
         text = json.dumps(values).encode()
