@@ -24,8 +24,8 @@ from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")
 
-# Between two states of the controller; a replay can begin at each of them. To keep one takes a
-# millisecond, behind the tick: one that is shorter than this does it only while nothing moves.
+# Time between two saved states of the controller; a replay can begin at each. To save one takes a
+# millisecond after the tick: with a tick shorter than this it is done only while nothing moves.
 STATE_NS = 10_000_000_000
 SHORT_TICK_MS = 5
 # How long after a trip the recording goes on.

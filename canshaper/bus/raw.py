@@ -41,7 +41,7 @@ PROBE_NS = 500_000_000
 REOPEN_NS = 200_000_000
 # States in which a frame of ours that gets onto the bus is news.
 SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.FAILED))
-# The device is no more; the socket would have to be bound to a new one.
+# The device is gone; the socket would have to be bound to a new one.
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
 LOST = frozenset((BusState.DOWN, BusState.FAILED))
 # States in which the sockets are closed, to be opened again.

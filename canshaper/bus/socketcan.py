@@ -123,9 +123,9 @@ def _word_and_mask(message: tuple[int, bool]) -> tuple[int, int]:
     return can_id, SFF_MASK | EFF_FLAG
 
 
-# Of one id for so long without one of them getting onto the bus: one waits, one is being sent, one
-# more for a confirmation that comes just after the tick. A slow bus with a fast loop is no fault,
-# so time has to pass as well: 30 frames of 250 kbit/s.
+# Frames of one id under way, and for how long, until that is a fault: one waits, one is being sent,
+# one more for a confirmation just after the tick. A slow bus with a fast loop is no fault, so time
+# has to pass as well: 30 frames at 250 kbit/s.
 MOST_UNCONFIRMED = 3
 UNCONFIRMED_NS = 20_000_000
 # Claims: on a bus that takes none one is sent now and then, until its queue is full.

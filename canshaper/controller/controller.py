@@ -147,7 +147,7 @@ class Controller:
         """Return the frame for the other bus of a gateway, if a joystick has received one."""
         for rule in self._forwarding.values():
             if rule.new_frame():
-                if self._stood_still:  # what has waited is not passed on later either
+                if self._stood_still:  # a frame that has waited is not passed on later either
                     return None
                 stopped = self._stop is not None and self._stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)

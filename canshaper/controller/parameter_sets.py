@@ -19,7 +19,7 @@ from canshaper.shaping.registry import (
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.sway import SwayModel
 
-# Between two changes of one axis: a weight that trembles must not keep the loop busy.
+# Shortest time between two changes of one axis: a noisy weight must not keep the loop busy.
 LEAST_BETWEEN_NS = 100_000_000
 # A profile that changes on the way to a speed leaves as much swing as no filter: it waits until the
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.

@@ -221,7 +221,7 @@ class AxisControl:
         self._releases = joystick.releases
         # A release is more than a fault.
         if fault is not None and (command.enabled or axis.neutral):
-            # A switch that does not agree does not hide that the one to press is let go of; where
+            # Another switch that does not agree must not hide a release of the one to press. Where
             # that one is lost, its return is no press.
             let_go = not command.enabled and command.fault is None
             enabled = not (let_go and fault is Reason.ENABLE_OFF)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("canshaper")
 
-# No one receives our frames there, or we no one's.
+# States in which no one receives our frames, or we receive none.
 _AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE)
 INTERNAL_ERROR = "INTERNAL_ERROR"
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))

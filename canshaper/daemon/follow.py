@@ -13,13 +13,13 @@ from canshaper.machine.joysticks import follow_fault
 
 log = logging.getLogger("canshaper")
 
-# A period may be so much shorter or longer than the tick.
+# Largest part by which a period may be shorter or longer than the tick.
 MOST = 0.01
 # From the joystick's frame to the deadline: the frame may come so late and is still read.
 AFTER_NS = 900_000
 # Its cycle is measured over so many frames; jitter of a frame hardly shows in their mean.
 MEASURED = 50
-# How far the cycle may be off: what is followed, and what is followed again.
+# Largest error of the cycle: while it is followed, and until it is followed again.
 OFF, AGAIN = 0.9 * MOST, 0.5 * MOST
 # Frames of other joysticks that come so soon after another are waited for.
 CLUSTER_NS = 1_000_000

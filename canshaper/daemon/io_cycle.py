@@ -61,8 +61,8 @@ class Standstill:
         return now_ns > latest_ns
 
 
-# After a standstill ports are asked so often until none has anything more: a port hands out 2000
-# frames at a time, a queue holds more, and 100 000 is more than any.
+# After a standstill ports are read again until none has more frames, this often at most: a port
+# hands out 2000 frames at a time, a queue holds more, and none holds 100 000.
 MOST_ROUNDS = 50
 
 

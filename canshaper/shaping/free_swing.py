@@ -9,7 +9,7 @@ from typing import NamedTuple
 from canshaper.shaping.sway import SwayMode, swing_over
 from canshaper.shaping.sway_sensor import TICK_OF_NOISE_S, Measured, SensorLimits, SensorTiming
 
-# The gains are within a thousandth of the steady ones then, some 10 ms later.
+# After so many steps, some 10 ms, the gains are within a thousandth of the steady ones.
 MOST_STEPS = 5000
 
 
@@ -22,10 +22,10 @@ def kalman_gains(
     """Return Kalman gains for successive measurements; the last ones are the steady state's.
 
     Args:
-        step: what the states become until the next measurement, a row for each.
-        shown: how much of each the measurement shows, whose noise has a variance of 1.
-        noise: variance that each gets until the next one.
-        first: variance of each before the first one.
+        step: transition of the states to the next measurement, a row for each state.
+        shown: part of each state in the measurement, whose noise has a variance of 1.
+        noise: process noise of each state between two measurements, variance.
+        first: variance of each state before the first measurement.
     """
     states = range(len(shown))
     covariance = [[first[k] if k == other else 0.0 for other in states] for k in states]
@@ -47,19 +47,19 @@ def kalman_gains(
     return tuple(gains[1:])
 
 
-# Process noise of a tick of 20 ms against a measurement noise of 1: of angle and rate, for the
-# quickness of the sensor's timing, and of the offset. That of a gyro may jump by no more than a
-# grapple's rate can: it has to be found before the damping of what is none does harm.
+# Process noise in a tick of 20 ms, with a measurement noise of 1: of angle and rate for the
+# quickness of the sensor's timing, and of the offset. The offset of a gyro may jump by as much as
+# a grapple's rate at most: it is estimated before the damping of a false swing does harm.
 ANGLE_PER_RATE = 0.02
 OFFSET_NOISE = {Measured.ANGLE: 0.02, Measured.RATE: 0.04}
-# What is expected at the first measurement, standard deviations: of the swing deg and deg/s, of the
-# offset a part of the largest one.
+# Standard deviations at the first measurement: of the swing, deg and deg/s; of the offset, as a
+# part of the largest one.
 FIRST_DEG, FIRST_DEG_S, FIRST_OFFSET = 10.0, 30.0, 1.0 / 12.0
 # From then on the gains are those of the steady state.
 FIRST_S = 4.0
-# With a second mode: process noise of the first one's rate and of its own, and what is expected
-# of it at the first measurement, deg and deg/s. So slow is the first one that the second, which is
-# driven too, hardly gets into it.
+# With a second mode: process noise of the first mode's rate and of the second mode, and standard
+# deviations of the second mode at the first measurement, deg and deg/s. The first mode is estimated
+# so slowly that the second one, which is driven too, hardly disturbs it.
 QUICKNESS_OF_TWO, SECOND_QUICKNESS = 0.4, 5.0
 FIRST_SECOND_DEG, FIRST_SECOND_DEG_S = 2.0, 20.0
 

@@ -6,8 +6,8 @@ from collections import deque
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.sway_sensor import SensorTiming
 
-# The lead that a two-axis motion makes ends with it; what is left by rounding goes with this time
-# constant, and below so much (full speed, times seconds) there is none.
+# The lead that a two-axis motion makes ends with the motion. The rest that rounding leaves decays
+# with this time constant, and is 0 below this value (full speed times seconds).
 LEAD_S, NO_LEAD = 1.0, 1e-5
 
 
@@ -48,8 +48,8 @@ class Late:
 class LateModel:
     """The sway as it was at the time of the measurement.
 
-    What a motion of two axes adds makes no swing of the grapple, but the tip stands so much ahead
-    of where it hangs: that is in the angle too.
+    The velocity that a motion of two axes adds makes no swing of the grapple, but it moves the tip
+    ahead of the grapple: the measured angle includes that lead.
 
     Args:
         sway: sway model of the axis.

@@ -20,15 +20,15 @@ import math
 
 from canshaper.shaping.moving_axis import GrapplePath, MovingAxis
 
-# Time constant with which a measured radius corrects the one that is carried on: a jump of the
-# signal moves nothing at once.
+# Time constant with which a measured radius corrects the predicted one: a jump of the signal moves
+# nothing at once.
 RADIUS_S = 1.0
-# Time in which the added part ends where one of the axes can no more.
+# Time in which the added part fades when one of the axes becomes unable to follow.
 FADE_S = 0.2
 _REST: GrapplePath = 0.0, 0.0, 0.0, 0.0
-# Least part of gravity that is left across the boom; beyond it the small angles are none.
+# Least part of gravity that is left across the boom; with less the angles are no longer small.
 _LEAST = 0.5
-# Least radius of the grapple that the map takes: a sensor may say 0.
+# Least radius of the grapple in the computation: a sensor may report 0.
 _LEAST_RADIUS_M = 0.5
 
 

@@ -123,5 +123,5 @@ class MovingAxis:
                 return
             velocity = math.copysign(1.0, velocity)
         self.added = velocity
-        # What a fading part leaves out is not made up for.
+        # A velocity that fading leaves out is not added later.
         self.reached = target if weight < 1.0 else self.reached + velocity * way

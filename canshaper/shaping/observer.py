@@ -34,7 +34,7 @@ class SwayObserver:
         late: the late model.
         free: free swing, if the sensor shows this axis.
         negated: the same, if it shows the opposite.
-        alone: what it shows, if that is no swing at all, only smooth.
+        alone: the measurement itself, if that is no swing at all, only smooth.
         dragged: the same, of a grapple on the ground that the tip turns as it moves.
     """
 

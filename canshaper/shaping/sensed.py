@@ -17,17 +17,17 @@ from canshaper.shaping.trust import (
     largest_jump,
 )
 
-# Time in which what the sensor adds comes in and fades.
+# Time in which the feedback of the sensor fades in and out.
 FADE_S = 0.6
-# The same where the grapple leans on something: what it shows there drives the crane.
+# The same where the grapple leans on something: feedback of that would drive the crane.
 CONTACT_FADE_S = 0.1
-# How much of the free swing is fed back next to a second mode: that of the first one is not known
-# as well, and a command that follows it drives the second one.
+# Part of the free swing that is fed back where there is a second mode: the first mode is known less
+# well then, and a command that follows it excites the second one.
 SECOND_MODE_WEIGHT = 0.75
 
-# Nothing of these speaks against a grapple that hangs free, and a sensor that shows it.
+# In these states nothing contradicts a free-hanging grapple and a sensor that shows it.
 HANGING = (Trust.UNPROVED, Trust.TRUSTED)
-# These are seen in the measurements themselves: they replace what was thought of their sense.
+# These states are seen in the measurements themselves: they replace every other state.
 UNDOUBTED = (Trust.LOST, Trust.JUMP, Trust.UNPROVED)
 
 
@@ -42,7 +42,7 @@ class SensedSway:
         damps: the free swing is fed back; else it is only watched.
 
     Attributes:
-        state: what is thought of the sensor.
+        state: trust state of the sensor.
         weight: how much of the free swing is fed back, 0 to 1.
         length: how long the pendulum seems to be.
     """

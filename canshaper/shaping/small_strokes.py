@@ -12,10 +12,10 @@ import math
 
 from canshaper.shaping.limits import OutputLimits, without_deadband
 
-# Strokes are small when the least step would take no longer than this for all of them, seconds. In
-# steps of 1/125 that is 0.6 s of full speed; of larger strokes single steps are no movement.
+# Strokes are small if the least step makes all of them within this time, s. With steps of 1/125
+# that is 0.6 s of full speed. Larger strokes are not made of single steps.
 SMALL_S = 90.0
-# Ticks at the least step that may be left: to travel them would be as much too far.
+# Ticks at the least step that may be left over: one more step would travel too far by as much.
 LEFT = 0.5
 
 

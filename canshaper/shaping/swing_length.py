@@ -16,20 +16,20 @@ from dataclasses import dataclass
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 from canshaper.shaping.sway_sensor import Measured, SensorLimits
 
-# Measurements are averaged over so much of a swing: it costs less, and filter and averaging are the
+# Measurements are averaged over this part of a swing, to save time; filter and averaging are the
 # same for angle and speed.
 MEAN_SWINGS = 0.03
 # Corner of the filter, times the natural frequency of the file.
 CORNER = 2.0
-# At rest is a grapple that swings less, deg, as seen through the filter: of noise, so many times.
+# A grapple is at rest if it swings less than this behind the filter: deg, and times the noise.
 REST_DEG, REST_NOISE = 0.5, 3.0
 # Parts of a swing from the press on: when there may be a result, and when the window ends.
 LEAST_SWINGS, MOST_SWINGS = 0.3, 1.2
 # Largest part of the motion that length and damping leave unexplained.
 UNEXPLAINED = 0.02
-# Largest standard deviation of a length that is one, percent.
+# Largest standard deviation of a length that counts as a result, percent.
 MOST_SD_PCT = 7.0
-# What the damping of the file counts for, against the motion in a window.
+# Weight of the file's damping against the motion in a window.
 DAMPING_WEIGHT = 0.05
 
 

@@ -1,4 +1,4 @@
-"""A filter, or the joystick past it, without a jump where one takes over from the other."""
+"""Bumpless transfer between filter and bypass, and from one filter to another."""
 
 import math
 
@@ -12,7 +12,7 @@ BLEND_S = 0.3
 
 
 class BumplessTransfer:
-    """What drives an axis in motion.
+    """Reference of filter or bypass, with bumpless transfer from one to the other.
 
     Args:
         shaper: the filter.
@@ -29,7 +29,7 @@ class BumplessTransfer:
         self._bypassed = False
 
     def entered(self, state: State, old: State) -> None:
-        """The axis has another state; a stop goes on with what drove the axis before."""
+        """Take a change of state; a stop goes on with what drove the axis before."""
         if state is not STOPPING:
             bypassed = state is BYPASS_ON
             # From rest there is nothing to join to: the joystick counts in full at once.
@@ -37,10 +37,10 @@ class BumplessTransfer:
             self._bypassed = bypassed
 
     def unlimited(self, command: float, maximum: float, applied: float, added: float) -> float:
-        """What is asked for before limits, with no step from what was sent before a change.
+        """Return the reference before limits, without a step from the output before a change.
 
         Args:
-            command: the operator's.
+            command: the operator's demand.
             maximum: largest |velocity| of the axis: a filter that is cut off damps nothing.
             applied: what was sent in the last tick.
             added: what another axis adds in this one.
@@ -60,7 +60,7 @@ class BumplessTransfer:
         return output + self._offset
 
     def hold(self, command: float) -> None:
-        """A tick was missed, with this command."""
+        """Count a missed tick with this command."""
         self._shaper.step(command)
 
     def replace(self, shaper: Shaper, command: float) -> None:
@@ -70,5 +70,5 @@ class BumplessTransfer:
         self._joins = True
 
     def rest(self) -> None:
-        """The axis is at rest: there is nothing to join to."""
+        """Forget the transfer offset: an axis at rest has nothing to join to."""
         self._offset = 0.0

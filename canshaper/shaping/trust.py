@@ -42,26 +42,27 @@ class Trust(IntEnum):
 LATCHED = (Trust.JUMP, Trust.RESTLESS)
 """They stay until the axis is at rest."""
 
-# Log-likelihood ratios: from here on it is proved, the same after a fault in this motion, and most
-# that they count.
+# Log-likelihood ratios: for a proof, for a proof after a fault in this motion, and their bound.
 PROVED, PROVED_AGAIN, BOUND = 6.0, 11.9, 12.0
 # Least standard deviation of what is expected, for errors of the model: deg, deg/s.
 MODEL_DEG, MODEL_DEG_S = 0.25, 0.7
-# What counts of the error that the better of two ideas makes too; most that a measurement says;
-# time over which errors are averaged; how many times a mean square is far larger.
+# Weight of the error that the better hypothesis makes too; largest step of a ratio; time
+# over which errors are averaged; factor by which a mean square is far larger.
 COMMON_SHARE, MOST_STEP, ENERGY_S, FAR = 8.0, 2.0, 0.08, 4.0
 # Largest error, as an acceleration that free swing needs for it: full speeds a second.
 SURPRISE_PER_S = 2.0
 # A grapple does not jump so far beyond what was expected within 20 ms, and noise: deg, deg/s.
 JUMP_DEG, JUMP_DEG_S, JUMP_NOISE = 1.5, 2.5, 5.0
-# The same value for so long, or this often, while a swing would change its rate by that: deg/s.
+# A value is stuck for this time and this number of measurements, if a swing would change its rate
+# by this meanwhile: deg/s.
 STUCK_S, LEAST_STILL, STUCK_DEG_S = 0.12, 3, 2.5
-# The same for a value that stays within so much and so many times the noise, for so much of a
-# swing. Of angle, and of rate, where an offset that is not yet known does the same for a while: deg
-# or deg/s, deg/s.
+# A grapple is held if the value stays for this part of a swing within this many times the noise and
+# within the first number of the angle or the rate (deg or deg/s), while a swing would change its
+# rate by the second number (deg/s). For a rate an offset that is not yet known does the same.
 HELD_SWINGS, HELD_NOISE, HELD_ANGLE, HELD_RATE = 0.1, 3.0, (0.35, 5.0), (1.0, 20.0)
 
-# Path of the velocity over so long, against that of the command: times, and full speeds besides.
+# Time over which paths are compared; largest path of the velocity: times that of the command, plus
+# full speeds.
 RESTLESS_S, RESTLESS_SHARE, RESTLESS_MORE = 2.0, 1.5, 1.0
 
 

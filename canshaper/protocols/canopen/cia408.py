@@ -17,8 +17,8 @@ from canshaper.shaping.states import Reason
 STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIVE)
 HOLD = STEPS.index(ValveState.HOLD)
 STEP_NS = 50_000_000
-# A state that is not reached within this time: once more from the beginning. A valve that boots is
-# not ready for more than a second, and no fault is reset before this time.
+# Time for a state to be reached; then the sequence starts again. A valve that boots is not ready
+# for more than a second, and no fault is reset before this time.
 GIVE_UP_NS = 2_000_000_000
 RESET_AGAIN_NS = 500_000_000
 STATE_MASK = (1 << STATE_BITS) - 1
