@@ -1,4 +1,4 @@
-"""The installation: its version, and the files that come with it (deployments, DBC files)."""
+"""Version of the program, and the deployments and DBC files that come with it."""
 
 from importlib.metadata import version as _version_of
 from pathlib import Path

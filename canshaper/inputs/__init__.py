@@ -1,1 +1,1 @@
-"""Checked inputs: validity, sequence and age of each received message."""
+"""Received messages: validity, sequence, age."""
