@@ -24,7 +24,7 @@ class MovingAxis:
         ahead_s: from now to the time of the model's state: to the end of the period that runs, 0
             where the next one begins now.
         commanded: the operator asked for motion within the tail.
-        unattended: its joystick rested for longer than the tail, see ``Axis``.
+        unattended: its joystick rested for longer than the tail, see ``ShapedAxis``.
         able: it may carry out what is added.
         added: velocity to add now, [-1, 1]; the result.
         sent: velocity that its valve was given last, [-1, 1].

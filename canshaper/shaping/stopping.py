@@ -71,7 +71,7 @@ def travel(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: fl
     Args:
         new_axis: makes the axis.
         timeout_s: age at which the joystick counts as lost.
-        period_s: time between two calls of ``Axis.tick``.
+        period_s: time between two calls of ``ShapedAxis.tick``.
     """
     return Travel.worst([_travel(new_axis(), sign, timeout_s, period_s) for sign in (1.0, -1.0)])
 
