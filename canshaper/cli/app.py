@@ -31,7 +31,7 @@ LINUX_ONLY = {"commission", "doctor", "gateway", "run", "set"}
 
 
 class Verbs(TyperGroup):
-    """Verbs by the modules that are there; what canshaper raises for a person ends any of them."""
+    """Verbs, one for each module; an exception that canshaper raises for a person ends them."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -39,11 +39,11 @@ class Verbs(TyperGroup):
         self.commands = cast(Any, dict.fromkeys(names))  # each loaded when it is used
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Their names."""
+        """Return the names of the verbs."""
         return list(self.commands)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """One of them; None where there is no such verb."""
+        """Return a verb; None where there is no such verb."""
         if cmd_name not in self.commands:
             return None
         return self.commands[cmd_name] or self._load(cmd_name)

@@ -120,7 +120,7 @@ def echo(text: str, *, err: bool = False) -> None:
 
 
 def fail(error: Exception, code: int | None = None) -> typer.Exit:
-    """Print an error as it is; its exit, which is that of its kind where ``code`` is None."""
+    """Print an error, and return the exit; its code is that of its kind where ``code`` is None."""
     echo(str(error), err=True)
     codes = (exit_code for kind, exit_code in EXITS.items() if isinstance(error, kind))
     return typer.Exit(next(codes, EXIT_WRONG) if code is None else code)
@@ -175,7 +175,7 @@ def loader(
     network: bool = False,
     inside: Path | None = None,
 ) -> "Callable[[], Deployment]":
-    """A function that loads the deployment with the bus options of the command line put in.
+    """Return a function that loads the deployment with the bus options of the command line.
 
     With ``inside`` it reads no DBC file outside of that directory.
     """

@@ -105,7 +105,7 @@ def _one(work: Callable[[Path], list[Row]], log: tuple[str, Path]) -> Log:
 
 
 def replayed(configs: tuple[str, ...], channels: Mapping[str, str], path: Path) -> list[Row]:
-    """Each deployment driven with a log: a row for each axis that moved."""
+    """Drive each deployment with a log; return a row for each axis that moved."""
     from canshaper.recording.replay import Replay, look
     from canshaper.recording.report import Replayed
     from canshaper.recording.trace import Trace
@@ -154,7 +154,7 @@ def identified(
     options: Mapping[str, Any],
     path: Path,
 ) -> list[Row]:
-    """Period and damping that a log shows: a row for each axis."""
+    """Identify period and damping in a log; return a row for each axis."""
     from canshaper.commissioning.identification.data import logged, messages_of, signals_named
 
     deployment = loader(file)() if file else None

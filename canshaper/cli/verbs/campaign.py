@@ -120,7 +120,7 @@ def campaign(
 
 
 def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "list[Store]") -> bool:
-    """Make the drives of every file; whether it was interrupted."""
+    """Make the drives of every file; return whether they were interrupted."""
     from canshaper.campaign.run import run_campaign
     from canshaper.report.console import progress_bar
 
@@ -134,7 +134,7 @@ def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "li
 
 
 def _report(files: "list[Deployment]", stores: "list[Store]", results: "Results") -> bool:
-    """Print and write what was found; whether all is accepted by the first file's limits."""
+    """Print and write the results; return whether the first file's limits accept them all."""
     from canshaper.campaign.summary import difference_table, differences, lines, summarise, tables
 
     accept = files[0].config.accept.model_dump(exclude_none=True)

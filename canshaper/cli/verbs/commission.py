@@ -101,14 +101,14 @@ def commission(
 
 
 def _words(interface: str | None, channels: list[str] | None, *, network: bool) -> list[str]:
-    """The bus options, as ``canshaper run`` takes them."""
+    """Return the bus options, as ``canshaper run`` takes them."""
     words = ["--interface", interface] if interface else []
     words += [word for channel in channels or [] for word in ("--channel", channel)]
     return [*words, *(["--network"] if network else [])]
 
 
 def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: bool) -> "Bench":
-    """Where it is measured; a rehearsal goes on with the crane that it was begun with."""
+    """Return the bench; a rehearsal goes on with the crane that it was begun with."""
     from canshaper.commissioning.procedure.bench import Simulated
     from canshaper.commissioning.procedure.machine import Machine
     from canshaper.commissioning.procedure.state import read_state
@@ -133,7 +133,7 @@ def _procedure(
 
 
 def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
-    """How far it has come."""
+    """Print how far the procedure has come."""
     from canshaper.commissioning.procedure.state import State, read_state
     from canshaper.commissioning.procedure.steps import STEPS
     from canshaper.report.console import SafeConsole, new_table
@@ -149,7 +149,7 @@ def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
 
 
 def _lead(procedure: "Procedure", name: str | None) -> None:
-    """Step by step, to the end or to the first that stays open."""
+    """Lead step by step, to the end or to the first step that stays open."""
     step = procedure.step(name) if name else procedure.next_open()
     while step:
         _one(procedure, step)
@@ -159,7 +159,7 @@ def _lead(procedure: "Procedure", name: str | None) -> None:
 
 
 def _one(procedure: "Procedure", step: "Step") -> None:
-    """One step, until it is done or left out.
+    """Lead through one step, until it is done or left out.
 
     Raises:
         typer.Exit: it stays open.
@@ -188,7 +188,7 @@ def _one(procedure: "Procedure", step: "Step") -> None:
 
 
 def _show(procedure: "Procedure", proposal: "Proposal") -> None:
-    """The results of a step, and what it would write."""
+    """Show the results of a step, and what it would write."""
     from canshaper.commissioning.procedure.files import shown
     from canshaper.report.console import SafeConsole
 
@@ -220,7 +220,7 @@ class Prompts:
 
     @contextmanager
     def progress(self, what: str) -> Iterator["OnProgress"]:
-        """A bar on the terminal."""
+        """Show a bar on the terminal."""
         from canshaper.report.console import progress_bar
 
         with progress_bar(what) as on_progress:

@@ -20,7 +20,7 @@ class _Pages(SimpleHTTPRequestHandler):
     extensions_map = {**SimpleHTTPRequestHandler.extensions_map, **TEXTS}  # noqa: RUF012
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing of each page."""
+        """Log nothing of a request."""
 
 
 def docs(

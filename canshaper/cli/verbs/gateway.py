@@ -69,7 +69,7 @@ def gateway(
 
 
 def _look_at_devices(deployment: "Deployment") -> None:
-    """A rule is for the device that has the name now.
+    """Check that the interface of a rule is the device of the deployment.
 
     Raises:
         BusError: it is another one than the deployment names, or cannot be looked at.

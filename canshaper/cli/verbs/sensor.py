@@ -118,7 +118,7 @@ def sensor(
 
 
 def _axes(deployment: "Deployment", axis: str | None) -> list[str]:
-    """The axes that are looked at."""
+    """Return the axes that are examined."""
     having = [name for name, one in deployment.axes.items() if one.sway_sensor]
     if not having:
         text = "expected an axis with a sway_sensor, got none; see docs/sensor.md"
