@@ -43,7 +43,7 @@ class InputFinder(Generic[_Input]):
                 group.of[can_id & 0xFF] = noted
 
     def find(self, frame: Frame, now_ns: int) -> _Input | None:
-        """The input that a frame is of, or None; ``now_ns`` is when it came, of any clock."""
+        """Return the input that a frame is of, or None; ``now_ns``: its arrival, of any clock."""
         if (bound := self._by_key.get(frame[:3])) is not None:
             return bound
         self._input = None
@@ -52,7 +52,7 @@ class InputFinder(Generic[_Input]):
         return self._input
 
     def note(self, bound: _Input) -> None:
-        """The frame that is looked at is of this one."""
+        """Note that the present frame is of this input."""
         self._input = bound
 
 

@@ -138,12 +138,12 @@ class CalibrationDrive:
         return self._guarded.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
+        """Take a frame from a bus; return the frame for the other bus of a gateway, or None."""
         self._speed.receive(frame, arrived_ns)
         return self._guarded.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """One tick: the frames to send."""
+        """Run one tick, and yield the frames to send."""
         axis = self._runner.axis
         state = axis.state
         valid = self._speed.valid(now_ns)
@@ -173,15 +173,15 @@ class CalibrationDrive:
         self._controller.events.clear()
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus; the axes of a valve frame trip."""
+        """Take note that a frame did not reach its bus; the axes of a valve frame trip."""
         self._guarded.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """A valve frame comes too late: whether it must not leave."""
+        """Whether a valve frame that comes too late must not leave."""
         return self._guarded.withhold(frame)
 
     def stalled(self) -> None:
-        """The loop stood still: what moves goes to neutral."""
+        """Take note that the loop stood still; moving axes go to neutral."""
         self._guarded.stalled()
 
     def _sample(self, time_s: float) -> None:
@@ -194,7 +194,7 @@ class CalibrationDrive:
         return self._end.reached(part, time_s, command, self._speed.value)
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve."""
+        """Return a neutral frame for every valve."""
         return self._guarded.neutral_frames()
 
     def result(self) -> Calibration:
@@ -228,7 +228,7 @@ class CalibrationDrive:
 
 
 def _check_top(deployment: Deployment, axis: str, ramp: Ramp) -> None:
-    """A ramp is no faster than the file allows.
+    """Check that the ramp is no faster than the file allows.
 
     Raises:
         ConfigError: it is.

@@ -106,7 +106,7 @@ class EndStopDetector:
         self._moved_s = 0.0
 
     def reached(self, part: str, time_s: float, command: float, speed: float) -> bool:
-        """Take a speed; whether the axis is at its end.
+        """Take a speed; return whether the axis is at its end.
 
         Args:
             part: of the ramp, as ``Ramp.part`` names it.
@@ -165,7 +165,7 @@ class SpeedFeedback:
         return self._input.value
 
     def valid(self, now_ns: int) -> bool:
-        """Whether there is a speed now: neither silence nor an error nor what is no number."""
+        """Whether there is a valid speed now: no silence, no error code, a number."""
         measured_ns = self._input.measured_ns
         return measured_ns is not None and now_ns - measured_ns <= SILENT_MS * 1_000_000
 

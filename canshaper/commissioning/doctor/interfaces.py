@@ -20,7 +20,7 @@ ERROR_FRAMES |= {"serial", "socketcand", "usb2can", "vector"}
 
 
 def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
-    """One finding for each thing that SocketCAN reports and this interface may not.
+    """Yield what an interface of python-can can and cannot report.
 
     Args:
         name: of the bus in the deployment file.
@@ -59,7 +59,7 @@ WRONG_RATE = "one of both is wrong: a wrong bit rate disturbs the whole bus"
 
 
 def bus_findings(buses: dict[str, Bus], tick_ms: int) -> list[Finding]:
-    """Checks of all buses of a deployment."""
+    """Check all buses of a deployment."""
     findings: list[Finding] = []
     kernel: OSError | None = None
     for name, bus in buses.items():
@@ -88,7 +88,7 @@ def kernel_fault() -> OSError | None:
 
 
 def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
-    """Checks of one interface of a deployment."""
+    """Check one interface of a deployment."""
     name = bus.channel
     if link is None:
         remedy = f"plug the adapter in; a virtual bus: sudo ip link add {name} type vcan"
@@ -112,7 +112,7 @@ def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
 
 
 def up(link: Link, bus: Bus) -> Finding:
-    """It is set up."""
+    """Check that it is set up."""
     if link.up:
         return Finding(link.name, Level.OK, "up")
     rate = link.bitrate or bus.bitrate or 250_000
@@ -122,7 +122,7 @@ def up(link: Link, bus: Bus) -> Finding:
 
 
 def bitrate(link: Link, bus: Bus) -> Finding | None:
-    """Its bit rate is that of the file, where that has one."""
+    """Check that its bit rate is that of the file, where that has one."""
     subject = f"{link.name} bit rate"
     if link.bitrate is None:
         return None
@@ -133,7 +133,7 @@ def bitrate(link: Link, bus: Bus) -> Finding | None:
 
 
 def fd(link: Link, bus: Bus) -> list[Finding]:
-    """It carries CAN FD at the bit rates of the file, where the bus is one of CAN FD."""
+    """Check that it carries CAN FD at the bit rates of the file, where the bus is one of CAN FD."""
     if not bus.fd:
         return []
     subject = f"{link.name} CAN FD"
@@ -157,7 +157,7 @@ def fd_options(bus: Bus) -> str:
 
 
 def queue(link: Link) -> Finding:
-    """Its transmit queue: short enough that no old command goes out."""
+    """Check its transmit queue: short enough that no old command goes out."""
     subject = f"{link.name} queue"
     remedy = f"sudo ip link set {link.name} txqueuelen 16"
     queue = f"{link.queue} frames"
@@ -171,7 +171,7 @@ def queue(link: Link) -> Finding:
 
 
 def state(link: Link) -> Finding | None:
-    """State of the controller; only while the interface is up, it has one that counts."""
+    """Check the state of its controller, which counts only while the interface is up."""
     state = link.data.get("state")
     if state is None or not link.up:
         return None
@@ -188,7 +188,7 @@ def state(link: Link) -> Finding | None:
 
 
 def errors(link: Link) -> Finding | None:
-    """Error counters of the controller, and what it has been through."""
+    """Check the error counters of its controller, and the faults that it had."""
     if not link.up:
         return None
     counters = link.data.get("berr_counter", {})
@@ -203,7 +203,7 @@ def errors(link: Link) -> Finding | None:
 
 
 def restart(link: Link) -> Finding:
-    """It comes back by itself after bus-off."""
+    """Check that it comes back by itself after bus-off."""
     subject = f"{link.name} restart"
     restart_ms = link.data.get("restart_ms", 0)
     if restart_ms:
@@ -217,7 +217,7 @@ def restart(link: Link) -> Finding:
 
 
 def modes(link: Link) -> Finding:
-    """Modes that are for tests, or change what a send means."""
+    """Check for modes that are for tests, or change what a send means."""
     on = set(link.data.get("ctrlmode", []))
     subject = f"{link.name} modes"
     low = f"with {link.name} down: sudo ip link set {link.name} type can"

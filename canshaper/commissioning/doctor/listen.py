@@ -89,7 +89,7 @@ def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
 
 
 def arrival_findings(deployment: Deployment, arrivals_ns: dict[str, list[int]]) -> list[Finding]:
-    """Period and gaps of each message against its cycle and its timeout."""
+    """Check period and gaps of each message against its cycle and its timeout."""
     findings = []
     for name, bound in inputs_of(deployment).items():
         if name in arrivals_ns:

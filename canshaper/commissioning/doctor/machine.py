@@ -32,7 +32,7 @@ def _read(file: Path) -> str | None:
 
 
 def machine_findings(tick_ms: int) -> list[Finding]:
-    """All checks of this machine."""
+    """Run all checks of this machine."""
     root = Path("/")
     number = os.cpu_count() or 1
     return [
@@ -52,7 +52,7 @@ def machine_findings(tick_ms: int) -> list[Finding]:
 
 
 def preemption(root: Path, version: str) -> Finding:
-    """How soon the kernel lets a real-time process run.
+    """Check how soon the kernel lets a real-time process run.
 
     Args:
         root: root of the file system.
@@ -81,7 +81,7 @@ def preemption(root: Path, version: str) -> Finding:
 
 
 def throttling(root: Path) -> Finding:
-    """How much of the time the kernel gives to real-time processes."""
+    """Check how much of the time the kernel gives to real-time processes."""
     runtime = _read(root / "proc/sys/kernel/sched_rt_runtime_us")
     period = _read(root / "proc/sys/kernel/sched_rt_period_us")
     if runtime is None or period is None:
@@ -101,7 +101,7 @@ def throttling(root: Path) -> Finding:
 
 
 def swap(root: Path) -> Finding:
-    """Memory that was written out, and is slow to come back."""
+    """Check for memory that was written out, and is slow to come back."""
     lines = (_read(root / "proc/swaps") or "").splitlines()[1:]
     used_kib = sum(int(line.split()[3]) for line in lines)
     if not lines:
@@ -117,7 +117,7 @@ def swap(root: Path) -> Finding:
 
 
 def huge_pages(root: Path) -> Finding:
-    """Whose memory the kernel may join to pages of 2 MiB, in steps that nothing interrupts.
+    """Check whose memory the kernel may join to pages of 2 MiB, in steps that nothing interrupts.
 
     The daemon refuses it for its own memory; that of other programs is joined on any processor.
     """
@@ -133,7 +133,7 @@ def huge_pages(root: Path) -> Finding:
 
 
 def governor(root: Path) -> Finding:
-    """Whether the processors slow down when there is little to do."""
+    """Check whether the processors slow down when there is little to do."""
     files = sorted((root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor"))
     names = {text for file in files if (text := _read(file))}
     if not names:
@@ -151,7 +151,7 @@ def governor(root: Path) -> Finding:
 
 
 def idle_states(root: Path, tick_ms: int) -> Finding:
-    """How long the deepest sleep that a processor may fall into takes to wake up from."""
+    """Check how long the deepest sleep of a processor takes to wake up from."""
     deepest_us, name = 0, ""
     for state in (root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpuidle/state*"):
         latency = _read(state / "latency")
@@ -183,7 +183,7 @@ def clock_source(root: Path) -> Finding:
 
 
 def suspend(root: Path) -> Finding:
-    """Whether the machine can be suspended: by its lid, a key, a desktop that finds it idle."""
+    """Check whether the machine can be suspended: by its lid, a key, a desktop that is idle."""
     states = _read(root / "sys/power/state")
     if not states:
         return Finding("suspend", Level.OK, "the kernel offers none")
@@ -199,7 +199,7 @@ def suspend(root: Path) -> Finding:
 
 
 def virtual(hypervisor: str | None, root: Path) -> Finding:
-    """Whether another system decides when this one runs.
+    """Check whether another system decides when this one runs.
 
     Args:
         hypervisor: output of ``systemd-detect-virt --vm``, None where there is no such program.
@@ -230,7 +230,7 @@ def _virtualisation() -> str | None:
 
 
 def processors(root: Path, number: int) -> Finding:
-    """How many processors there are, and which of them are kept free."""
+    """Check how many processors there are, and which of them are kept free."""
     isolated = _read(root / "sys/devices/system/cpu/isolated")
     text = f"{number}, isolated: {isolated or 'none'}"
     return Finding("processors", Level.NOTE, text)
@@ -251,7 +251,7 @@ def others(load: float, number: int) -> Finding:
 
 
 def interpreter() -> Finding:
-    """The Python that runs the loop, and whether it is one for searching errors."""
+    """Check the Python that runs the loop, and whether it is a debug build."""
     text = f"{platform.python_implementation()} {platform.python_version()}"
     if hasattr(sys, "gettotalrefcount"):
         remedy = "take the ordinary build"

@@ -104,7 +104,7 @@ REAL_TIME = "see kernel, huge pages, governor, idle states and virtual machine b
 
 
 def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Finding]:
-    """Findings on all runs, by their names."""
+    """Judge all runs, by their names."""
     tick_ns = deployment.config.tick_ms * 1_000_000
     findings = [check(next(iter(runs.values()))) for check in (policy, memory)]
     checks: tuple[Callable[[str, Run, int], Finding], ...] = (lateness, deadlines, processing)
@@ -133,7 +133,7 @@ def waiting(deployment: Deployment) -> list[Finding]:
 def _share_finding(
     subject: str, times_ns: list[int], shares: tuple[float, float], tick_ns: int, remedy: str
 ) -> Finding:
-    """Level by the 99.9 % quantile against parts of the tick."""
+    """Judge the 99.9 % quantile against parts of the tick."""
     at_ns = quantile(sorted(times_ns), 0.999)
     good, worst = shares
     part = at_ns / tick_ns
@@ -153,12 +153,12 @@ def _held_up(run: Run) -> str:
 
 
 def lateness(name: str, run: Run, tick_ns: int) -> Finding:
-    """How late the ticks come."""
+    """Judge how late the ticks come."""
     return _share_finding(f"lateness {name}", run.late_ns, LATE_SHARES, tick_ns, _held_up(run))
 
 
 def processing(name: str, run: Run, tick_ns: int) -> Finding:
-    """How much of its tick the loop needs."""
+    """Judge how much of its tick the loop needs."""
     remedy = _held_up(run)
     if quantile(sorted(run.tick_ns), 0.5) > BUSY_SHARES[0] * tick_ns:  # it does so by itself
         remedy = "a faster processor, a longer tick_ms or fewer axes"
@@ -166,7 +166,7 @@ def processing(name: str, run: Run, tick_ns: int) -> Finding:
 
 
 def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
-    """Deadlines at which nothing was computed; the valves held their last command."""
+    """Judge deadlines at which nothing was computed; the valves held their last command."""
     subject = f"deadlines {name}"
     of = len(run.late_ns) + run.missed
     measured = f"{run.missed} of {of} missed"
@@ -181,7 +181,7 @@ def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
 
 
 def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
-    """Joystick to valve: the wait for the next valve frame, and what comes on top."""
+    """Judge joystick to valve: the wait for the next valve frame, and what comes on top."""
     subject = f"joystick to valve {name}"
     quantiles = summary(run.joystick_ns)
     if quantiles is None:
@@ -199,7 +199,7 @@ def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
 
 
 def motion(name: str, run: Run, axes: list[str]) -> Finding:
-    """The axes were at work as on the machine, and none stopped."""
+    """Check that the axes were at work as on the machine, and that none stopped."""
     subject = f"axes {name}"
     stops = Counter(
         f"{axis} {state} {reason}" for axis, state, reason in run.events if state in LOST
@@ -218,7 +218,7 @@ def motion(name: str, run: Run, axes: list[str]) -> Finding:
 
 
 def policy(run: Run) -> Finding:
-    """The loop has a real-time priority."""
+    """Check that the loop has a real-time priority."""
     subject = "scheduling"
     if run.policy is None:
         return Finding(subject, Level.OK, f"SCHED_FIFO with priority {LOOP_PRIORITY}")
@@ -227,7 +227,7 @@ def policy(run: Run) -> Finding:
 
 
 def memory(run: Run) -> Finding:
-    """The loop's memory cannot be written out."""
+    """Check that the loop's memory cannot be written out."""
     subject = "memory"
     if run.memory is None:
         return Finding(subject, Level.OK, "locked")

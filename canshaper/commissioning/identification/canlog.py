@@ -55,7 +55,7 @@ class _Reader:
         return group_of(can_id) == group_of(own) and sender in (NULL, can_id & 0xFF)
 
     def receive(self, time_s: float, sender: tuple[str, int], data: bytes) -> None:
-        """A frame was received."""
+        """Take a frame that was received."""
         self.senders.add(sender)
         if len(data) < self.message.length:
             self.wrong_length += 1

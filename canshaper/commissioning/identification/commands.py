@@ -83,7 +83,7 @@ class Commands:
         self._finder = InputFinder(deployment.config.buses if deployment else {}, joysticks)
 
     def receive(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
-        """A frame was received."""
+        """Take a frame that was received."""
         valves = self._by_valve.get(key)
         if valves:
             layout, length = self._layouts[key]

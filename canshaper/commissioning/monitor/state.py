@@ -47,7 +47,7 @@ class MessageRate:
     times: deque[int] = field(default_factory=deque)
 
     def received(self, time_ns: int) -> None:
-        """A frame of it was received."""
+        """Take a frame of this message."""
         self.last_ns = time_ns
         self.times.append(time_ns)
         self.invalidate(time_ns)
@@ -120,7 +120,7 @@ class Monitor:
         self.messages.setdefault(key, MessageRate(name, cycle))
 
     def receive(self, frame: ReceivedFrame) -> None:
-        """A frame was received."""
+        """Take a frame that was received."""
         self._buses[frame.bus].received(frame.time_ns)
         if frame.kind:
             self.others[frame.kind] += 1
@@ -150,7 +150,7 @@ class Monitor:
         self.note(time_ns, f"daemon runs digest {digest:#06x}{differs}")
 
     def note(self, time_ns: int, text: str) -> None:
-        """Note something that did not come with a frame."""
+        """Note an event that did not come with a frame."""
         self.events.append(HistoryEvent(time_ns, text))
 
     def frames_per_s(self, bus: str, now_ns: int) -> float:

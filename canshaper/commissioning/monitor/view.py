@@ -70,7 +70,7 @@ def pressed_keys() -> Iterator[bool]:
 
 
 def waiting() -> str:
-    """Keys that wait."""
+    """Return the keys that wait."""
     file = sys.stdin.fileno()
     if not select.select([file], [], [], 0.0)[0]:
         return ""

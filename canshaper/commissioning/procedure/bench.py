@@ -70,7 +70,7 @@ class Person(Protocol):
 
 
 class Bench(Protocol):
-    """Where it is measured.
+    """Place where a step drives and measures.
 
     Attributes:
         simulated: whether a simulated crane stands for the machine.

@@ -106,7 +106,7 @@ class Machine:
 
 
 def _wait_for_start(daemon: "subprocess.Popen[bytes]", said: Path) -> None:
-    """Until it says that it has started.
+    """Wait until the daemon says that it has started.
 
     Raises:
         BusError: it cannot open a bus, or does not start.
@@ -122,7 +122,7 @@ def _wait_for_start(daemon: "subprocess.Popen[bytes]", said: Path) -> None:
 
 
 def _failed(daemon: "subprocess.Popen[bytes]", said: Path) -> BusError | UsageError:
-    """Why it has ended."""
+    """Return why it has ended."""
     text = said.read_text(encoding="utf-8", errors="replace").strip()
     kind = BusError if daemon.returncode == EXIT_BUS else UsageError
     return kind(f"canshaper run ended with status {daemon.returncode}:\n{text}")

@@ -96,7 +96,7 @@ class Procedure:
         self._notice_changes()
 
     def _check_bench(self) -> None:
-        """The state is of the same machine, or of the same simulated crane."""
+        """Check that the state is of the same machine, or of the same simulated crane."""
         state, bench, path = self.state, self._bench, self.files.state
         remedy = "move it away to begin again"
         if state.simulated != bench.simulated:
@@ -245,7 +245,7 @@ class Procedure:
                     record.status, record.why = Status.OPEN, why
 
     def _notice_changes(self) -> None:
-        """Say so where someone else has changed the file: what it was checked for is open again."""
+        """Report a file that someone else has changed: what it was checked for is open again."""
         now = hash_of(self.files.deployment)
         if self.state.left and self.state.left != now:
             why = f"{self.files.deployment.name} was changed by another program"

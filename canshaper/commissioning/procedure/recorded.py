@@ -75,7 +75,7 @@ def machine_recording(log: Path, deployment: Deployment, signals: Mapping[str, s
 
 
 def _check_complete(name: str, series: Series, duration_s: float) -> None:
-    """A sensor that falls silent would show no swing.
+    """Check that the sensor did not fall silent: a gap would show no swing.
 
     Raises:
         IdentificationError: it has a gap.

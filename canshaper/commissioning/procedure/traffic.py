@@ -84,7 +84,7 @@ class _Reader:
         }
 
     def receive(self, frame: Frame, time_ns: int, time_s: float) -> None:
-        """A frame was received."""
+        """Take a frame that was received."""
         traffic, key = self.traffic, frame[:3]
         traffic.duration_s = time_s
         traffic.frames[key].append(time_s)

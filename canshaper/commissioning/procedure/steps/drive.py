@@ -94,7 +94,7 @@ def _signals(context: Context) -> dict[str, str]:
 
 
 def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Traffic) -> None:
-    """Were the axes driven, and in both drives about as much?"""
+    """Check that the axes were driven, and in both drives about as much."""
     table = new_table("axis", "driven before, s of full deflection", "after")
     for name in axes:
         both = [_driven_s(one.axes[name]) for one in (before, after)]
