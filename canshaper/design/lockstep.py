@@ -64,13 +64,13 @@ class PlantPort:
         self._time_s = 0.0
 
     def begin(self, time_ms: int, frames: Sequence[Frame]) -> None:
-        """A tick begins; these come from the joysticks, behind what the plant has sent."""
+        """Begin a tick; these frames come from the joysticks, after those of the plant."""
         self.arrived_ns, self._time_s = time_ms * 1_000_000, time_ms / 1000.0
         self._report(frames, self._time_s)
         self._waiting += frames
 
     def end(self, step_s: float) -> None:
-        """It is over: the plant moves until the next one, and sends what it measures."""
+        """End the tick: the plant moves until the next one, and sends what it measures."""
         self._plant.advance(step_s)
         frames = self._plant.feedback()
         self._report(frames, self._time_s + step_s)
@@ -83,12 +83,12 @@ class PlantPort:
                 self._on_frame(frame, time_s)
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits."""
+        """Yield every frame that waits."""
         waiting, self._waiting = self._waiting, []
         return iter(waiting)
 
     def background(self) -> Iterator[Frame]:
-        """There are none."""
+        """Return no frames."""
         return iter(())
 
     def send(self, frame: Frame) -> bool:
@@ -136,7 +136,7 @@ class LockStep:
         self._standstill.clock = lambda: 0  # nothing is ever late here
 
     def step(self) -> None:
-        """One tick, and the time until the next one."""
+        """Run one tick, and let time pass until the next one."""
         time_ms, tick_ms = self.time_ms, self._tick_ms
         hands = self._joysticks
         frames = [frame for hand in hands for frame in hand.frames_of_tick(time_ms, tick_ms)]

@@ -35,13 +35,13 @@ class _Queue(Generic[J]):
         self._again: deque[tuple[J, int]] = deque()
 
     def take(self) -> tuple[J, int] | None:
-        """The next one; None where there is none."""
+        """Return the next job; None where there is none."""
         if self._again:
             return self._again.popleft()
         return next(((job, 0) for job in self._jobs), None)
 
     def put_back(self, job: J, deaths: int) -> None:
-        """The process of a job died."""
+        """Put back a job whose process died."""
         if deaths + 1 >= MOST_DEATHS:
             raise CampaignError(f"the process died {MOST_DEATHS} times of {job}")
         self._again.append((job, deaths + 1))
