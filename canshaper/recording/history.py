@@ -68,7 +68,7 @@ class History:
             self._codecs[deployment.status.message.key] = deployment.status
 
     def receive(self, frame: ReceivedFrame) -> None:
-        """A data frame was received; one that is no status is passed over."""
+        """Take a data frame; pass over one that is no status."""
         key = (frame.bus, frame.can_id, frame.extended)
         codec = self._codecs.get(key)
         if codec is None or (values := codec.decode(frame.data)) is None:

@@ -155,12 +155,12 @@ class LogPort:
         self._before_ns = 0
 
     def begin(self, tick: Tick, before_ns: int) -> None:
-        """A tick begins; the one before it was at another time."""
+        """Begin a tick; the one before it was at another time."""
         self.sent, self._before_ns = [], before_ns
         self._received, self._others = tick.received, tick.others
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits."""
+        """Yield every frame that waits."""
         waiting, self._received = self._received, []
         for time_ns, frame in waiting:
             # Without stamps a port knows only when it was read before.
@@ -197,7 +197,7 @@ class Stepper:
         self._rows = Rows(controller)
 
     def step(self, tick: Tick) -> Result:
-        """One tick, as the daemon makes it."""
+        """Run one tick, as the daemon does."""
         controller, port = self._controller, self._port
         first = self._guarded.neutral_frames() if tick.number == 0 else []
         port.begin(tick, self._standstill.last_ns)
