@@ -69,7 +69,7 @@ class _Tracks:
         self._states: list[CraneState] = []
 
     def add(self, time_ms: int) -> None:
-        """A tick is over."""
+        """Take the state of the crane after a tick."""
         plant = self._plant
         crane, commands, speeds = plant.crane, self._commands, self._speeds
         self._t_s.append(time_ms / 1000.0)
