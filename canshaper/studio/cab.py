@@ -70,7 +70,7 @@ class Cab:
         self._centred = False
 
     def leave(self, page: int, now_s: float) -> None:
-        """A page has gone, or has to let go."""
+        """Give up the seat of a page that has gone, or has to let go."""
         if page == self.driver:
             self._report(said("leaves", page=page))
             self._let_go(now_s)
@@ -100,7 +100,7 @@ class Cab:
         self._joysticks = {n: float(v) for n, v in joysticks.items()} if self._centred else {}
 
     def nonsense(self, page: int, now_s: float) -> None:
-        """A page has sent what it should not: it loses the joysticks until they are in neutral."""
+        """Take the joysticks from a page that sent nonsense, until they are in neutral."""
         if page == self.driver:
             self._let_go(now_s)
 

@@ -48,28 +48,28 @@ class BoundedHttp(H11Protocol):
     _overdue: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """A connection: its first request has to come."""
+        """Begin a connection, and wait for its first request."""
         super().connection_made(transport)
         self._watch()
 
     def data_received(self, data: bytes) -> None:
-        """A piece of a request, perhaps its end."""
+        """Take a piece of a request, perhaps its end."""
         super().data_received(data)
         self._watch()
 
     def on_response_complete(self) -> None:
-        """Answered: the next request has to come."""
+        """End an answer, and wait for the next request."""
         super().on_response_complete()
         self._watch()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        """A page: from now on pings watch it."""
+        """Begin a page: from now on pings watch it."""
         self._cancel()
         super().handle_websocket_upgrade(event)
         self._cancel()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The end."""
+        """End the connection."""
         self._cancel()
         super().connection_lost(exc)
 
