@@ -60,12 +60,12 @@ Root = tuple[Guarded, Controller]
 
 
 def _fixed(number: int) -> Any:
-    """In a pickle: what never changes, by its number."""
+    """Stand in a pickle for an object that never changes, by its number."""
     raise NotImplementedError  # its name only is used
 
 
 def _method(one: Any, name: str) -> Any:
-    """In a pickle: a method of an object of ours."""
+    """Stand in a pickle for a method of one of our objects."""
     if type(one).__module__ == "builtins" or name.startswith("__"):
         raise StateError(
             f"expected a method of an object of ours, got {name} of {type(one).__name__}"

@@ -126,7 +126,7 @@ OPERATORS: Mapping[str, Callable[[Draw, Sequence[str], str], Script]] = {
     "reversals": _resting(_reversals),
     "both": _resting(_both),
 }
-"""By their names; called with the stream, the axes of the crane and a name for the script."""
+"""Operators by name; called with the stream, the axes of the crane and a name for the script."""
 
 
 @dataclass(frozen=True)

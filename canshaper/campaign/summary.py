@@ -87,7 +87,7 @@ class Summary:
         return not self.promises.broken and all(one.kept for one in self.verdicts)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the summary for JSON."""
         return {**asdict(self), "accepted": self.accepted}
 
 
@@ -129,7 +129,7 @@ def _where(columns: Columns, keep: Sequence[bool]) -> dict[str, list[Any]]:
 
 
 def _quantiles(columns: Columns) -> dict[str, dict[str, Quantile]]:
-    """By measure and quantile; no measure that no drive has."""
+    """Return quantiles by measure and share; no measure that no drive has."""
     quantiles = {}
     for measure in MEASURES:
         values = [value for value in columns[measure] if value is not None]

@@ -33,7 +33,7 @@ class KernelSum:
         raise NotImplementedError
 
     def __call__(self, _can_id: int, place: Place, data: bytes) -> int:
-        """That of a frame: over the bytes but the one that it lies in."""
+        """Return the checksum of a frame: over the bytes but the one that it lies in."""
         at = place.byte
         return self.of(data[:at] + data[at + 1 :])
 

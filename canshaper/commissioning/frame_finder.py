@@ -69,4 +69,4 @@ class _Noted(Generic[_Input]):
         return FrameFault.NONE
 
     def invalidate(self) -> None:
-        """Nothing is kept."""
+        """Do nothing: no state is kept."""

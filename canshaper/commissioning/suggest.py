@@ -136,7 +136,7 @@ def joysticks(messages: Sequence[Message]) -> list[Message]:
 
 
 def likely_joysticks(messages: Sequence[Message]) -> list[Message]:
-    """Those that are as good as the first of them: cyclic with a switch, or two-sided, or all."""
+    """Return messages as likely as the first: cyclic with a switch, or two-sided, or all."""
     candidates = joysticks(messages)
     tiers = [_tier(m, axes(m) and switches(m)) for m in candidates]
     return [m for m, tier in zip(candidates, tiers, strict=True) if tier == tiers[0]]

@@ -1,4 +1,4 @@
-"""From a file to a valid configuration, or to every reason why it is none."""
+"""Loading of a file: a valid configuration, or every reason why it is none."""
 
 import types
 from collections.abc import Mapping

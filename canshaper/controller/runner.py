@@ -148,7 +148,7 @@ class AxisControl:
         self._sway_signal.node = node
 
     def isolate(self, joystick: CommandSource, axis: ShapedAxis | None = None) -> None:
-        """For a measurement: another joystick, perhaps another axis, nothing of other axes.
+        """Isolate the axis for a measurement: another joystick, nothing of other axes.
 
         Args:
             joystick: where the joystick comes from now.

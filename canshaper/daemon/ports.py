@@ -48,7 +48,7 @@ def open_ports(
 
 
 def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Port]:
-    """Those among ports that were not open before."""
+    """Return the ports that were not open before."""
     return [port for port in ports.values() if port not in opened.values()]
 
 

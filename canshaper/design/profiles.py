@@ -50,7 +50,7 @@ class Chosen:
         self._name = name
 
     def name(self, _now_ns: int) -> str:
-        """That one."""
+        """Return the name of the chosen profile."""
         return self._name
 
 

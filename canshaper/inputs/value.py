@@ -118,7 +118,7 @@ class ProfileSwitch:
         self._names = {float(code): name for name, code in codes.items()}
 
     def name(self, now_ns: int) -> str:
-        """That of the code; the axis' own filter for any other one, and after silence."""
+        """Name by the code; the axis' own filter for any other code, and after silence."""
         code = self._value.fresh(now_ns)
         return "" if code is None else self._names.get(code, "")
 
@@ -136,7 +136,7 @@ class ProfileButtons:
         self._names = tuple(names)
 
     def name(self, _now_ns: int) -> str:
-        """That of the presses so far; a joystick that is lost changes nothing."""
+        """Name by the presses so far; a joystick that is lost changes nothing."""
         presses = sum(joystick.presses for joystick in self._joysticks)
         return self._names[presses % len(self._names)]
 

@@ -46,7 +46,7 @@ class Identity:
         return int(sha256(together.encode()).hexdigest()[: DIGEST_BITS // 4], 16)
 
     def lines(self) -> list[str]:
-        """For people and logs: the digest, then every hash in full."""
+        """Lines for people and logs: the digest, then every hash in full."""
         return [
             f"digest={self.digest:#06x}",
             f"program=sha256:{program_sha256()} version={version()}",

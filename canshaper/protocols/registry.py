@@ -15,7 +15,7 @@ def protocols(
     joysticks: Mapping[str, JoystickInput],
     inputs: Sequence[tuple[BoundInput, MessageInput]],
 ) -> list[BusProtocol]:
-    """Those that this machine speaks, in the order in which they send.
+    """Return the protocols that this machine speaks, in the order in which they send.
 
     Args:
         deployment: the machine.

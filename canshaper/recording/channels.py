@@ -18,9 +18,9 @@ class Kind(Enum):
     """Kind of a frame for the daemon of a deployment."""
 
     RECEIVED = "received"
-    """It waits in the first socket, and is read before the valves have their frames."""
+    """The frame waits in the first socket, and is read before the valves have their frames."""
     OTHER = "other"
-    """It is seen too, after the valves have their frames."""
+    """The frame is seen too, after the valves have their frames."""
     SENT = "sent"
     """The daemon sends such frames."""
     IGNORED = "ignored"

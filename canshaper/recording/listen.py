@@ -57,7 +57,7 @@ class ReceivedFrame(NamedTuple):
     flags: int | None = None
 
     def line(self) -> str:
-        """As ``candump -L`` writes it."""
+        """Line as ``candump -L`` writes it."""
         seconds, ns = divmod(self.time_ns, 10**9)
         can_id = f"{self.can_id:08X}" if self.extended else f"{self.can_id:03X}"
         data = "R" if self.kind == "remote" else self.data.hex().upper()

@@ -37,7 +37,7 @@ class WholeTable(Table):
     """A table that loses no digit on a narrow terminal: several below each other instead."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Itself where it fits, else its first column with as many others as fit, and so on."""
+        """Yield the table where it fits, else its first column with the others part by part."""
         if len(self.columns) < 2 or self._width(console, options) <= options.max_width:
             yield from super().__rich_console__(console, options)
             return

@@ -28,19 +28,19 @@ class Trust(IntEnum):
     STUCK = 4
     """The value repeats while the model swings."""
     JUMP = 5
-    """It has jumped further than a grapple can; until the axis is at rest."""
+    """The value has jumped further than a grapple can; until the axis is at rest."""
     WRONG_SIGN = 6
-    """It shows the opposite of what motion makes."""
+    """The sensor shows the opposite of what motion makes."""
     OFFSET = 7
     """Its offset is larger than configured."""
     CONTACT = 8
-    """It shows nothing of what motion makes: the grapple leans on something."""
+    """The sensor shows nothing of what motion makes: the grapple leans on something."""
     RESTLESS = 9
     """The command moves far more than the operator asks for; until the axis is at rest."""
 
 
 LATCHED = (Trust.JUMP, Trust.RESTLESS)
-"""They stay until the axis is at rest."""
+"""States that stay until the axis is at rest."""
 
 # Log-likelihood ratios: for a proof, for a proof after a fault in this motion, and their bound.
 PROVED, PROVED_AGAIN, BOUND = 6.0, 11.9, 12.0

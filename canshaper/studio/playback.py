@@ -23,7 +23,7 @@ QUIET_S = 1.0
 """Part of a pause of a log of which pictures are kept, s."""
 
 Window = tuple[float, float | None]
-"""From and up to where pictures are kept, s."""
+"""Begin and end of the pictures that are kept, s; None for the end of the drive."""
 Progress = Callable[[float], None]
 """Called with the part that is done, 0 to 1."""
 

@@ -31,7 +31,7 @@ class Reader:
     """The person in front of the page, who is not asked for words and sees no bar."""
 
     def ready(self, words: str) -> None:
-        """Nothing is waited for at the desk."""
+        """Wait for nothing: this is the desk."""
 
     def answer(self, _question: str, default: str, _allowed: Sequence[str] = ()) -> str:
         """The default."""

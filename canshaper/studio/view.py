@@ -1,4 +1,4 @@
-"""From the frames of one crane to what the page shows of it. No clock, no sockets."""
+"""State of one crane for the page, from its frames. No clock, no sockets."""
 
 import math
 from collections.abc import Callable, Mapping

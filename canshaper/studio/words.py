@@ -107,6 +107,6 @@ class Events:
             )
 
     def since(self, number: int) -> list[Event]:
-        """Those after this one, in order."""
+        """Return the events after this one, in order."""
         with self._lock:
             return [event for event in self._events if event.number > number]

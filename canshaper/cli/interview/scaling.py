@@ -87,7 +87,7 @@ def _around_middle(signal: "Signal") -> "FirstScaling":
 
 
 def _full(signal: "Signal", zero: float) -> float:
-    """From zero to full command."""
+    """Ask for the value from zero to full command."""
     from canshaper.commissioning import suggest
 
     likely = suggest.likely_full(signal, zero)

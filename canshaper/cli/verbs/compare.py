@@ -142,7 +142,7 @@ def _felt(table: "list[Row]") -> "Table":
 
 
 def _worst(table: "list[Row]") -> "Table":
-    """With the wrong length: what makes the worst case, and which of ours beats it."""
+    """Return a table with the wrong length: worst case of a filter, and which of ours beats it."""
     from canshaper.design.comparison.summary import beaten_by
     from canshaper.report.console import new_table
 

@@ -93,7 +93,7 @@ def robust(
 
 
 def _result(one: "RobustDesign") -> dict[str, Any]:
-    """For ``--json``."""
+    """Return the design for ``--json``."""
     return {
         "axis": one.bound.name,
         "filter": one.section,

@@ -1,4 +1,4 @@
-"""From a slow ramp to the curve of a valve.
+"""Curve of a valve from a slow ramp.
 
 A valve follows with a delay, so on the way up it opens at a larger command than it should, and on
 the way down it closes at a smaller one. With a ramp as fast up as down the mean of both is right.

@@ -139,7 +139,7 @@ def _joystick_ns(
     sent: list[tuple[int, int, int]],
     hand: dict[str, list[tuple[int, int]]],
 ) -> list[int]:
-    """From each joystick frame to the valve frames that are computed with it.
+    """Return the times from each joystick frame to the valve frames that are computed with it.
 
     A bus keeps the order of its frames: the n-th one that a joystick sent on it is the n-th that
     the loop took. Frames from before the first tick are too old, those after the last valve frame

@@ -245,7 +245,7 @@ class _Problem:
     def _gain_deviation(
         self, projected: Sequence[tuple[Array, Array]], gain: float, omega: float
     ) -> float:
-        """By the noise at the frequency of the swing, or by how the stretches differ."""
+        """Return the deviation of the gain: by the noise or by the stretches, the larger one."""
         squares = [float(h @ h) for h, _ in projected]
         noise = 0.0
         for one, (h, y), square in zip(self.data, projected, squares, strict=True):

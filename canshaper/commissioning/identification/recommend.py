@@ -1,4 +1,4 @@
-"""From findings to sway data: one value, one in the middle, or a set for each state."""
+"""Sway data from findings: one value, one in the middle, or a set for each state."""
 
 import math
 from collections.abc import Sequence

@@ -22,7 +22,7 @@ class Kind(Enum):
     """Quantity of a signal in the swing."""
 
     ANGLE = "angle"
-    """In rad."""
+    """Angle, rad."""
     RATE = "rate"
     """Its rate, in rad/s."""
     OTHER = "other"

@@ -63,7 +63,7 @@ class MessageRate:
         return len(self.times) * 1e9 / WINDOW_NS
 
     def silent_s(self, now_ns: int) -> float | None:
-        """For how long it is missing; None where it is not."""
+        """Return for how long the message is missing; None where it is not."""
         if self.last_ns is None:
             return None
         limit_ns = LATE_NS
@@ -158,7 +158,7 @@ class Monitor:
         return self._buses[bus].per_s(now_ns)
 
     def stale_s(self, axis: str, now_ns: int) -> float | None:
-        """For how long the status of an axis is missing; None where it is fresh, or never came."""
+        """Return for how long an axis' status is missing; None where it is fresh, or never came."""
         bound = self.deployment.axes[axis].status
         return self.messages[bound.message.key].silent_s(now_ns) if bound else None
 

@@ -73,7 +73,7 @@ class Pdo:
 
     @property
     def name(self) -> str:
-        """As TPDO1."""
+        """Name such as TPDO1."""
         number = self.index - (TRANSMIT if self.transmitted else RECEIVE) + 1
         return f"{'T' if self.transmitted else 'R'}PDO{number}"
 

@@ -52,7 +52,7 @@ class Parameter:
 
     @property
     def where(self) -> str:
-        """As 1800h:5."""
+        """Place such as 1800h:5."""
         return f"{self.index:04X}h:{self.subindex}"
 
     def __str__(self) -> str:

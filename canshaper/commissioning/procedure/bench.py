@@ -23,7 +23,7 @@ STILL_MOVES = (
     "WARNING: we send nothing to the valves, but the controller of before moves the crane wherever"
     " it is connected. Everybody away, a hand on the emergency stop."
 )
-"""For the person who moves joysticks in ``Mode.LISTEN`` or ``Mode.DRY``."""
+"""Warning to the person who moves joysticks in ``Mode.LISTEN`` or ``Mode.DRY``."""
 
 
 class Mode(Enum):

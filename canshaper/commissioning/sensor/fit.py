@@ -157,7 +157,7 @@ class _Problem:
     def _deviations(
         self, x: Array, projected: Sequence[tuple[Array, Array]], gain: float
     ) -> tuple[float, float, float, float]:
-        """By the noise at the frequency of the swing."""
+        """Return the deviations, by the noise at the frequency of the swing."""
         columns = []
         for j in range(len(x)):
             step = np.zeros(len(x))
@@ -184,7 +184,7 @@ class _Problem:
 
 
 def _gain(projected: Sequence[tuple[Array, Array]]) -> float:
-    """That of least squares."""
+    """Return the gain of least squares."""
     square = sum(float(h @ h) for h, _ in projected)
     return sum(float(h @ y) for h, y in projected) / max(square, 1e-30)
 

@@ -121,7 +121,7 @@ def beaten_by(row: Row, table: list[Row]) -> Row | None:
 
 
 def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, str]]:
-    """For "fast", "balanced" and "calm" a row and a sentence that says why.
+    """Return for "fast", "balanced" and "calm" a row and a sentence that says why.
 
     The filter that is off dips never, so that there always is one.
     """

@@ -1,4 +1,4 @@
-"""From a tuning to what stands in the deployment file, and what a person should know of it."""
+"""A tuning in the deployment file, and what a person should know of it."""
 
 import math
 from collections.abc import Callable, Mapping

@@ -142,7 +142,7 @@ def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]
 
 
 def _second_try(program: Program) -> Solution:
-    """From a point that a search over all poles found feasible, or say why there is none."""
+    """Solve from a feasible point of a search over all poles, or say why there is none."""
     point = feasible_point(program)
     if point is None:
         raise InfeasibleError(explain(program))

@@ -54,7 +54,7 @@ class Rule:
     hops: int = 1
 
     def __str__(self) -> str:
-        """For people."""
+        """Text for people."""
         word, mask = self.pattern.value, self.pattern.mask
         changed = ", changed" if self.changes else ""
         return f"{self.source} -> {self.destination} {word:x}:{mask:x}{changed}"
@@ -188,6 +188,6 @@ def difference(present: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[
 
 
 def between(names: Iterable[str], rules: Iterable[Rule]) -> list[Rule]:
-    """Those of the rules that lead from one of these interfaces to another of them."""
+    """Return the rules that lead from one of these interfaces to another of them."""
     ends = {*names}
     return [rule for rule in rules if {rule.source, rule.destination} <= ends]

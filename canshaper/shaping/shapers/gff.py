@@ -138,7 +138,7 @@ def _check(**parameters: float) -> None:
 
 
 def _by_poles(parameters: Parameters) -> Parameters:
-    """By its poles, the faster one first: between two denominators they may become complex."""
+    """Return the parameters as poles: between two denominators the poles may become complex."""
     rest = dict(parameters)
     if "a1" in rest:
         rest["poles_rad_s"] = poles_from_denominator(rest.pop("a1"), rest.pop("a2"))
