@@ -50,7 +50,7 @@ class Deployment:
     codes: tuple[NamedCode, ...] = ()
     """Meanings of the named values of the signals that are read."""
     starts: tuple[StartValue, ...] = ()
-    """What valve messages carry in signals that no axis uses."""
+    """Start values of valve messages in signals that no axis uses."""
     listen_only: bool = False
     """Whether nothing is sent but status: another controller drives the machine, or no one."""
 

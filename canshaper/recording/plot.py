@@ -212,7 +212,7 @@ def _draw_lanes(
 
 
 def _spans(one: Replayed, axis: str) -> Iterator[tuple[float, float, State, Reason]]:
-    """Return when an axis was in which state, s, and why; before its first event: unknown."""
+    """Yield begin, end (s), state and reason of an axis; unknown before its first event."""
     changes = [(_seconds(one, at), m[2], m[3]) for at, m in _matches(one) if m[1] == axis]
     end = (_seconds(one, one.trace.end_ns), "", "")
     for (start_s, state, reason), (end_s, *_) in pairwise([*changes, end]):
