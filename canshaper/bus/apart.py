@@ -28,11 +28,11 @@ LEAVE_S = LEAVE_NS / 1e9
 PROBE_NS = 500_000_000
 # How long a read waits before the bus counts as seen empty again: a frame looks so much older.
 LOOK_S = 0.005
-# An adapter with nothing to wait on is polled so often.
+# Polling period of an adapter with nothing to wait on.
 POLL_S = 0.002
 # Room for the backlog of a long stall.
 MOST_RECEIVED = 20_000
-# A close waits so long for what was sent last and for the goodbye of the interface.
+# Longest wait of a close for the last frames and for the goodbye of the interface.
 CLOSE_S = 0.2
 # linux/sockios.h and asm/ioctls.h: bytes that TCP has not sent yet, and those that a tty has not.
 SIOCOUTQNSD, TIOCOUTQ = 0x894B, 0x5411

@@ -33,7 +33,7 @@ from canshaper.machine.routing import BusRoutes
 # Frames read in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
 # empties any backlog and still cannot hold up the tick for ever.
 MOST_FRAMES = 2000
-# Of ids that no one knows; the rest is dropped, their count is "at least".
+# Frames of unknown ids read in one tick at most; the rest is dropped, so their count is a minimum.
 MOST_UNKNOWN = 20
 # How often a bus that took no frames is tried again, with one frame, neutral by then.
 PROBE_NS = 500_000_000

@@ -76,7 +76,7 @@ class FlaggedVelocity:
 
 @dataclass(frozen=True, slots=True)
 class RockerVelocity:
-    """Velocity of a rocker with a signal for each direction, be they proportional or two buttons.
+    """Velocity of a rocker with a signal for each direction: proportional signals or two buttons.
 
     Attributes:
         positive: signal of the positive direction (``magnitude_range``).

@@ -21,7 +21,7 @@ class Protection:
 
     Attributes:
         counter: signal of the alive counter, where it is one.
-        counts: values of the counter, be it that signal or that of E2E; 0 where there is none.
+        counts: values of the counter, of that signal or of E2E; 0 where there is no counter.
         check: what protects the content.
     """
 

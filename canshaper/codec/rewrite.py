@@ -26,12 +26,12 @@ class RewrittenMessage(SentMessage):
         ours: names of the signals that the axes put in.
 
     Attributes:
-        start: raw value of every signal: neutral in those of the axes, in all others what a frame
-            of our own says, which is nothing: rest, or "not available".
+        start: raw value of every signal in a frame of our own: neutral for the axes, rest or "not
+            available" for all others.
         enable: name of its enable switch.
         ours: names of the signals that the axes put in.
         ours_mask: bits of the velocities, byte 0 the lowest.
-        mask_of_all: the same with those of the alive counter.
+        mask_of_all: ``ours_mask`` with the bits of the alive counter.
     """
 
     def __init__(

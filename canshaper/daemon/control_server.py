@@ -16,7 +16,7 @@ MOST_BYTES = 65536
 # (benchmarks/control.py).
 MOST_REQUEST = 4096
 MOST_CLIENTS = 4
-# Who asks nothing for so long leaves room for others.
+# A client that asks nothing for so long is closed, to leave room for others.
 SILENT_NS = 10_000_000_000
 # Between two requests: a slider that is dragged must not keep the loop busy.
 LEAST_BETWEEN_NS = 50_000_000

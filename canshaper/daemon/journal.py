@@ -71,7 +71,7 @@ class JournalHandler(logging.Handler):
         if len(self._lines) >= MOST_LINES:
             self._dropped += 1
             return
-        # What others wrote, a peer's name or a piece of a file, must not look like a line of ours.
+        # Text of others, a peer's name or a piece of a file, must not look like a line of ours.
         text = printable(text.replace("\n", " | "))
         if self._journal:
             text = PRIORITY.get(level, "<3>") + text

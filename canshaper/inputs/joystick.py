@@ -27,7 +27,7 @@ class JoystickInput(Input):
     """Receives the frames of one joystick; answers what an axis may use of them at a moment.
 
     Attributes:
-        pressed: the switch to press, where it is none of its own.
+        pressed: the switch to press, where it is in another message.
         presses: how often its button for the next profile was pressed.
         commands: its velocities in the last frame that counted, or why there is none, by signal.
     """
@@ -124,7 +124,7 @@ class JoystickInput(Input):
             now_ns: monotonic time.
             releases: as they were at the last tick of this axis.
             trip: a cause for neutral at once, handed through.
-            neutral_band: |joystick| up to which it counts as neutral and may stand still for ever.
+            neutral_band: |joystick| up to which it counts as neutral and may stand still forever.
         """
         pressed = self.pressed
         known = self._releases if pressed is None else pressed.releases

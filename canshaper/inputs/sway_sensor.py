@@ -20,7 +20,7 @@ class SwaySensorInput(Input):
 
     Attributes:
         number: frames that counted so far.
-        values: of the last one, by signal, in the unit of the DBC; None for one that is none.
+        values: of the last one, by signal, in the unit of the DBC; None for a code without value.
     """
 
     def __init__(self, bound: SensorMessage) -> None:

@@ -22,11 +22,11 @@ from canshaper.machine.lookup import Lookup
 
 # Characters of the name of an interface (linux/if.h, IFNAMSIZ less the end).
 LONGEST_NAME = 15
-# They carry CAN FD without being asked to.
+# Interfaces that carry CAN FD without an option.
 ALWAYS_FD = frozenset(("udp_multicast", "virtual"))
-# They take bit rate and switch of CAN FD without a parameter of that name (python-can 4.6).
+# Interfaces that take bit rate and switch of CAN FD without such a parameter (python-can 4.6).
 UNNAMED_FD = frozenset(("kvaser", "neovi"))
-# What stands elsewhere in the file, or is ours to say.
+# Parameters that stand elsewhere in the file, or that the program sets.
 OURS = frozenset(("channel", "bitrate", "can_filters", "receive_own_messages"))
 OURS |= {"fd", "data_bitrate"}
 
@@ -128,7 +128,7 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
             add(("buses", name, *place), text)
         if bus.j1939 is None:
             continue
-        # Behind a gateway both may meet, and no one would know which is meant.
+        # A gateway may bring both onto one bus, where nothing distinguishes them.
         if (other := names.setdefault(bus.j1939.name, name)) != name:
             text = f"is the NAME of bus {other}; each node needs one of its own:"
             add(("buses", name, "j1939", "name"), f"{text} another ecu_instance will do")

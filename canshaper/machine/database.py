@@ -28,7 +28,7 @@ class DbcFile:
         sha256: of its bytes, in hexadecimal digits.
         entries: every message that stands in it.
         messages: those of them that were asked for.
-        warnings: what is wrong with the others, the first of it.
+        warnings: first faults of the other messages.
         count: how many warnings there are.
         statements: how many of its statements belong to messages.
         used_bytes: of what cantools got of it.

@@ -72,17 +72,17 @@ class BusRoutes:
     """Routes of one bus as sets of (id, extended), for its sockets.
 
     Attributes:
-        received: what is received by its id.
-        sent: what we send, and no one else may.
-        valves: those of them that move something.
-        known: all that the DBC files know; one that they do not know is a fault.
+        received: messages that are received by their id.
+        sent: messages that we send, and no one else may.
+        valves: the messages among ``sent`` that move something.
+        known: all messages of the DBC files; any other message is a fault.
         received_groups: groups of J1939 that are received, from whatever address.
         sent_groups: groups that we send, and no one else may.
-        claims: what we send of the groups that are received: it comes back among them.
-        j1939: the bus is one of J1939, where unknown ids of 29 bits are daily life.
-        canopen: the bus is one of CANopen, where that is so for SDO, SYNC and the like.
-        in_line: the bus is one of an inline gateway, where that is so for all: it forwards them.
-        fd: what is sent in frames of CAN FD, by us and by others.
+        claims: messages of ours in groups that are received: they come back among these.
+        j1939: the bus is one of J1939, where unknown ids of 29 bits are normal.
+        canopen: the bus is one of CANopen, where ids of SDO, SYNC and the like are normal.
+        in_line: the bus is one of an inline gateway, which forwards every unknown id.
+        fd: messages that are sent in frames of CAN FD, by us and by others.
     """
 
     received: frozenset[tuple[int, bool]]
@@ -103,12 +103,12 @@ class Routing:
     """Routing table of all buses.
 
     Attributes:
-        routes: what ids are, by bus, id and whether that is extended.
-        groups: what groups of J1939 are, by bus and group.
+        routes: routes of ids, by bus, id and whether that is extended.
+        groups: routes of groups of J1939, by bus and group.
         valves: names of the axes whose commands a message carries; also where another controller
             sends it.
         others: messages of the DBC files that are neither received nor sent: other traffic.
-        buses: the same by bus.
+        buses: routes of each bus, for its sockets.
     """
 
     routes: Mapping[Key, Route]
