@@ -19,7 +19,7 @@ import yaml
 
 from canshaper.config.schema import Bus
 from canshaper.config.source import Source
-from canshaper.daemon.notify import lock_memory, refuse_huge_pages
+from canshaper.daemon.realtime import lock_memory, refuse_huge_pages
 
 ROOT = Path(__file__).resolve().parents[1]
 PEERS = ROOT / "benchmarks" / "peers"

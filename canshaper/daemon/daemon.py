@@ -20,7 +20,7 @@ from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.io_cycle import Standstill, io_cycle
 from canshaper.daemon.loop import run_at_deadlines
-from canshaper.daemon.notify import Collector, ServiceManager, lock_memory, refuse_huge_pages
+from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
     close_ports,
     new_ports,
@@ -29,6 +29,7 @@ from canshaper.daemon.ports import (
     send_neutral,
     waiting,
 )
+from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.reloads import Reloads
 from canshaper.daemon.reporter import Reporter, flush
 from canshaper.errors import BusError, InternalError, raised

@@ -14,8 +14,8 @@ import pytest
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.daemon import reloads as reading_module
-from canshaper.daemon.reloads import ConfigReload
+from canshaper.daemon import config_reload as reading_module
+from canshaper.daemon.config_reload import ConfigReload
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from tests.rigs.forwarder import ROOT, TICK_NS

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.daemon import daemon as module
+from canshaper.daemon import gateway
 from canshaper.daemon.io_cycle import FramePort, FrameProcessor, Standstill, receive_waiting
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
@@ -63,7 +63,7 @@ def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[CountingGateway
         lines.append(CountingGateway(bench, *arguments))
         return lines[-1]
 
-    monkeypatch.setattr(module, "InlineGateway", in_line)
+    monkeypatch.setattr(gateway, "InlineGateway", in_line)
     return lines
 
 
@@ -118,7 +118,7 @@ def test_a_line_that_cannot_be_opened_leaves_the_one_before(
         raise BusError("gateway: cannot open vcan0 and vcan9: no such device")
 
     def reloads() -> None:
-        monkeypatch.setattr(module, "InlineGateway", cannot)
+        monkeypatch.setattr(gateway, "InlineGateway", cannot)
         bench.reload("channel: vcan1", "channel: vcan9")
 
     closed: list[tuple[str, bool]] = []

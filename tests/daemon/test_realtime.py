@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.daemon.notify import Collector
+from canshaper.daemon.realtime import Collector
 
 pytestmark = pytest.mark.processes
 
@@ -106,7 +106,7 @@ def test_it_stays_off_when_a_library_switches_it_on(collector: Collector) -> Non
 # -- memory ----------------------------------------------------------------------------------------
 
 # Everything is imported before ``prepare`` may take the right to read it away.
-IMPORT = "import ctypes, os, resource, sys\nfrom canshaper.daemon.notify import lock_memory\n"
+IMPORT = "import ctypes, os, resource, sys\nfrom canshaper.daemon.realtime import lock_memory\n"
 LOCK = """
 print(lock_memory())
 more = bytearray(4 << 20)
@@ -149,7 +149,7 @@ def test_memory_is_locked_also_what_is_taken_later() -> None:
 
 def test_huge_pages_are_refused_and_by_children_too() -> None:
     code = (
-        "import subprocess\nfrom canshaper.daemon.notify import refuse_huge_pages\n"
+        "import subprocess\nfrom canshaper.daemon.realtime import refuse_huge_pages\n"
         "show = ['grep', 'THP_enabled', '/proc/self/status']\n"
         "subprocess.run(show)\nrefuse_huge_pages()\nsubprocess.run(show)\n"
     )

@@ -30,7 +30,7 @@ HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
 PAUSE = HUGE_PAGES / "khugepaged/scan_sleep_millisecs"
 # A process like the daemon, but for the one call.
 LARGE = """
-from canshaper.daemon.notify import lock_memory
+from canshaper.daemon.realtime import lock_memory
 kept = [bytes(100) for _ in range(100_000)]
 assert lock_memory() is None
 print("ready", flush=True)

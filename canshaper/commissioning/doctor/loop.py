@@ -17,7 +17,7 @@ from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.io_cycle import Standstill, io_cycle
 from canshaper.daemon.loop import run_at_deadlines
-from canshaper.daemon.notify import Collector, lock_memory, refuse_huge_pages
+from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
