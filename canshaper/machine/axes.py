@@ -25,8 +25,9 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     slewing = {motion.slew for motion in lookup.config.motion.values()}
     order = sorted(lookup.config.axes.items(), key=lambda item: item[0] not in slewing)
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
-    for shared in shared_valves.values():
-        check_start_values(shared)
+    if not lookup.diagnostics.problems:  # else a signal may be unused because it was not bound
+        for shared in shared_valves.values():
+            check_start_values(shared)
     tick_s = lookup.config.tick_ms / 1000.0
     periods = {n: tick_s * axis.period_ticks for n, axis in axes.items() if axis}
     sensors = bind_sway_sensors(lookup, periods)

@@ -36,6 +36,7 @@ BA_ "GenMsgCycleTime" BO_ 2365468926 20;
 BA_ "GenMsgCycleTime" BO_ 1280 20;
 BA_ "VFrameFormat" BO_ 2365468926 3;
 BA_ "GenSigStartValue" SG_ 2365468926 FailSafe 0;
+BA_ "GenSigStartValue" SG_ 1280 Falling 2;
 VAL_ 2365468926 State 0 "Block" 1 "Extend" 2 "Retract" 3 "Float" 15 "DontCare" ;
 """
 network: Any = cantools.database.load_string(DBC, "dbc")

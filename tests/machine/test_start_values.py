@@ -50,3 +50,10 @@ def test_what_rests_or_is_no_command_is_shown(
     add(machine, signal, start, name)
     (carried,) = machine.load().starts
     assert (carried.message, carried.signal, carried.value) == ("SlewCommand", "Rotate", value)
+
+
+def test_next_to_another_problem_nothing_is_said_of_it(machine: Machine) -> None:
+    """The signal of an axis that could not be bound would look as if no axis used it."""
+    add(machine, '@1+ (1,-100) [-100|100] "%"')
+    machine.in_yaml("timeout_ms: 100 #", "timeout_ms: 1 #")
+    assert not any("Rotate" in problem for problem in machine.problems())
