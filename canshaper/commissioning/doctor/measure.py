@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from canshaper.bus.packet import CAN_FRAME
-from canshaper.commissioning.doctor.link import load_kinds
+from canshaper.commissioning.doctor.load import load_kinds
 from canshaper.commissioning.doctor.processes import Children, output, ready
 from canshaper.errors import MeasurementError
 from canshaper.machine.deployment import Deployment

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.commissioning.doctor.listen import LARGEST, NEUTRAL_S, STROKE_S, Waving
+from canshaper.commissioning.doctor.joysticks import LARGEST, NEUTRAL_S, STROKE_S, Waving
 from canshaper.commissioning.doctor.measure import measure, run_of
 from canshaper.commissioning.doctor.processes import Children, ready
 from canshaper.controller.controller import Controller
