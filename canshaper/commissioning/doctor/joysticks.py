@@ -8,8 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from canshaper.bus.packet import boottime_ns
-from canshaper.bus.packet import FD_SIZE, FDF, Packet
+from canshaper.bus.packet import FD_SIZE, FDF, Packet, boottime_ns
 from canshaper.codec.frame import EFF_FLAG
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, real_time, say_ready
 from canshaper.daemon.loop import run_at_deadlines
