@@ -129,11 +129,11 @@ def test_the_daemon_ends_with_us(deployment: Deployment, tmp_path: Path) -> None
     """We are killed in the middle of a drive: the valves are sent neutral all the same."""
     code = (
         "import os, signal; from pathlib import Path\n"
-        "from canshaper.cli.verbs.commission import Terminal\n"
+        "from canshaper.cli.verbs.commission import Prompts\n"
         "from canshaper.commissioning.procedure.machine import Machine\n"
         "from canshaper.commissioning.procedure.bench import Mode\n"
         "from canshaper.machine.binding import load_deployment\n"
-        "bench = Machine(Terminal(), [])\n"
+        "bench = Machine(Prompts(), [])\n"
         "with bench._daemon(load_deployment(Path('machine.yaml')), Path('d.log'), Mode.SHAPED):\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
