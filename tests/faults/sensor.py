@@ -2,7 +2,6 @@
 
 import math
 import random
-import struct
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ from cantools.database.can import Message
 
 from tests.faults.axis import Axis
 from tests.faults.inputs import Key
+from tests.faults.sealed import with_header_p4
 from tests.faults.swing import Swing
 
 if TYPE_CHECKING:
@@ -19,16 +19,6 @@ Values = dict[str, float]
 DEGREE = math.pi / 180.0
 NOISE = 0.1  # degrees, or degrees a second
 DELAYED = 15  # frames
-
-
-def crc32_p4(data: bytes) -> int:
-    """The CRC of profile 4, bit by bit: polynomial 0xF4ACFB13, here reflected."""
-    crc = 0xFFFFFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xC8DF352F if crc & 1 else 0)
-    return crc ^ 0xFFFFFFFF
 
 
 class SensorMessage:
@@ -63,10 +53,9 @@ class SensorMessage:
         return data if self.data_id is None else self._sealed(data, self.data_id)
 
     def _sealed(self, data: bytes, data_id: int) -> bytes:
-        """With the header of profile 4: length, counter, data ID, CRC over all the rest."""
-        self._count = (self._count + 1) % (1 << 16)
-        head = struct.pack(">HHI", len(data), self._count, data_id)
-        return head + struct.pack(">I", crc32_p4(head + data[12:])) + data[12:]
+        """Put the header of profile 4 in front, with the next counter."""
+        self._count += 1
+        return with_header_p4(len(data), self._count, data_id, data[12:])
 
 
 def _all(change: Callable[["Fault", float], float]) -> Callable[["Fault", Values], Values]:

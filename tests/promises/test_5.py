@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from canshaper.codec.frame import Frame
-from tests.promises.sealed import sealed
+from tests.faults.sealed import sealed
 from tests.promises.test_2 import rounding
 from tests.promises.world import REST, World, every
 from tests.promises.worst import Worst
@@ -213,7 +213,7 @@ class TestOneWrongCommand:
             assert not [one for one in world.left if one[:3] in world.moved_by]
 
     def test_every_frame_is_within_the_limits_of_the_file(self, name: str) -> None:
-        """Of the worst controller, with any strokes: rise, fall, and a maximum that was set."""
+        """The worst controller keeps rise, fall and a maximum that was set, in any stroke."""
         world, most = Worst(name), 0.4
         for axis in world.gate.axes.values():
             axis.of.ranges = {"limits.max_pct": (20.0, 80.0)}

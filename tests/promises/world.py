@@ -19,8 +19,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.faults.fields import Field
 from tests.faults.machine import Key, Machine
+from tests.faults.sealed import sealed
 from tests.faults.shipped import CONFIG, NAMES
-from tests.promises.sealed import sealed
 from tests.promises.seen import Buses
 
 REST = 25  # ticks until claims, nodes and neutral are seen
@@ -219,12 +219,12 @@ class World:
         return self.passed(frame, at_ns)
 
     def passed(self, frame: Frame, at_ns: int) -> list[Frame]:
-        """What leaves for it at once."""
+        """Return the frames that leave for it at once."""
         passed = self.guarded.receive(frame, at_ns)
         return [passed] if passed else []
 
     def ticked(self, missed: int) -> Iterable[Frame]:
-        """What leaves in the tick."""
+        """Yield the frames that leave in the tick."""
         return self.guarded.tick(self.now_ns, missed)
 
     def step(self, plant: Plant | None = None, missed: int = 0) -> list[Frame]:
@@ -265,7 +265,7 @@ class World:
             self.step(plant)
 
     def refusals(self) -> list[str]:
-        """What the gate has refused since they were asked for."""
+        """Return the refusals of the gate since the last call."""
         refused = [one.why for one in self.evil.events if isinstance(one, RefusalEvent)]
         self.evil.events.clear()
         return refused

@@ -33,14 +33,19 @@ def crc64_xz(data: bytes) -> int:
     return crc(0xC96C5795D7870F42, 64, data)
 
 
+def with_header_p4(length: int, count: int, data_id: int, rest: bytes) -> bytes:
+    """The frame of profile 4: length, counter, data ID, and the CRC over all but itself."""
+    head = struct.pack(">HHI", length, count % (1 << 16), data_id)
+    return head + struct.pack(">I", crc32_p4(head + rest)) + rest
+
+
 def sealed(section: dict[str, Any] | None, data: bytes, ahead: int = 0) -> bytes:
     """The frame with the right header, its counter so much ahead; as it is without a section."""
     if section is None:
         return data
     if section["profile"] == "p04":
         length, count, data_id, _ = struct.unpack(">HHII", data[:12])
-        head = struct.pack(">HHI", length, (count + ahead) % (1 << 16), data_id)
-        return head + struct.pack(">I", crc32_p4(head + data[12:])) + data[12:]
+        return with_header_p4(length, count + ahead, data_id, data[12:])
     assert section["profile"] == "p07"
     length, count, data_id = struct.unpack(">III", data[8:20])
     rest = struct.pack(">III", length, (count + ahead) % (1 << 32), data_id) + data[20:]
