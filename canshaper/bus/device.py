@@ -137,21 +137,6 @@ def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
         raise WrongDeviceError(fault)
 
 
-def check_present(bus: Bus, root: Path = ROOT) -> None:
-    """Whether there is an interface of that name, before a socket is bound to it.
-
-    Binding to a name that does not exist makes the kernel look for a module that would make the
-    interface: for a process with root's rights up to half a second, in which no axis is driven. An
-    empty name would bind to every interface.
-
-    Raises:
-        OSError: ENODEV, there is none.
-    """
-    names = root / "sys/class/net"
-    if not bus.channel or (names.is_dir() and not (names / bus.channel).exists()):
-        raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
-
-
 def check_mtu(bus: Bus, root: Path = ROOT) -> None:
     """Whether the interface of a bus of CAN FD is set up for it.
 

@@ -3,14 +3,17 @@
 Why not python-can: docs/decisions.md#raw-sockets.
 """
 
+import errno
+import os
 import select
 import socket
 import struct
 from collections import deque
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
-from canshaper.bus.device import check_device, check_mtu, check_present
+from canshaper.bus.device import ROOT, check_device, check_mtu
 from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
@@ -70,6 +73,21 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
             one.close()
         raise
     return opened
+
+
+def check_present(bus: Bus, root: Path = ROOT) -> None:
+    """Whether there is an interface of that name, before a socket is bound to it.
+
+    Binding to a name that does not exist makes the kernel look for a module that would make the
+    interface: for a process with root's rights up to half a second, in which no axis is driven. An
+    empty name would bind to every interface.
+
+    Raises:
+        OSError: ENODEV, there is none.
+    """
+    names = root / "sys/class/net"
+    if not bus.channel or (names.is_dir() and not (names / bus.channel).exists()):
+        raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
 
 
 def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:

@@ -49,13 +49,12 @@ class Verbs(TyperGroup):
         return self.commands[cmd_name] or self._load(cmd_name)
 
     def _load(self, name: str) -> Any:
-        word = name.replace("-", "_")
         one = typer.Typer(
             add_completion=False,
             rich_markup_mode=None,
             context_settings={"help_option_names": ["-h", "--help"]},
         )
-        verb = getattr(_module(name), word)
+        verb = getattr(_module(name), _word(name))
         checked = _linux_only(verb) if name in LINUX_ONLY else verb
         one.command(name, help=pasteable(verb.__doc__ or ""))(checked)
         self.commands[name] = typer.main.get_command(one)
@@ -86,8 +85,13 @@ class Verbs(TyperGroup):
             raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
+def _word(name: str) -> str:
+    """Return the name of a verb in Python, of its module and its function."""
+    return name.replace("-", "_")
+
+
 def _module(name: str) -> Any:
-    return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
+    return import_module(f"{verbs.__name__}.{_word(name)}")
 
 
 def pasteable(text: str) -> str:

@@ -1,4 +1,4 @@
-"""What a control loop asks of the interpreter and the kernel: no surprises from memory.
+"""Requests of a control loop to interpreter and kernel: no surprises from memory.
 
 The scheduling policy is set from outside (``CPUSchedulingPolicy=`` of the unit, ``chrt``).
 """

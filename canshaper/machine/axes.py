@@ -2,20 +2,18 @@
 
 from dataclasses import replace
 
+from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.enable import slowest_ms
 from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.machine.filters import check_filters
 from canshaper.machine.identity import bind_status
-from canshaper.machine.inputs import (
-    bind_feedback,
-    bind_status_word,
-)
+from canshaper.machine.inputs import bind_feedback, bind_status_word
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.stopping import stated_fault
 from canshaper.machine.sway_sensor import bind_sway_sensors
-from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve, check_start_values
+from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 
 def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
@@ -27,7 +25,8 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
     if not lookup.diagnostics.problems:  # else a signal may be unused because it was not bound
         for shared in shared_valves.values():
-            check_start_values(shared)
+            if not isinstance(shared.codec, RewrittenMessage):  # its signals are the joystick's
+                shared.used.check_start_values(shared.codec.start)
     tick_s = lookup.config.tick_ms / 1000.0
     periods = {n: tick_s * axis.period_ticks for n, axis in axes.items() if axis}
     sensors = bind_sway_sensors(lookup, periods)

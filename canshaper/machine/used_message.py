@@ -7,8 +7,8 @@ from typing import NamedTuple
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.identifier import STATE_BITS
-from canshaper.codec.layout import Chosen
-from canshaper.codec.signals import find_signal, names_broken
+from canshaper.codec.layout import Chosen, is_j1939
+from canshaper.codec.signals import find_signal, names_broken, raw_limits
 from canshaper.config.source import Place
 from canshaper.errors import there_are
 from canshaper.machine.database import DbcFile
@@ -113,6 +113,28 @@ class UsedMessage:
             if raw in means and names_broken(code.name):
                 text = f"expected a signal whose {raw} is {code.means}, got {signal.name!r}"
                 self.diagnostics.add(place, f'{text}, whose {raw} is "{code.name}" in the DBC')
+
+    def check_start_values(self, start: Mapping[str, float]) -> None:
+        """Check that signals that no axis uses rest: every frame carries their start value.
+
+        Args:
+            start: raw start value of every signal of the message that is sent.
+        """
+        for signal in self.message.signals:
+            raw = start[signal.name]
+            missing = is_j1939(self.message) and signal.raw_initial is None  # all bits 1
+            if signal.name in self.uses or signal.is_multiplexer or missing:
+                continue
+            value, unit = raw * signal.scale + signal.offset, signal.unit or ""
+            self.starts.append(StartValue(self.message.name, signal.name, value, unit))
+            ends = [one * signal.scale + signal.offset for one in raw_limits(signal)]
+            low = min(ends) if signal.minimum is None else signal.minimum
+            high = max(ends) if signal.maximum is None else signal.maximum
+            if low < 0.0 < high and value != 0.0 and raw not in (signal.choices or {}):
+                rest = -signal.offset / signal.scale
+                text = f"expected {rest:g}, rest, or a value that VAL_ names: no axis uses it and"
+                text += f" every frame of {self.message.name} carries it; got {raw:g}, {value:g}"
+                self.add_fault(f"{signal.name}: GenSigStartValue: {text} {unit}".rstrip())
 
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
         """Check that a raw value is a whole number."""

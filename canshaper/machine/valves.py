@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.sent import SentMessage
@@ -34,7 +33,7 @@ from canshaper.machine.inputs import Bound, BoundValue
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
 from canshaper.machine.sway_sensor import BoundSwaySensor
-from canshaper.machine.used_message import StartValue, UsedMessage, key_path
+from canshaper.machine.used_message import UsedMessage, key_path
 
 # A valve learns of a stop no sooner than with its next frame.
 SLOWEST_VALVE_MS = 200
@@ -106,32 +105,6 @@ def bind_valve(
     if signal is None or not shared.ticks or len(lookup.diagnostics.problems) > before:
         return None
     return ValveCodec(shared.codec, signal, codec, [s for s in also if s], negative), shared.ticks
-
-
-def check_start_values(shared: SharedValve) -> None:
-    """Signals that no axis uses leave with their start value: of a command it has to be rest."""
-    used, codec = shared.used, shared.codec
-    if isinstance(codec, RewrittenMessage):  # they leave as the joystick sent them
-        return
-    for signal in used.message.signals:
-        raw = codec.start[signal.name]
-        missing = is_j1939(used.message) and signal.raw_initial is None  # all bits 1
-        if signal.name in used.uses or signal.is_multiplexer or missing:
-            continue
-        value, unit = raw * signal.scale + signal.offset, signal.unit or ""
-        used.starts.append(StartValue(used.message.name, signal.name, value, unit))
-        ends = [one * signal.scale + signal.offset for one in raw_limits(signal)]
-        low = min(ends) if signal.minimum is None else signal.minimum
-        high = max(ends) if signal.maximum is None else signal.maximum
-        if low < 0.0 < high and value != 0.0 and raw not in (signal.choices or {}):
-            expected = (
-                f"expected {-signal.offset / signal.scale:g}, rest, or a value that VAL_ names"
-            )
-            got = f"got {raw:g}, {value:g} {unit}".rstrip()
-            used.add_fault(
-                f"{signal.name}: GenSigStartValue: {expected}: no axis uses it and every frame of"
-                f" {used.message.name} carries it; {got}"
-            )
 
 
 def _check_cycle(lookup: Lookup, place: Place, valve: Valve, shared: SharedValve) -> None:

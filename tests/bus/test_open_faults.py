@@ -10,9 +10,8 @@ import pytest
 
 from canshaper.bus import port as bus_module
 from canshaper.bus import python_can, socketcan
-from canshaper.bus.device import check_present
 from canshaper.bus.port import open_port
-from canshaper.bus.socketcan import open_sockets
+from canshaper.bus.socketcan import check_present, open_sockets
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError, WrongBusError, WrongDeviceError

@@ -60,7 +60,7 @@ def words(text: str) -> int:
 
 
 def excess(page: str, text: str) -> str | None:
-    """What is wrong with the number of words of a page."""
+    """Return the fault of the number of words of a page; empty for none."""
     count, budget = words(text), BUDGET[page]
     if count <= MORE * budget:
         return None

@@ -1,4 +1,4 @@
-"""What goes wrong on the buses of a machine, tick by tick; ``World.well`` ends it."""
+"""Faults on the buses of a machine, tick by tick; ``World.well`` ends them."""
 
 from collections.abc import Callable, Iterable
 
@@ -8,7 +8,7 @@ from tests.faults.machine import Key
 from tests.promises.world import World
 
 Event = Callable[[World, int], None]
-"""What happens before each tick, by its number from when it began."""
+"""Act before each tick, called with the number of ticks since it began."""
 
 
 def once(act: Callable[[World], None]) -> Event:

@@ -1,4 +1,4 @@
-"""What was on the buses of a machine, as one knows it who reads the pages and the DBC only.
+"""Traffic on the buses of a machine, judged by its pages and its DBC files only.
 
 ``tests.faults.received`` decides from bytes what each message is worth; it shares no code with us.
 """

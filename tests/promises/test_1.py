@@ -45,7 +45,7 @@ class TestNoMotionWithoutAnOperator:
     fresh, valid, enabled joystick that was seen in neutral."""
 
     def world(self, name: str) -> Worst:
-        """What moves is checked in each frame that leaves."""
+        """Make a world that checks every moving axis in each frame that leaves."""
         world = Worst(name)
 
         def judge(axis: str, before: float, now: float) -> None:

@@ -43,7 +43,7 @@ class TestNeutralStops:
         return world
 
     def test_whatever_a_controller_sends(self, name: str) -> None:
-        """Held, tapped, turned round, a little beside neutral, in a bypass; then in neutral."""
+        """Held, tapped, turned round, just outside neutral, in a bypass; then in neutral."""
         world = Worst(name)
         self.judged(world)
         longest = max(run_on(one) * one.period_ticks for one in world.axes.values())

@@ -76,7 +76,7 @@ class TestEveryFrameIsOfItsTick:
         assert not moving  # refused: neutral in their place
 
     def test_no_frame_without_a_tick(self, name: str) -> None:
-        """Of any speed, right behind the tick, also where it asks for nothing new."""
+        """Frames of any speed, right behind the tick, also such as ask for nothing new."""
         world = self.world(name)
         if world.machine.gateway:
             pytest.skip(

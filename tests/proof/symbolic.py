@@ -33,7 +33,7 @@ class Paths:
         self._pending: list[list[bool]] = [[]]
 
     def prove(self, run: Callable[[], "Unknown | bool"]) -> None:
-        """What it returns holds on every path.
+        """Prove that the returned claim holds on every path.
 
         Raises:
             AssertionError: with numbers for which it does not.
@@ -43,9 +43,9 @@ class Paths:
             self._taken, self._at, self._here = self._pending.pop(), 0, []
             claim = value(run())
             self.count += 1
-            found = self._solver.check(*self._here, z3.Not(claim))
-            assert found != z3.unknown, "not decided"
-            assert found == z3.unsat, self._solver.model()
+            answer = self._solver.check(*self._here, z3.Not(claim))
+            assert answer != z3.unknown, "not decided"
+            assert answer == z3.unsat, self._solver.model()
 
     def decide(self, condition: Any) -> bool:
         """Which way this path goes; the other one, where it is possible, is for later."""
@@ -60,9 +60,9 @@ class Paths:
         return way
 
     def _possible(self, condition: Any, way: bool) -> bool:
-        found = self._solver.check(*self._here, condition if way else z3.Not(condition))
-        assert found != z3.unknown, "not decided"
-        return bool(found == z3.sat)
+        answer = self._solver.check(*self._here, condition if way else z3.Not(condition))
+        assert answer != z3.unknown, "not decided"
+        return bool(answer == z3.sat)
 
 
 def value(one: Any) -> Any:

@@ -41,7 +41,7 @@ def gate(name: str) -> Gate:
 
 
 class Demand:
-    """What was asked in one direction: any, within the tail."""
+    """Any demand in one direction, within the tail."""
 
     def __init__(self, name: str) -> None:
         self.most, self.before, self.remaining = real(f"{name}.most"), real(f"{name}.before"), 0.0
@@ -250,9 +250,9 @@ def test_every_frame_of_a_valve(name: str, monkeypatch: pytest.MonkeyPatch) -> N
         little = z3.BitVec("frame", bits + 8)  # so that no sum of an 8-bit field overflows
         ordered = [z3.Extract(8 * n + 7, 8 * n, little) for n in range(valve.length)]
         word = Unknown(little), Unknown(z3.Concat(z3.BitVecVal(0, 8), *ordered))
-        told = replace(valve, check=None, words=tuple((f, tuple(v)) for f, v in valve.words))
+        bare = replace(valve, check=None, words=tuple((f, tuple(v)) for f, v in valve.words))
 
-        def run(valve: Any = told, axes: Any = axes, word: Any = word, bits: int = bits) -> Any:
+        def run(valve: Any = bare, axes: Any = axes, word: Any = word, bits: int = bits) -> Any:
             if rules.bytes_refused(valve, bytes(bits // 8), word, None, held=False):
                 return True
             claims: list[Any] = [(word[0] & valve.fixed) == valve.fixed_value]

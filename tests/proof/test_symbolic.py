@@ -1,4 +1,4 @@
-"""What runs functions on every path: it says what holds, and what does not."""
+"""The runner of every path: it confirms claims that hold, and refutes others."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What else may run on a machine PC, at ordinary priority: processes that keep it busy."""
+"""Other work of a machine PC at ordinary priority: processes that keep it busy."""
 
 import os
 import tempfile
