@@ -35,7 +35,7 @@ def test_the_way_of_a_frame_grows_no_longer(file: str, functions: int, files: in
     finally:
         sys.setprofile(None)
     print(
-        *(f"{place.rpartition('/canshaper/')[2]} {name}" for place, name in sorted(called)),
+        *(f"{place.removeprefix(PACKAGE)} {name}" for place, name in sorted(called)),
         sep="\n",
     )
     assert any(any(frame.data[:2]) for frame in sent)  # in motion
