@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -10,15 +11,15 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from canshaper.config.enable import slowest_ms
 from canshaper.config.filters import Filter, Profile
 from canshaper.config.schema import AxisSection
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import FullSpeed, full_speed, stop_fault
+from canshaper.machine.stopping import FullSpeed, full_speed, output_limits, stop_fault, when
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.stopping import Travel, allowed_s, travel
+from canshaper.shaping.axis import ShapedAxis
+from canshaper.shaping.stopping import Travel, allowed_s, needed_s, travel
 
 # Of a proportional valve with a first-order lag: that of the simulated crane, typical of pilot
 # stages. The tip travels on for so long at its last speed, whatever the commands did before.
@@ -34,6 +35,7 @@ class Stopping:
     speed: FullSpeed
     maximum: float
     travel: Travel
+    needed_s: float
     allowed_s: float
     stated_m: float | None
 
@@ -61,6 +63,8 @@ def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: floa
         f"Released at full speed, {name} travels {one.cell(one.travel.release)} with it;"
         f" its limits allow {one.cell(one.allowed_s)}."
     )
+    if one.stated_m is not None and one.needed_s > one.allowed_s:
+        text += f" It needs {one.cell(one.needed_s)}: stop_distance_m cuts it short."
     if tail_s is None:
         return text
     limits = bound.config.limits.model_copy(update={"tail_s": tail_s})
@@ -70,31 +74,24 @@ def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: floa
 
 def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
     joystick = deployment.joysticks[bound.config.command.joystick]
-    limits = bound.config.limits
+    config, limits = bound.config, bound.config.limits
     tick_s = deployment.config.tick_ms / 1000.0
-    period_s = tick_s * bound.period_ticks
-    timeout_s = slowest_ms(deployment.config, joystick.name) / 1000.0
+    times = {"timeout_s": bound.timeout_ms / 1000.0, "period_s": tick_s * bound.period_ticks}
     senders = {one.key: one.sender() for one in deployment.sent()}
-    travels = [
-        travel(
-            lambda one=one: (
-                AxisControl(  # type: ignore[misc]
-                    one, tick_s, JoystickInput(joystick), senders
-                ).axis
-            ),
-            timeout_s=timeout_s,
-            period_s=period_s,
-        )
-        for one in _variants(bound)
-    ]
-    allowed = allowed_s(
-        limits.output_limits(), stop_s=limits.stop_s, timeout_s=timeout_s, period_s=period_s
-    )
+
+    def axis(one: BoundAxis) -> ShapedAxis:
+        return AxisControl(one, tick_s, JoystickInput(joystick), senders).axis
+
+    unbounded = limits.model_copy(update={"stop_distance_m": None})
+    free = replace(bound, config=config.model_copy(update={"limits": unbounded}))
+    bounds = output_limits(config, **when(deployment, bound.name))
+    allowed = allowed_s(bounds, stop_s=limits.stop_s, **times)
     return Stopping(
         bound.name,
-        full_speed(bound.config),
+        full_speed(config),
         limits.max_pct / 100.0,
-        Travel.worst(travels),
+        Travel.worst([travel(partial(axis, one), **times) for one in _variants(bound)]),
+        max(needed_s(partial(axis, one), **times) for one in _variants(free)),
         allowed,
         limits.stop_distance_m,
     )
@@ -133,8 +130,10 @@ def _table(axes: list[Stopping]) -> Table:
 
     row("joystick released", lambda a: a.cell(a.travel.release))
     row("joystick reversed", lambda a: a.cell(a.travel.reversal))
+    row("  in the old direction", lambda a: f"{a.travel.reversal_s:.2f} s")
     row("joystick lost", lambda a: a.cell(a.travel.lost))
     row("enable lost, e-stop", lambda a: a.cell(a.travel.enable))
+    row("its filter needs", lambda a: a.cell(a.needed_s))
     row("limits allow", lambda a: a.cell(a.allowed_s))
     row("stop_distance_m", lambda a: "-" if a.stated_m is None else f"{a.stated_m:g} m")
     row("valve's lag adds", lambda a: a.cell(a.maximum * VALVE_LAG_S))
@@ -147,6 +146,12 @@ def _notes(axes: list[Stopping]) -> Iterator[RenderableType]:
         f" for its timeout. The valve's lag is assumed to be {VALVE_LAG_S:g} s.",
         "dim",
     )
+    for axis in axes:
+        if axis.stated_m is not None and axis.needed_s > axis.allowed_s:
+            yield Text(
+                f"WARNING: {axis.name}: its filter needs {axis.cell(axis.needed_s)};"
+                f" stop_distance_m ends it at {axis.stated_m:g} m, and more swing is left."
+            )
     if unknown := [axis.name for axis in axes if axis.speed.m_s is None]:
         yield Text(
             f"{', '.join(unknown)}: in seconds of full speed; the file has no speed of the tip"

@@ -65,8 +65,13 @@ class Limits(Section):
     allow_reverse: bool = Field(False, description="the output may go against the joystick")
     reversal: Literal["stop", "brake_shaped"] = "stop"
     """The output after the joystick was pulled the other way. With stop it falls by fall_per_s;
-    with brake_shaped it runs on along the filter within tail_s, never faster than was commanded in
-    that direction: a third less swing, a second longer to turn round."""
+    with brake_shaped it runs on along the filter for reversal_s, never faster than was commanded in
+    that direction: less swing, later to turn round."""
+    reversal_s: Annotated[
+        float, number(0.1, 5, "s", "longest motion in the old direction after a reversal")
+    ] = 0.45
+    """With brake_shaped: longest motion in the old direction after the joystick was pulled the
+    other way, the fall included."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -106,7 +111,7 @@ class Limits(Section):
             tail_s=self.tail_s,
             allow_faster=self.allow_faster,
             allow_reverse=self.allow_reverse,
-            brake_shaped=self.reversal == "brake_shaped",
+            reversal_s=self.reversal_s if self.reversal == "brake_shaped" else 0.0,
         )
 
 

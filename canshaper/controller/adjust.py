@@ -93,7 +93,8 @@ class Adjuster:
             config = adjusted(runner.bound.config, values, self._deployment.config.axes[name])
         except ValueError as error:
             raise ValueError(f"axes.{name}.{error}") from None
-        if config.limits != runner.bound.config.limits and not runner.axis.neutral:
+        before = runner.limits(runner.bound.config)
+        if runner.limits(config) != before and not runner.axis.neutral:
             state = runner.axis.state.name
             raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
         rate = config.limits.slowest_per_s

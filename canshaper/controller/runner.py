@@ -14,9 +14,11 @@ from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
 from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ProfileChoice, ValueInput
+from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import ShapedAxis
+from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper
@@ -65,7 +67,7 @@ class AxisControl:
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         self.axis = ShapedAxis(
             period_s,
-            config.limits.output_limits(),
+            self.limits(config),
             sway=sway,
             shaper=_shaper(config, period_s, sway),
             neutral_band=self._neutral_band,
@@ -83,6 +85,10 @@ class AxisControl:
         self._radius: ValueInput | None = None
         self._sway_signal: SwaySignal | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
+
+    def limits(self, config: AxisSection) -> OutputLimits:
+        """Limits of this axis with such a configuration."""
+        return output_limits(config, timeout_ms=self.bound.timeout_ms, period_s=self.period_s)
 
     @property
     def tripping(self) -> bool:
@@ -182,9 +188,9 @@ class AxisControl:
         Args:
             config: one whose filter runs at this period; with other limits only in neutral.
         """
-        limits = config.limits
-        if limits != self.bound.config.limits:
-            self.axis.limit(limits.output_limits())
+        limits = self.limits(config)
+        if limits != self.limits(self.bound.config):
+            self.axis.limit(limits)
         if config.sway is not None:
             mode, period_s = config.sway.mode(), self.period_s
             self.axis.retune(mode, lambda sway: _shaper(config, period_s, sway))

@@ -66,7 +66,8 @@ class AxisState(Pending):
         latched: neutral does not arm before reset or enable is pressed again.
         cause: ticks that were made before the last reason that latched.
         why: why it is not armed.
-        now: demand in this period, where it is armed.
+        now: demand in this period, where it is armed; ``held`` for how many periods before it was
+            on the same side.
         forth, back: what was asked in each direction.
         least, most: what may leave in this tick.
         asks, asked: something is asked of it or its partner: in this period, in it or the last one.
@@ -76,6 +77,7 @@ class AxisState(Pending):
         last: velocity of that frame; ``top`` what it may have been before it was rounded.
         uncounted: up to this velocity a fall counts no distance.
         zero_at: ticks that were made before it came to rest, or lost the right to move.
+        ran: how far it has run beyond the demand and what a partner may add, since it did not.
         way, alone: distance and periods in motion since something was asked of it, or nothing
             of its partner; a pause gives none of it back.
     """
@@ -92,7 +94,7 @@ class AxisState(Pending):
         self.stop_left = 0
         self.cause = NEVER
         self.why = "start"
-        self.now = 0.0
+        self.now, self.held, self.ran = 0.0, 0, 0.0
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
         self.asks = self.asked = self.due = False
@@ -162,6 +164,7 @@ class AxisState(Pending):
     def _ask(self, before: float, period: int, passed: int) -> None:
         """Remember what is asked; over deadlines that were missed the demand before was held."""
         of, now = self.of, self.now
+        self.held = self.held + passed if now * before > 0.0 else 0
         if self.flips != self.joystick.flips:
             self.flips = self.joystick.flips
             self.blend()
@@ -204,6 +207,11 @@ class AxisState(Pending):
         self.alone += velocity != 0.0
         # Of a fall counts what is faster than the way back from what was asked last.
         held = max(self.now if velocity > 0.0 else -self.now, 0.0)
+        beyond = size - held - of.added
+        if beyond > 0.0:
+            self.ran += beyond * of.period_s * passed
+        elif self.now:
+            self.ran = 0.0
         on = self.uncounted - of.fall * passed if velocity * self.last > 0.0 else 0.0
         self.uncounted = max(on, held + of.step)
         if size > min(fallen, self.uncounted) + EPSILON:

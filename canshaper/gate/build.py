@@ -168,7 +168,8 @@ def _axis(bound: Any, deployment: Any) -> Axis:
     rewritten, in_dbc = config.command if forwarded else None, find(valve.message)[1]
     command = command_of(bound.valve_message, valve, rewritten, in_dbc)
     control, start = deployment.config.control, f"axes.{bound.name}."
-    curve = limits.curve_command_pct, limits.curve_speed_pct
+    curve, tip = (limits.curve_command_pct, limits.curve_speed_pct), config.slewing
+    reversal = 0 if limits.reversal == "stop" else round(limits.reversal_s / period_s)
     ranges = (control.adjustable if control else {}).items()
     return Axis(
         *(bound.name, config.command.joystick, config.command.signal),
@@ -182,10 +183,13 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         *(limits.rise_per_s * period_s, limits.fall_per_s * period_s),
         *(round(limits.tail_s / period_s), max(1, round(limits.stop_s / period_s))),
         valve.timeout_ms // deployment.config.tick_ms,
-        *(limits.allow_faster, limits.allow_reverse, limits.reversal == "brake_shaped"),
+        *(limits.allow_faster, limits.allow_reverse),
+        reversal,
         slack_of(config),
         forwarded,
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
+        stop_m=limits.stop_distance_m or math.inf,
+        tip_m_s=tip.full_speed_rad_s * tip.largest_radius_m if tip else 0.0,
         ranges={k.removeprefix(start): tuple(ends) for k, ends in ranges if k.startswith(start)},
     )
 

@@ -105,7 +105,10 @@ class Axis:
         tail: for how long the output may stay as fast as was asked.
         stop: longest shaped stop.
         silent: ticks without a frame after which the valve closes.
-        faster, reverse, brake_shaped: what the file allows beyond that.
+        faster, reverse: what the file allows beyond that.
+        reversal: for how long the output may run on against a stick that is held.
+        stop_m: how far the tip may travel when it stops, ``tip_m_s`` its full speed where that is
+            not ``full_m_s``; ``run_on`` the distance in full speed times seconds.
         slack: how far a sound filter may run ahead of what was asked, full speed times seconds.
         forwarded: its command leaves in the frames of its own joystick, through a gateway.
         partner: the axis that adds velocity to this one; empty for none.
@@ -134,7 +137,7 @@ class Axis:
     silent: int
     faster: bool
     reverse: bool
-    brake_shaped: bool
+    reversal: int
     slack: float
     forwarded: bool
     partner: str = ""
@@ -142,13 +145,16 @@ class Axis:
     most_periods: int = 0
     path_m: float = 0.0
     full_m_s: float = 1.0
+    stop_m: float = math.inf
+    tip_m_s: float = 0.0
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     step: float = field(init=False)
     path: float = field(init=False)
+    run_on: float = field(init=False)
 
     def __post_init__(self) -> None:
         self.step = max(slope for one in self.openings for slope in one.slopes)
-        self.path = self.path_m / self.full_m_s
+        self._scale()
 
     def set(self, key: str, value: float) -> None:
         """A number was changed, never beyond the range of the file; without one it stays."""
@@ -163,7 +169,12 @@ class Axis:
         elif key == "limits.fall_per_s":
             self.fall = value * self.period_s
         elif key == "sway.full_speed_m_s":
-            self.full_m_s, self.path = value, self.path_m / value
+            self.full_m_s = value
+            self._scale()
+
+    def _scale(self) -> None:
+        self.path = self.path_m / self.full_m_s
+        self.run_on = self.stop_m / (self.tip_m_s or self.full_m_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,8 @@ def neutral_first(axis: AxisState) -> str:
 def bounds(axis: AxisState) -> tuple[float, float]:
     """Rule 4: what may leave in each direction; limit: the demand within the tail, ``max_pct``.
 
-    Never against a stick that is held, but in a shaped stop. Beyond the demand what a partner adds.
+    Against a stick that is held for ``reversal_s`` only, but in a shaped stop. Beyond the demand
+    what a partner adds.
     """
     of, low, high, now = axis.of, -axis.back.most, axis.forth.most, axis.now
     least, most = low, high
@@ -58,7 +59,7 @@ def bounds(axis: AxisState) -> tuple[float, float]:
         least, most = (-1.0 if low else 0.0), (1.0 if high else 0.0)
     if of.reverse:
         least, most = min(least, -most), max(most, -least)
-    elif not of.brake_shaped and not axis.stop_left:
+    elif axis.held >= of.reversal and not axis.stop_left:
         if now > 0.0:
             least = 0.0
         elif now < 0.0:
@@ -105,9 +106,12 @@ def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
 def distance(axis: AxisState, velocity: float) -> str:
     """Rule 7: no farther than was asked and not yet run; limit: the slack of its filter.
 
+    Beyond the demand no farther than ``stop_distance_m``.
     Where nothing was asked within the tail a partner moves it: limits are its path and its time.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
+    if axis.ran > of.run_on:
+        return f"limit=stop_distance_m allowed={of.run_on:.3f}"
     if asked.most:
         ahead = asked.remaining + of.slack + of.path
         if abs(velocity) * of.period_s > ahead:

@@ -69,6 +69,7 @@ def _bind_axis(
         codec.message.fields.message,
         codec,
         ticks,
+        timeout_ms,
         *status,
         bind_feedback(lookup, (*place, "feedback"), axis.feedback) if axis.feedback else None,
         bind_status_word(lookup, at, cia408.status) if cia408 else None,

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypedDict
 
-from canshaper.config.enable import slowest_ms
 from canshaper.config.origin import simulated
 from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.machine.deployment import Deployment
+from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.stopping import allowed_s
 
 # Farthest that limits allow without a word of the file: what a tip at 1 m/s, a usual speed of
@@ -40,6 +40,20 @@ def full_speed(axis: AxisSection) -> FullSpeed:
     return FullSpeed(speed_m_s, None)
 
 
+def output_limits(axis: AxisSection, *, timeout_ms: int, period_s: float) -> OutputLimits:
+    """Limits of an axis, with the run-on that its ``stop_distance_m`` leaves.
+
+    The tip travels at full speed until a lost joystick is seen, and while a command waits; what is
+    left of the distance is for the run-on. Arguments as ``allowed_m``.
+    """
+    limits = axis.limits.output_limits()
+    stated, speed = axis.limits.stop_distance_m, full_speed(axis).m_s
+    if stated is None or speed is None:
+        return limits
+    waits = limits.maximum * (timeout_ms / 1000.0 + 2.0 * period_s)
+    return replace(limits, run_on=stated / speed - waits)
+
+
 def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float | None:
     """Farthest that the limits allow the tip to travel when it stops; None without its speed.
 
@@ -51,28 +65,28 @@ def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float |
     speed = full_speed(axis).m_s
     if speed is None:
         return None
-    limits = axis.limits
     return speed * allowed_s(
-        limits.output_limits(),
-        stop_s=limits.stop_s,
+        output_limits(axis, timeout_ms=timeout_ms, period_s=period_s),
+        stop_s=axis.limits.stop_s,
         timeout_s=timeout_ms / 1000.0,
         period_s=period_s,
     )
 
 
 def stated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
-    """Why an axis breaks its own ``stop_distance_m``, or None; arguments as ``allowed_m``."""
-    stated = axis.limits.stop_distance_m
+    """Why no limit keeps an axis within its ``stop_distance_m``, or None; as ``allowed_m``."""
+    stated, speed = axis.limits.stop_distance_m, full_speed(axis).m_s
     if stated is None:
         return None
-    allowed = allowed_m(axis, timeout_ms=timeout_ms, period_s=period_s)
-    if allowed is None:
+    if speed is None:
         return f"expected the section sway or slewing with it, got {stated:g} m without"
-    if allowed <= stated:
+    limits = output_limits(axis, timeout_ms=timeout_ms, period_s=period_s)
+    lacks = 0.5 * limits.maximum**2 / limits.fall_per_s - limits.run_on
+    if lacks <= 0.0:
         return None
     return (
-        f"expected {_up(allowed)} m or more, by max_pct, tail_s, stop_s, fall_per_s and the speed"
-        f" of the tip, got {stated:g} m"
+        f"expected {_up(stated + lacks * speed)} m or more, what it travels without any run-on by"
+        f" max_pct, fall_per_s, timeout_ms and the speed of the tip, got {stated:g} m"
     )
 
 
@@ -83,7 +97,7 @@ def unstated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> st
         return None
     return (
         f"missing: to stop, the limits allow {_up(allowed)} m, which is more than"
-        f" {MOST_UNSTATED_M:g} m; where that is meant, state stop_distance_m: {_up(allowed)}"
+        f" {MOST_UNSTATED_M:g} m; write how far the tip may travel when it stops"
     )
 
 
@@ -95,27 +109,29 @@ def stop_fault(deployment: Deployment, name: str, axis: AxisSection) -> str | No
         name: the axis.
         axis: its configuration, or another one that it shall have.
     """
-    when = _when(deployment, name)
-    return stated_fault(axis, **when) or unstated_fault(axis, **when)
+    times = when(deployment, name)
+    return stated_fault(axis, **times) or unstated_fault(axis, **times)
 
 
 def unstated(deployment: Deployment) -> Iterator[tuple[Place, str]]:
     """Axes that stop over a long way which the file does not state: where, and why."""
     for name, axis in deployment.axes.items():
-        if fault := unstated_fault(axis.config, **_when(deployment, name)):
+        if fault := unstated_fault(axis.config, **when(deployment, name)):
             yield ("axes", name, "limits", "stop_distance_m"), fault
 
 
-class _When(TypedDict):
+class When(TypedDict):
+    """Times of an axis, as of ``allowed_m``."""
+
     timeout_ms: int
     period_s: float
 
 
-def _when(deployment: Deployment, name: str) -> _When:
-    """When an axis sees an event."""
+def when(deployment: Deployment, name: str) -> When:
+    """When an axis sees an event: timeout of its joystick, time between two commands."""
     axis = deployment.axes[name]
     return {
-        "timeout_ms": slowest_ms(deployment.config, axis.config.command.joystick),
+        "timeout_ms": axis.timeout_ms,
         "period_s": axis.period_ticks * deployment.config.tick_ms / 1000.0,
     }
 

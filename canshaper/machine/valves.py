@@ -258,13 +258,19 @@ def _alike(one: Signal, other: Signal) -> bool:
 
 @dataclass(frozen=True)
 class BoundAxis:
-    """An axis with its valve message and, where it has one, its status message."""
+    """An axis with its valve message and, where it has one, its status message.
+
+    Attributes:
+        period_ticks: ticks from one command to the next.
+        timeout_ms: longest time until its joystick, or a switch that enables it, counts as lost.
+    """
 
     name: str
     config: AxisSection
     valve_message: Message
     valve: ValveCodec
     period_ticks: int
+    timeout_ms: int
     status: StatusCodec[ReportedAxis] | None
     status_ticks: int
     feedback: BoundValue[FeedbackSection] | None = None

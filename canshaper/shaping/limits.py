@@ -29,8 +29,10 @@ class OutputLimits:
         tail_s: how long after the operator asked for a speed the output may still be as fast.
         allow_faster: the output may exceed what the operator asks or asked within the tail.
         allow_reverse: the output may go against the joystick.
-        brake_shaped: after a reversal of the joystick the output may run on in the old direction,
-            never faster than asked there within the tail, instead of stopping at ``fall_per_s``.
+        reversal_s: how long after a reversal of the joystick the output may run on in the old
+            direction, the fall included; 0: it falls at once.
+        run_on: how far the output may run beyond what the operator asks now, the fall included,
+            full speed times seconds.
     """
 
     maximum: float = 1.0
@@ -42,7 +44,8 @@ class OutputLimits:
     tail_s: float = 2.0
     allow_faster: bool = False
     allow_reverse: bool = False
-    brake_shaped: bool = False
+    reversal_s: float = 0.0
+    run_on: float = math.inf
 
 
 class RecentCommand:
@@ -104,12 +107,11 @@ class RecentCommand:
 
 
 def allowed_range(
-    command: float, recent_low: float, recent_high: float, limits: OutputLimits
+    recent_low: float, recent_high: float, limits: OutputLimits
 ) -> tuple[float, float]:
-    """Range the operator allows now: never faster than asked, never against the joystick.
+    """Range the operator allows now: never faster than asked in that direction.
 
     Args:
-        command: the operator's command now, [-1, 1].
         recent_low: smallest command within the tail, 0 or negative.
         recent_high: largest command within the tail, 0 or positive.
         limits: the axis' limits.
@@ -124,11 +126,6 @@ def allowed_range(
         low, high = (-1.0 if low < 0.0 else 0.0), (1.0 if high > 0.0 else 0.0)
     if limits.allow_reverse:
         low, high = min(low, -high), max(high, -low)
-    elif not limits.brake_shaped:
-        if command > 0.0:
-            low = 0.0
-        elif command < 0.0:
-            high = 0.0
     maximum = limits.maximum
     return (-maximum if low < -maximum else low), (maximum if high > maximum else high)
 

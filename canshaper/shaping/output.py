@@ -6,10 +6,12 @@ In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
 
 1. Range. The operator bounds the output: it is never faster than he demands now or demanded within
    the tail, and never against his joystick, unless the limits allow that. The reference is clamped
-   to this range. For a tail after anti-sway was switched on in motion, or a motion was cut off by
-   a trip or the end of a stop, there is no run-on: the output is never faster than he demands now,
-   and rests in neutral. What the axis did without the filter, or has not run to its end, is in the
-   memory and in the sway model of the filter, which would run it once more, also after a rest.
+   to this range. The run-on ends sooner where it has gone as far as the limits allow, or against
+   the joystick for as long as they allow. For a tail after anti-sway was switched on in motion, or
+   a motion was cut off by a trip or the end of a stop, there is no run-on: the output is never
+   faster than he demands now, and rests in neutral. What the axis did without the filter, or has
+   not run to its end, is in the memory and in the sway model of the filter, which would run it
+   once more, also after a rest.
 2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
    of the frame. The axis makes one short movement of them.
 3. Added velocity. The motion of two axes may add to that, in a range of its own. It counts every
@@ -22,6 +24,7 @@ the output would be if nothing had been added: it is where the output goes at on
 loses the right to add. Once nothing is added and both have met, one computation does for both.
 """
 
+import math
 from dataclasses import dataclass
 
 from canshaper.shaping.limits import (
@@ -81,18 +84,22 @@ class OutputStage:
             rounded one, it would stick on a coarse grid.
         largest_added: largest |velocity| that the motion of two axes may give to this axis while no
             one commands it; 0 where it may add nothing.
+        side: to which side the joystick was deflected last, 1 or -1.
         tail: ticks for which the output may run on.
     """
 
     __slots__ = (
         "_carry",
+        "_crossed",
         "_demanded",
         "_dropped_at",
         "_grid_steps",
         "_no_run_on",
         "_own_ramp",
+        "_ran",
         "_rates",
         "_recent",
+        "_reversal",
         "_small",
         "_spreads",
         "_tick_s",
@@ -100,6 +107,7 @@ class OutputStage:
         "limits",
         "output",
         "ramp",
+        "side",
         "tail",
     )
 
@@ -116,6 +124,9 @@ class OutputStage:
         self._recent = RecentCommand(self.tail)
         self._demanded = RecentCommand(self.tail)  # the same, but no rest ends it
         self._no_run_on = 0  # ticks that are left without run-on
+        self._ran = 0.0  # how far it has run beyond what was asked, full speed times seconds
+        self.side = 1.0
+        self._crossed = 0  # ticks since the joystick was deflected to this side
         self.change_limits(limits)
         self._own_ramp = 0.0  # what ``ramp`` would be if nothing had been added
         self._carry = 0.0  # what rounding has left out of an added velocity, summed up
@@ -150,8 +161,9 @@ class OutputStage:
         if no_run_on:
             self._no_run_on -= 1
             recent.clear()
+        self._end_run_on(demand)
         recent.add(demand)
-        low, high = allowed_range(demand, recent.low, recent.high, limits)
+        low, high = allowed_range(recent.low, recent.high, limits)
         own = within(reference, low, high, limits.minimum)
 
         # 2. Small strokes
@@ -196,6 +208,28 @@ class OutputStage:
             carry = self._carry + total - output.setpoint
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
 
+    def _end_run_on(self, demand: float) -> None:
+        """End what runs on beyond the demand, by the fall, where it reaches a limit.
+
+        After a reversal that is a time, and always a way: what will be left of it once the axis has
+        fallen from its velocity. Another demand of so much velocity begins the way again.
+        """
+        recent, own = self._recent, self._own_ramp
+        if demand * self.side < 0.0:
+            self.reverse()
+        if self._crossed >= self._reversal and (recent.low if self.side > 0.0 else recent.high):
+            recent.clear_against(self.side)
+        self._crossed += 1
+        held = demand if own > 0.0 else -demand
+        beyond = abs(own) - held if held > 0.0 else abs(own)
+        if beyond > 0.0:
+            self._ran += beyond * self._tick_s
+            falling = 0.5 * beyond * beyond / self.limits.fall_per_s
+            if self._ran + falling > self.limits.run_on:
+                recent.clear()
+        elif demand:
+            self._ran = 0.0
+
     def _range_with_added(
         self, demand: float, own: float, largest: float, no_run_on: bool
     ) -> tuple[float, float]:
@@ -234,19 +268,9 @@ class OutputStage:
         self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
         self._carry = 0.0
 
-    def stop_against(self, held: float) -> None:
-        """End the run-on of a stop by the fall, where the joystick is held against it.
-
-        Nor does the filter begin to run against a joystick that is held. After a reversal the
-        limits may let the output run on; then they do so here.
-        """
-        limits = self.limits
-        if limits.brake_shaped or limits.allow_reverse:
-            return
-        if held * self.ramp < 0.0:
-            self._recent.clear()
-        else:
-            self._recent.clear_against(held)
+    def reverse(self) -> None:
+        """Begin a reversal: the joystick is deflected to the other side than it was last."""
+        self.side, self._crossed = -self.side, 0
 
     def hold_run_on(self) -> None:
         """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.
@@ -271,12 +295,17 @@ class OutputStage:
         self._recent.age(ticks)
         self._demanded.age(ticks)
         self._no_run_on -= ticks
+        self._crossed += ticks
+        self._ran += abs(self._own_ramp) * ticks * self._tick_s
         self._small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:
         """Take other limits, at rest. Demands within the tail still count."""
         self.limits = limits
         self._rates = limits.rise_per_s * self._tick_s, limits.fall_per_s * self._tick_s
+        fall_s = limits.maximum / limits.fall_per_s
+        reversal = int(max(limits.reversal_s - fall_s, 0.0) / self._tick_s + 1e-6)
+        self._reversal = math.inf if limits.allow_reverse else reversal  # ticks
         self._small = SmallStrokes(limits, self._grid_steps, self._tick_s)
 
     def change_filter(self, *, spreads: bool) -> None:

@@ -15,13 +15,16 @@ from canshaper.shaping.states import MOVING, CommandInput, Reason
 
 # Until a filter of the schema gives full speed: five times the longest time constant.
 WARM_UP_S = 25.0
+# Releases that are tried: up to so long a stroke, at such intervals.
+LONGEST_PULSE_S = 4.0
+RELEASES_S = 0.1
 # Longer than the longest tail and the slowest fall of the schema.
 LONGEST_STOP_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """Travel after each event, seconds of full speed.
+    """Travel after each event, seconds of full speed; and time.
 
     Attributes:
         release: the joystick goes to neutral.
@@ -29,12 +32,14 @@ class Travel:
             direction.
         lost: the joystick's frames end.
         enable: enable released, or emergency stop.
+        reversal_s: how long it moves in the old direction after that reversal, s.
     """
 
     release: float
     reversal: float
     lost: float
     enable: float
+    reversal_s: float
 
     @classmethod
     def worst(cls, travels: "list[Travel]") -> Self:
@@ -45,7 +50,8 @@ class Travel:
 def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s: float) -> float:
     """Travel that the limits allow after release or a lost joystick, whatever the filter does.
 
-    Full speed until the event is seen, full speed for the whole tail, then the slowest fall.
+    Full speed until the event is seen, full speed for the whole tail, then the slowest fall; where
+    the run-on is bounded no farther than that, and a period for the tick in which it ends.
 
     Args:
         limits: limits of the axis.
@@ -62,6 +68,8 @@ def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s
     falling_s = min(full / fall, max(0.0, stop_s - tail_s))
     stop = full * min(tail_s, stop_s) + (full - 0.5 * fall * falling_s) * falling_s
     release = full * tail_s + 0.5 * full * full / fall
+    run_on = limits.run_on + full * period_s
+    stop, release = min(stop, run_on), min(release, run_on)
     return max(full * (timeout_s + period_s) + stop, full * period_s + release)
 
 
@@ -84,24 +92,52 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
     full = sign * axis.sent
 
     def after(joystick: CommandInput, wait_s: float = period_s) -> float:
-        return full * wait_s + _way_s(axis, joystick, sign, period_s)
+        return full * wait_s + _way(axis, joystick, sign, period_s)[0]
 
+    way, ticks = _way(axis, CommandInput(-sign), sign, period_s)
     return Travel(
         release=after(CommandInput()),
-        reversal=after(CommandInput(-sign)),
+        reversal=full * period_s + way,
         lost=after(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), timeout_s + period_s),
         enable=after(CommandInput(enabled=False)),
+        reversal_s=ticks * period_s,
     )
 
 
-def _way_s(steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float) -> float:
-    """How far the axis gets in the old direction."""
+def needed_s(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> float:
+    """Travel to which an axis can be bounded without cutting the run-on of its filter short.
+
+    That of the worst release: after full speed for any time, and after a lost joystick.
+
+    Args:
+        new_axis: makes the axis, with ``OutputLimits.run_on`` that bounds nothing.
+        timeout_s, period_s: as of ``travel``.
+    """
+    most = 0.0
+    for sign in (1.0, -1.0):
+        axis = new_axis()
+        axis.tick(CommandInput())
+        for _ in range(round(LONGEST_PULSE_S / RELEASES_S)):
+            for _ in range(round(RELEASES_S / period_s)):
+                axis.tick(CommandInput(sign))
+            most = max(most, _way(axis, CommandInput(), sign, period_s)[0])
+        waits = sign * axis.sent * (timeout_s + 2.0 * period_s)
+    return waits + most
+
+
+def _way(
+    steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float
+) -> tuple[float, int]:
+    """How far the axis gets in the old direction, and for how many ticks it moves there."""
     axis = copy.deepcopy(steady)
     way_s = most_s = 0.0
-    for _ in range(round(LONGEST_STOP_S / period_s)):
+    last = 0
+    for tick in range(1, round(LONGEST_STOP_S / period_s) + 1):
         axis.tick(joystick)
         if axis.state not in MOVING:
             break
-        way_s += sign * axis.sent * period_s
+        velocity = sign * axis.sent
+        way_s += velocity * period_s
         most_s = max(most_s, way_s)
-    return most_s
+        last = tick if velocity > 0.0 else last
+    return most_s, last

@@ -47,8 +47,10 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     # 0.5 rad/s at 9.6 m; lift has no speed
     assert rows["joystick released"] == ["3.63", "m", "22", "deg", "0.74", "m", "0.11", "s"]
     assert rows["joystick lost"] == ["4.11", "m", "25", "deg", "0.84", "m", "0.21", "s"]
-    assert rows["limits allow"] == ["10.22", "m", "61", "deg", "2.13", "m", "0.63", "s"]
-    assert rows["stop_distance_m"] == ["10.5", "m", "2.2", "m", "-"]
+    assert rows["in the old direction"] == ["0.18", "s", "0.18", "s", "0.18", "s"]
+    assert rows["its filter needs"] == ["4.21", "m", "25", "deg", "0.87", "m", "0.23", "s"]
+    assert rows["limits allow"] == ["4.70", "m", "28", "deg", "1.00", "m", "0.63", "s"]
+    assert rows["stop_distance_m"] == ["4.7", "m", "1", "m", "-"]
     assert "WARNING" not in "".join(lines)
     assert "lift: in seconds of full speed" in "".join(lines)
     assert "slewing: of one that slews" not in "".join(lines)
@@ -109,13 +111,13 @@ def unstated(tmp_path: Path) -> Path:
     """The shipped machine, whose slew does not state how far it may travel on."""
     text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     file = tmp_path / "unstated.yaml"
-    file.write_text(text.replace(", stop_distance_m: 10.5", "").replace("    slewing:", "    #"))
+    file.write_text(text.replace(", stop_distance_m: 4.7", "").replace("    slewing:", "    #"))
     return file
 
 
 LONG_WAY = (
     "axes.slew.limits.stop_distance_m: missing: to stop, the limits allow 3.2 m, which is more"
-    " than 2 m; where that is meant, state stop_distance_m: 3.2"
+    " than 2 m; write how far the tip may travel when it stops"
 )
 
 

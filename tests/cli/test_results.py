@@ -196,7 +196,7 @@ def test_check_as_json() -> None:
     assert result["good"] is True
     assert result["digest"] == f"{deployment.identity.digest:#06x}"
     assert list(result["axes"]) == list(deployment.axes)
-    assert result["axes"]["slew"]["stop_distance_m"] == 10.5
+    assert result["axes"]["slew"]["stop_distance_m"] == 4.7
     assert result["buses"]["crane"]["load"] == pytest.approx(0.117, abs=0.001)
 
 

@@ -42,7 +42,7 @@ def deployment(tmp_path: Path, taps: str, radius: str | None) -> Deployment:
     changed = f"    filter: {{ kind: robust, tick_ms: 20, taps: [{taps}] }}\n"
     assert SLEW in text
     file = tmp_path / "machine.yaml"
-    text = text.replace(SLEW, f"{changed}    limits: {{", 1)
+    text = text.replace(SLEW, f"{changed}    limits: {{", 1).replace(": 4.7 }", ": 5.3 }")
     if radius is not None:
         text += f"motion: {{ crane: {{ slew: slew, near_far: near_far, {radius} }} }}\n"
     file.write_text(text)
@@ -123,7 +123,7 @@ def test_both_joysticks_at_once_leave_little_swing_whatever_the_timing() -> None
 
 
 @pytest.mark.parametrize(
-    ("axis", "residual_deg", "peak_deg"), [("slew", 0.3, 15.0), ("near_far", 0.1, 10.0)]
+    ("axis", "residual_deg", "peak_deg"), [("slew", 0.3, 20.5), ("near_far", 0.1, 14.0)]
 )
 def test_a_reversal_brakes_along_the_filter(
     axis: str, residual_deg: float, peak_deg: float

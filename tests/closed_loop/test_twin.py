@@ -109,7 +109,7 @@ def test_a_pulse_of_one_axis(axis: str, most: float) -> None:
     judged(f"pulse {axis}", figures(shipped(), [pulse(axis)]), most, most)
 
 
-@pytest.mark.parametrize(("axis", "most", "peak"), [("slew", 0.3, 14.5), ("near_far", 0.1, 10.0)])
+@pytest.mark.parametrize(("axis", "most", "peak"), [("slew", 0.3, 20.5), ("near_far", 0.1, 14.0)])
 def test_a_reversal(axis: str, most: float, peak: float) -> None:
     judged(f"reversal {axis}", figures(shipped(), [reversal(axis)]), most, most, peak)
 

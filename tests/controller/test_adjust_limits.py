@@ -90,9 +90,9 @@ def test_a_two_axis_motion_takes_the_new_sway_of_near_far(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("stated", "values", "why"),
     [
-        # 4.8 m/s at the largest radius: 2.03 s at max_pct and the fall are within 8 m at 78 %.
-        (8, {"axes.slew.limits.max_pct": 79}, "expected 8.0[0-9] m or more, .*, got 8 m$"),
-        (8, {"axes.slew.limits.max_pct": 70}, None),
+        # 4.8 m/s at the largest radius: 0.14 s at max_pct and the fall are within 0.8 m at 78 %.
+        (0.8, {"axes.slew.limits.max_pct": 79}, "expected 0.8[0-9] m or more, .*, got 0.8 m$"),
+        (0.8, {"axes.slew.limits.max_pct": 70}, None),
         (None, {"axes.slew.limits.max_pct": 41}, "missing: to stop, the limits allow 3.93 m"),
         (None, {"axes.slew.limits.max_pct": 20}, None),
     ],
@@ -116,8 +116,8 @@ def test_a_stop_over_a_longer_way_than_is_stated_is_refused(
 def test_a_faster_tip_counts_where_nothing_else_says_how_fast_it_is(make: Make) -> None:
     slewing = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"
     adjuster = Adjuster(
-        make({slewing: "", "stop_distance_m: 200": "stop_distance_m: 4"}).controller
+        make({slewing: "", "stop_distance_m: 200": "stop_distance_m: 0.45"}).controller
     )
     adjuster.change({"axes.slew.sway.full_speed_m_s": 1.8})
-    with pytest.raises(ValueError, match=r"expected 4.2[0-9] m or more, .*, got 4 m"):
+    with pytest.raises(ValueError, match=r"expected 0.4[0-9] m or more, .*, got 0.45 m"):
         adjuster.change({"axes.slew.sway.full_speed_m_s": 2.0})

@@ -1,5 +1,6 @@
 """One axis of a machine as its files say: what its joystick means, what its valve was sent."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,6 +70,7 @@ class Axis:
     words: Words | None = None
     period_s: float | None = None  # of its swing; with a sway sensor
     full_speed_m_s: float = 0.0
+    tip_m_s: float = 0.0  # at the largest radius, where the file says
     steps: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -83,7 +85,9 @@ class Axis:
         self.stop = max(1, round(limit("stop_s", 2.0) / period_s))
         self.allow_faster = limit("allow_faster", False)
         self.allow_reverse = limit("allow_reverse", False)
-        self.brake_shaped = limit("reversal", "stop") == "brake_shaped"
+        shaped = limit("reversal", "stop") == "brake_shaped"
+        self.reversal = round(limit("reversal_s", 0.45) / period_s) if shaped else 0
+        self.run_on = limit("stop_distance_m", math.inf) / (self.tip_m_s or 1.0)
         self.step = 1.0 / self.steps / (1.0 - self.deadband)  # velocity of one raw step
         self._frames: dict[bytes, tuple[int, int]] = {}
         self._statuses: dict[bytes, Any] = {}

@@ -56,6 +56,7 @@ class AxisJudge:
         self._commands: deque[tuple[int, float]] = deque()
         self._range = (0.0, 0.0)
         self._end = 0
+        self._side, self._crossed = 1.0, 0  # to which side the joystick is held, and since when
         self._releases = self._presses = self._resets = self._disagreements = 0
         self._shaped_since = -(10**9)  # deadline at which anti-sway was switched on in motion
         self._steady = 0
@@ -148,7 +149,7 @@ class AxisJudge:
 
     def _stop_against(self, deflection: float) -> None:
         """Nothing runs on against a valid joystick, unless a reversal may."""
-        shaped = self.axis.brake_shaped or self.axis.allow_reverse
+        shaped = self.axis.reversal or self.axis.allow_reverse
         if self.mode == STOP and deflection * self.raw < 0.0 and not shaped:
             self._commands.clear()
             self._range = (0.0, 0.0)
@@ -165,6 +166,8 @@ class AxisJudge:
         if self.mode in (WAIT, LATCHED):
             return
         self.command = command if self.mode == FREE else 0.0
+        if self.command * self._side < 0.0:
+            self._side, self._crossed = -self._side, index
         low, high = self._range = self._range_since(index - axis.tail, index)
         in_motion = self.raw or before or self.command
         if self.state == BYPASS_ON and in_motion and not self.joystick.bypasses():
@@ -176,7 +179,7 @@ class AxisJudge:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
             low, high = min(low, -high), max(high, -low)
-        elif not axis.brake_shaped:
+        elif index - self._crossed >= axis.reversal:
             low = low if self.command <= 0.0 else 0.0
             high = high if self.command >= 0.0 else 0.0
         added = axis.largest_added and (before or self.commanded or slewing) and self.mode == FREE

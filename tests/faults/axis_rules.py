@@ -28,6 +28,7 @@ class AxisRules:
         self._moved = False  # since it was armed
         self._low = self._high = self._command = 0.0
         self._commanded_down = self._commanded_up = False
+        self._side, self._turned_ns, self._turns = 1.0, 0, False
         self._why = ""
         self._releases = self._disagreements = 0
         self._presses = self._resets = 0
@@ -101,6 +102,10 @@ class AxisRules:
     def _follow_command(self, now_ns: int, command: float) -> None:
         axis, recent = self.axis, self._commands
         self._command = command
+        if command * self._side < 0.0:
+            self._side, self._turned_ns = -self._side, now_ns
+        turns_ns = (axis.reversal + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
+        self._turns = bool(axis.reversal) and now_ns - self._turned_ns <= turns_ns
         # The daemon may not have been ready in the tick in which it was armed here.
         self._moved = self.armed and (self._moved or self.raw != 0)
         recent.append((now_ns, command, self._moved))
@@ -175,7 +180,7 @@ class AxisRules:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
             low, high = min(low, -high), max(high, -low)
-        elif not axis.brake_shaped:
+        elif not self._turns:
             low = low if self._command <= 0.0 else 0.0
             high = high if self._command >= 0.0 else 0.0
         # Where its operator commands nothing and holds nothing against it, another one may.

@@ -161,6 +161,10 @@ class Machine:
         counter = valve.get("alive_counter")
         status = section.get("status")
         shown = messages[status["message"]] if status else None
+        slewing, sway = section.get("slewing"), section.get("sway") or {}
+        tip_m_s = sway.get("full_speed_m_s", 0.0)
+        if slewing:
+            tip_m_s = slewing["full_speed_rad_s"] * slewing["largest_radius_m"]
         axis = Axis(
             name=name,
             joystick=joystick,
@@ -181,6 +185,7 @@ class Machine:
             negative=joystick.fields[command["negative"]] if "negative" in command else None,
             direction=_direction(valve.get("direction")),
             words=self._words(valve, message, messages),
+            tip_m_s=tip_m_s,
         )
         joystick.axes.append(axis)
         return axis

@@ -106,7 +106,7 @@ class Bench:
 
 def bench(**limits: Any) -> Bench:
     """The forwarder with other limits of near-far, which without them are nearly none."""
-    free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}
+    free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0, "stop_distance_m": None}
     return Bench(limited(load("forwarder"), "near_far", **(free | limits)), "near_far")
 
 

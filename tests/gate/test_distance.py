@@ -26,6 +26,29 @@ class TestDistance:
         assert first * 0.02 == pytest.approx(SWING_SLACK, abs=0.021)
         assert "limit=distance" in left[first]
 
+    @signs
+    @pytest.mark.parametrize("after", [0.0, 0.3])
+    def test_no_farther_than_the_file_says(self, sign: int, after: float) -> None:
+        """Beyond the demand; a new stroke has the whole way again."""
+        one = bench(tail_s=2.0, stop_distance_m=0.5)  # at 1 m/s
+        for _ in range(2):
+            one.ramp(sign * FULL, near_far=float(sign))
+            assert not any(one.sends(sign * FULL, near_far=sign * after) for _ in range(24))
+        left = [one.sends(sign * FULL, near_far=sign * after) for _ in range(30)]
+        first = [bool(why) for why in left].index(True)
+        assert (24 + first) * 0.02 * (1.0 - after) == pytest.approx(0.5, abs=0.021)
+        assert "limit=stop_distance_m allowed=0.500" in left[first]
+
+    @signs
+    def test_what_falls_goes_on(self, sign: int) -> None:
+        one = bench(tail_s=2.0, stop_distance_m=0.5, fall_per_s=5.0)
+        one.ramp(sign * FULL, near_far=float(sign))
+        for _ in range(25):
+            assert not one.sends(sign * FULL)
+        for steps in range(FULL - 12, 0, -12):
+            assert not one.sends(sign * steps)
+            assert one.axis.ran >= 0.5
+
     def test_while_it_is_asked_there_is_no_end(self) -> None:
         one = bench()
         one.ramp(FULL, near_far=1.0)

@@ -86,9 +86,11 @@ class TestDirectionAndSize:
 
     @signs
     def test_a_reversal_may_be_braked_along_the_filter(self, sign: int) -> None:
-        one = bench(reversal="brake_shaped")
+        one = bench(reversal="brake_shaped", reversal_s=0.4)
         one.ramp(sign * 60, near_far=sign * 0.5)
-        assert not one.sends(sign * 60, near_far=-sign * 0.5)
+        for _ in range(20):
+            assert not one.sends(sign * 60, near_far=-sign * 0.5)
+        assert "limit=asked" in one.sends(sign * 60, near_far=-sign * 0.5)
         one = bench()
         one.ramp(sign * 60, near_far=sign * 0.5)
         assert "limit=asked" in one.sends(sign * 60, near_far=-sign * 0.5)

@@ -7,6 +7,7 @@ from canshaper.machine.stopping import (
     FullSpeed,
     allowed_m,
     full_speed,
+    output_limits,
     stated_fault,
     stop_fault,
     unstated,
@@ -62,24 +63,23 @@ def test_a_distance_that_the_limits_just_reach_is_good(
 
 
 @pytest.mark.parametrize(
-    ("stated", "good"), [("10.22", False), ("10.23", True), ("11", True)], ids=str
+    ("stated", "good"), [("1.15", False), ("1.16", True), ("11", True)], ids=str
 )
-def test_a_stated_distance_is_a_bound(machine: Machine, stated: str, good: bool) -> None:
+def test_a_stated_distance_holds_the_fall(machine: Machine, stated: str, good: bool) -> None:
     line = machine.in_yaml(STATED, f", stop_distance_m: {stated}")
     if good:
         assert machine.load().axes["slew"].config.limits.stop_distance_m == float(stated)
         return
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.slew.limits.stop_distance_m: expected 10.23 m or more, by"
-        " max_pct,"
-        " tail_s, stop_s, fall_per_s and the speed of the tip, got 10.22 m"
+        f"machine.yaml:{line}: axes.slew.limits.stop_distance_m: expected 1.16 m or more, what it"
+        " travels without any run-on by max_pct, fall_per_s, timeout_ms and the speed of the tip,"
+        " got 1.15 m"
     ]
 
 
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("tail_s: 2.0", "tail_s: 2.1"),
         ("fall_per_s: 5", "fall_per_s: 3"),
         ("largest_radius_m: 9.6", "largest_radius_m: 10"),
         ("full_speed_rad_s: 0.5", "full_speed_rad_s: 0.6"),
@@ -87,12 +87,12 @@ def test_a_stated_distance_is_a_bound(machine: Machine, stated: str, good: bool)
     ],
 )
 def test_everything_that_lengthens_a_stop_is_seen(machine: Machine, old: str, new: str) -> None:
-    machine.in_yaml(STATED, ", stop_distance_m: 10.23")
+    machine.in_yaml(STATED, ", stop_distance_m: 1.16")
     machine.load()
     machine.in_yaml(old, new)
     (problem,) = machine.problems()
     assert "axes.slew.limits.stop_distance_m: expected" in problem
-    assert problem.endswith(", got 10.23 m")
+    assert problem.endswith(", got 1.16 m")
 
 
 def test_a_distance_of_an_axis_without_a_speed_says_nothing(machine: Machine) -> None:
@@ -109,8 +109,8 @@ def test_a_long_way_has_to_be_stated(machine: Machine) -> None:
     assert axes == [
         (
             ("axes", "slew", "limits", "stop_distance_m"),
-            "missing: to stop, the limits allow 10.23 m, which is more than 2 m; where that is"
-            " meant, state stop_distance_m: 10.23",
+            "missing: to stop, the limits allow 10.23 m, which is more than 2 m; write how far the"
+            " tip may travel when it stops",
         )
     ]
 
@@ -129,22 +129,33 @@ def test_a_distance_in_whole_centimetres_is_not_rounded_up(machine: Machine) -> 
     machine.in_yaml("largest_radius_m: 9.6", "largest_radius_m: 10")
     (fault,) = (fault for _, fault in unstated(machine.load()))
     assert fault == (
-        "missing: to stop, the limits allow 10.65 m, which is more than 2 m; where that is meant,"
-        " state stop_distance_m: 10.65"
+        "missing: to stop, the limits allow 10.65 m, which is more than 2 m; write how far the tip"
+        " may travel when it stops"
     )
 
 
 def test_an_axis_may_not_move_over_a_stated_or_an_unstated_way(machine: Machine) -> None:
-    """The way is 10.23005 m: a hair beyond a whole centimetre."""
-    machine.in_yaml("largest_radius_m: 9.6", "largest_radius_m: 9.60568")
+    """The shortest way is 1.20004 m: a hair beyond a whole centimetre."""
+    machine.in_yaml("largest_radius_m: 9.6", "largest_radius_m: 10.00034")
     deployment = machine.load()
     axis = deployment.axes["slew"].config
-    assert stop_fault(deployment, "slew", stopping(axis, 10.24)) is None
-    assert stop_fault(deployment, "slew", stopping(axis, 10.23)) == (
-        "expected 10.24 m or more, by max_pct, tail_s, stop_s, fall_per_s and the speed of the tip,"
-        " got 10.23 m"
+    assert stop_fault(deployment, "slew", stopping(axis, 1.21)) is None
+    assert stop_fault(deployment, "slew", stopping(axis, 1.2)) == (
+        "expected 1.21 m or more, what it travels without any run-on by max_pct, fall_per_s,"
+        " timeout_ms and the speed of the tip, got 1.2 m"
     )
     assert stop_fault(deployment, "slew", stopping(axis, None)) == (
-        "missing: to stop, the limits allow 10.24 m, which is more than 2 m; where that is meant,"
-        " state stop_distance_m: 10.24"
+        "missing: to stop, the limits allow 10.66 m, which is more than 2 m; write how far the tip"
+        " may travel when it stops"
     )
+
+
+@pytest.mark.parametrize("timeout_ms", [100, 300])
+def test_what_is_stated_bounds_what_the_limits_allow(machine: Machine, timeout_ms: int) -> None:
+    """A lost joystick, a command that waits, and the tick of the fall are within it."""
+    axis = stopping(slew(machine), 4.7)
+    times = {"timeout_ms": timeout_ms, "period_s": 0.02}
+    limits = output_limits(axis, **times)
+    assert limits.run_on == pytest.approx(4.7 / 4.8 - timeout_ms / 1000.0 - 0.04)
+    assert allowed_m(axis, **times) == pytest.approx(4.7)
+    assert output_limits(stopping(axis, None), **times) == axis.limits.output_limits()

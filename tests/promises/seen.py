@@ -26,7 +26,7 @@ class Seen:
         neutral: joystick valid, enabled and in neutral since the last reason to stop.
         latched: in motion it stopped at once, and neither reset nor enable was pressed since.
         stop_until: period up to which a shaped stop may last.
-        demand: what is asked now, [-1, 1].
+        demand: what is asked now, [-1, 1]; ``crossed`` since when to this side.
         asked: what was asked within the tail, with the period; ``deflected`` when it was last.
     """
 
@@ -36,7 +36,7 @@ class Seen:
         self.foreign_ns = LONG_AGO
         self.neutral = self.latched = False
         self.stop_until = self.period = -1
-        self.demand = 0.0
+        self.demand, self.crossed, self._side = 0.0, 0, 1.0
         self.asked: deque[tuple[int, float]] = deque()
         self.deflected = -(10**6)
         self._causes: set[str] = set()
@@ -97,6 +97,8 @@ class Seen:
             before.popleft()
         if self.demand:
             self.deflected = period
+        if self.demand * self._side < 0.0:
+            self._side, self.crossed = -self._side, period
 
     def stalled(self) -> None:
         """The loop stood still."""

@@ -23,15 +23,29 @@ def run_on(axis: Axis) -> int:
 @every
 class TestNeutralStops:
     """**The joystick in neutral always stops**, within the bounded run-on of the filter: after
-    `tail_s` the output falls to zero by `fall_per_s`. For `tail_s` after anti-sway was switched
-    on in motion, or after a trip or the end of a stop cut a motion off, there is no run-on."""
+    `tail_s`, and before `stop_distance_m`, the output falls to zero by `fall_per_s`. For `tail_s`
+    after anti-sway was switched on in motion, or after a trip or the end of a stop cut a motion
+    off, there is no run-on."""
 
     def judged(self, world: World) -> World:
-        """After the tail each frame is lower by the fall, and from its end on there is none."""
+        """After the tail each frame is lower by the fall, and from its end on there is none.
+
+        Of the worst controller the fall counts beyond the distance, of a sound one within it.
+        """
+        ran = dict.fromkeys(world.axes, 0.0)
 
         def judge(axis: str, before: float, now: float) -> None:
             seen = world.buses.axes[axis]
             of = seen.axis
+            held = seen.demand if now > 0.0 else -seen.demand
+            beyond = abs(now) - max(held, 0.0) - of.largest_added
+            if beyond > 0.0:
+                ran[axis] += beyond * of.tick_s * of.period_ticks
+                falling = 0.5 * of.tick_s * of.period_ticks / of.fall
+                most = of.run_on + falling * isinstance(world, Worst)
+                assert ran[axis] <= most + 0.03, f"{axis}: {ran[axis]:.3f} of {most:.3f}"
+            elif seen.demand:
+                ran[axis] = 0.0
             last = max(one.deflected for one in (seen, seen.partner or seen))
             since = seen.period - last
             if now and since > of.tail + bool(of.moves_with):  # its partner's demand counts, too

@@ -20,7 +20,7 @@ class TestNeverFaster:
     """**Never faster than commanded** within the tail, and never against the joystick, with two
     exceptions that the file has to state: with `motion` one axis adds a bounded velocity to
     another one, whose joystick may be in neutral; with `reversal: brake_shaped` the output runs
-    on for up to `tail_s` after a reversal, never faster than commanded there before."""
+    on for up to `reversal_s` after a reversal, never faster than commanded there before."""
 
     def world(self, name: str) -> Worst:
         world = Worst(name)
@@ -29,7 +29,8 @@ class TestNeverFaster:
             seen = world.buses.axes[axis]
             of, sign = seen.axis, 1.0 if now > 0.0 else -1.0
             reach, held = max(seen.most(sign), 0.0), sign * seen.demand
-            if held < 0.0 and not of.brake_shaped and seen.period > seen.stop_until:
+            in_time = seen.period - seen.crossed < of.reversal
+            if held < 0.0 and not in_time and seen.period > seen.stop_until:
                 reach = 0.0
             if held >= 0.0 and seen.partner and (seen.partner.deflected > 0 or reach):
                 reach = max(reach, of.largest_added)

@@ -60,12 +60,13 @@ class AnyState:
         axis = self.axis = gate("forwarder").axes["slew"]
         of = self.of = axis.of
         of.maximum, of.rise, of.fall, of.step = map(real, ("maximum", "rise", "fall", "step"))
-        of.faster, of.reverse, of.brake_shaped = map(truth, ("faster", "reverse", "brake_shaped"))
-        of.added, of.slack, of.path = map(real, ("added", "slack", "path"))
-        of.stop, of.silent = integer("stop"), integer("silent")
+        of.faster, of.reverse = map(truth, ("faster", "reverse"))
+        of.added, of.slack, of.path, of.run_on = map(real, ("added", "slack", "path", "run_on"))
+        of.stop, of.silent, of.reversal = map(integer, ("stop", "silent", "reversal"))
         of.stick = replace(of.stick, band=real("band"))
         axis.forth, axis.back = Demand("forth"), Demand("back")  # type: ignore[assignment]
-        axis.now, axis.last, axis.top = map(real, ("now", "last", "top"))
+        axis.now, axis.last, axis.top, axis.ran = map(real, ("now", "last", "top", "ran"))
+        axis.held = integer("held")
         axis.armed, axis.latched = truth("armed"), truth("latched")
         axis.asked, axis.stop_left = truth("asked"), integer("stop_left")
         self.velocity = real("velocity")
@@ -110,7 +111,7 @@ def test_direction_and_size(monkeypatch: pytest.MonkeyPatch) -> None:
         within = size(v) <= of.maximum + EPSILON
         usual = no(either(of.faster, of.reverse, of.added > 0.0))
         held = either(both(forth, axis.now < 0.0), both(no(forth), axis.now > 0.0))
-        free = either(of.reverse, of.brake_shaped, axis.stop_left > 0)
+        free = either(of.reverse, axis.held < of.reversal, axis.stop_left > 0)
         return both(
             either(way_back, within),
             implies(usual, either(way_back, size(v) <= asked + EPSILON)),

@@ -14,7 +14,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
 MODE = SwayMode.from_period(2.356, 0.038)
-LIMITS = OutputLimits(deadband=0.05, tail_s=2.2, brake_shaped=True)
+LIMITS = OutputLimits(deadband=0.05, tail_s=2.2, reversal_s=5.0)
 # Three heaps and a floor between them, as ``canshaper robust`` makes them: 1.8 s.
 TAPS = [0.1, 0.1, 0.1, *[0.0044] * 40, 0.1, 0.1, 0.048, *[0.0044] * 40, 0.1]
 

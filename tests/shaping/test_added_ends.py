@@ -39,7 +39,9 @@ def test_what_was_added_against_the_own_part_ends_by_the_rates() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_was_added_beyond_the_own_part_stops_before_the_own_part_begins(sign: float) -> None:
-    axis, _ = pair(OutputLimits(rise_per_s=1.0, tail_s=2.0), lambda: Fir([0.0] * 40 + [1.0]))
+    axis, _ = pair(
+        OutputLimits(rise_per_s=1.0, tail_s=2.0, reversal_s=5.0), lambda: Fir([0.0] * 40 + [1.0])
+    )
     axis.allow_added(1.0, TIME_S)
     for command, ticks in ((0.4, 30), (-1.0, 2)):
         for _ in range(ticks):
@@ -58,7 +60,7 @@ def test_what_was_added_beyond_the_own_part_stops_before_the_own_part_begins(sig
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_was_added_to_an_own_part_that_turns_ends_before_the_other_side(sign: float) -> None:
-    limits = OutputLimits(rise_per_s=1.0, fall_per_s=0.9, tail_s=3.0, brake_shaped=True)
+    limits = OutputLimits(rise_per_s=1.0, fall_per_s=0.9, tail_s=3.0, reversal_s=5.0)
     axis, _ = pair(limits, lambda: Fir([0.0] * 30 + [1.0]))
     axis.tick(CommandInput())
     for command, ticks in ((-1.0, 1), (-0.4, 10), (1.0, 11)):

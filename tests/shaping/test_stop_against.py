@@ -87,9 +87,11 @@ def test_held_the_same_way_or_in_neutral_it_leaves_the_run_on(
     assert drive.axis.sent == pytest.approx(sign * 0.8, abs=0.01)
 
 
-@pytest.mark.parametrize("key", ["brake_shaped", "allow_reverse"])
-def test_where_a_reversal_may_run_on_a_stop_may_too(drive_with: DriveWith, key: str) -> None:
-    drive = stopping(drive_with, 1.0, replace(LIMITS, **{key: True}))
+@pytest.mark.parametrize("allowed", [{"reversal_s": 1.0}, {"allow_reverse": True}])
+def test_where_a_reversal_may_run_on_a_stop_may_too(
+    drive_with: DriveWith, allowed: dict[str, Any]
+) -> None:
+    drive = stopping(drive_with, 1.0, replace(LIMITS, **allowed))
     drive.run(CommandInput(-1.0, fault=LATE), 0.5)
     assert drive.axis.sent == pytest.approx(0.8, abs=0.01)
 

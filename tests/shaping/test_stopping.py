@@ -151,5 +151,5 @@ def test_no_filter_travels_farther_than_the_limits_allow(
 
 
 def test_the_worst_of_several() -> None:
-    one, other = Travel(1.0, 0.2, 3.0, 0.4), Travel(0.1, 2.0, 0.3, 4.0)
-    assert Travel.worst([one, other]) == Travel(1.0, 2.0, 3.0, 4.0)
+    one, other = Travel(1.0, 0.2, 3.0, 0.4, 5.0), Travel(0.1, 2.0, 0.3, 4.0, 0.5)
+    assert Travel.worst([one, other]) == Travel(1.0, 2.0, 3.0, 4.0, 5.0)

@@ -104,6 +104,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
                 "valve": config.axes[one.name].valve.message,
                 "full_speed_m_s": one.speed.m_s,
                 "travel_s": asdict(one.travel),
+                "needed_s": one.needed_s,
                 "allowed_s": one.allowed_s,
                 "stop_distance_m": one.stated_m,
             }

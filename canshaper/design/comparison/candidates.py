@@ -116,7 +116,7 @@ def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
     axes = dict(deployment.axes)
     for axis, its_filter in candidate.filters.items():
         config = axes[axis].config
-        limits = config.limits.model_copy(update={"tail_s": TAIL_S})
+        limits = config.limits.model_copy(update={"tail_s": TAIL_S, "stop_distance_m": None})
         config = config.model_copy(update={"filter": its_filter, "limits": limits})
         sensor = axes[axis].sway_sensor if candidate.sensor else None
         axes[axis] = replace(axes[axis], config=config, sway_sensor=sensor)
