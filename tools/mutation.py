@@ -53,6 +53,7 @@ CORE_TESTS = [
     "test_motion*.py",
     "test_other_plane.py",
     "test_output_stage.py",
+    "test_run_on.py",
     "test_sensed.py",
     "test_sets.py",
     "test_small_strokes.py",
