@@ -55,7 +55,7 @@ def test_a_speed_with_which_the_tip_stops_too_late_is_not_written(
 ) -> None:
     """The file would be refused at the next start."""
     text = file.read_text().replace("full_speed_m_s: 1.0", "full_speed_m_s: 0.5")
-    file.write_text(text.replace("stop_distance_m: 2.2", "stop_distance_m: 1.1"))
+    file.write_text(text.replace("stop_distance_m: 1 }", "stop_distance_m: 0.2 }"))
     before = file.read_text()
     result = run(tmp_path, logs / "empty.log", "--file", file, "--write")
     assert result.exit_code == 2
