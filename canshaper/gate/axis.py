@@ -18,7 +18,8 @@ class Asked:
     Attributes:
         most: the largest of it.
         before: the largest of it, and of what was asked before the last stop.
-        remaining: distance that was asked and has not been run, full speed times seconds.
+        remaining: distance that was asked and has not been run, full speed times seconds; not
+            below 0 where a stroke begins, since a sound filter may make more of a tap than it is.
     """
 
     __slots__ = ("_last", "_since", "_sizes", "before", "most", "remaining")
@@ -168,6 +169,9 @@ class AxisState(Pending):
         if self.flips != self.joystick.flips:
             self.flips = self.joystick.flips
             self.blend()
+        if now and not before:
+            began = self.forth if now > 0.0 else self.back
+            began.remaining = max(began.remaining, 0.0)
         distance = (now + before * (passed - 1)) * of.period_s
         forth = distance if distance > 0.0 else 0.0
         self.forth.note(now if now > 0.0 else 0.0, forth, period, of)

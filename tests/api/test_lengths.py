@@ -12,11 +12,13 @@ VERBS = ROOT / "canshaper" / "cli" / "verbs"
 
 
 def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef, *, verb: bool) -> int:
-    """Lines of a function; of a verb without its options and its help, which are one page."""
-    first = function.body[0]
-    if verb and ast.get_docstring(function):
-        return function.end_lineno - (first.end_lineno or 0)  # type: ignore[operator]
-    return function.end_lineno - function.lineno + 1  # type: ignore[operator]
+    """Lines of a function without its docstring; of a verb also without its options."""
+    first, last = function.body[0], function.end_lineno
+    assert last is not None
+    if not ast.get_docstring(function):
+        return last - function.lineno + 1
+    assert first.end_lineno is not None
+    return last - first.end_lineno + (0 if verb else first.lineno - function.lineno)
 
 
 @pytest.mark.slow

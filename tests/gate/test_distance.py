@@ -49,6 +49,17 @@ class TestDistance:
             assert not one.sends(sign * steps)
             assert one.axis.ran >= 0.5
 
+    @signs
+    def test_each_stroke_has_its_own_slack(self, sign: int) -> None:
+        """An S-curve makes more of each tap than it is, also where tap follows tap."""
+        one = bench(tail_s=2.0)
+        one.rests()
+        for _ in range(6):
+            for _ in range(5):
+                assert not one.sends(sign * FULL, near_far=float(sign))
+            for _ in range(35):
+                assert not one.sends(sign * FULL)
+
     def test_while_it_is_asked_there_is_no_end(self) -> None:
         one = bench()
         one.ramp(FULL, near_far=1.0)
