@@ -100,7 +100,7 @@ def test_a_claim_that_is_wrong_is_seen(entry: str, fault: str | None) -> None:
 
 
 def test_a_row_says_the_reaction_of_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = reactions.Row("EMERGENCY_STOP", "", "", "promises/test_1", reactions.NONE)
+    wrong = reactions.Row("EMERGENCY_STOP", "", "promises/test_1", "", reactions.NONE)
     monkeypatch.setattr(reactions, "ROWS", (wrong,))
     with pytest.raises(ValueError, match=r"^expected one reaction of EMERGENCY_STOP, got "):
         list(reactions.reaction_rows())
