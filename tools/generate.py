@@ -29,6 +29,7 @@ from canshaper.shaping.trust import Trust
 from tools.architecture import ring_rows
 from tools.frame_faults import FAULT_TEXTS
 from tools.marks import marked, with_sections
+from tools.reactions import reaction_rows
 
 Key = TypeVar("Key", bound=IntEnum)
 ROOT = Path(__file__).parents[1]
@@ -210,6 +211,7 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "diagram": diagram,
     "reasons": lambda: reason_rows(Reason, REASON_TEXTS),
     "faults": fault_rows,
+    "reactions": reaction_rows,
     "filters": lambda: filter_table(KINDS.values()),
     "checksums": checksum_table,
     "e2e profiles": profile_rows,

@@ -41,7 +41,7 @@ BUDGET = {
     "docs/monitor.md": 230,
     "docs/realtime.md": 400,
     "docs/replay.md": 690,
-    "docs/safety.md": 3310,
+    "docs/safety.md": 2300,
     "docs/sensor.md": 1170,
     "docs/service.md": 790,
     "docs/states.md": 230,

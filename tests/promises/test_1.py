@@ -41,8 +41,8 @@ EVENTS: dict[str, Event] = {
 
 @every
 class TestNoMotionWithoutAnOperator:
-    """**No motion without an operator.** An axis moves only from READY, and READY needs a
-    fresh, valid, enabled joystick that was seen in neutral."""
+    """**No motion without an operator.** An axis moves only from READY, and READY needs a fresh,
+    valid, enabled joystick that was seen in neutral."""
 
     def world(self, name: str) -> Worst:
         """Make a world that checks every moving axis in each frame that leaves."""

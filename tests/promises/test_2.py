@@ -22,10 +22,10 @@ def run_on(axis: Axis) -> int:
 
 @every
 class TestNeutralStops:
-    """**The joystick in neutral always stops**, within the bounded run-on of the filter: after
-    `tail_s`, and before `stop_distance_m`, the output falls to zero by `fall_per_s`. For `tail_s`
-    after anti-sway was switched on in motion, or after a trip or the end of a stop cut a motion
-    off, there is no run-on."""
+    """**A joystick in neutral stops its axis** within a bounded run-on: after `tail_s` at the
+    latest, and within `stop_distance_m` where the file has it, the output falls to zero, by
+    `fall_per_s` or faster. For `tail_s` after anti-sway was switched on in motion, or after a trip
+    or the end of a stop cut a motion off, there is no run-on. A `motion` has its own bounds."""
 
     def judged(self, world: World) -> World:
         """After the tail each frame is lower by the fall, and from its end on there is none.

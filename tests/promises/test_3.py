@@ -17,10 +17,10 @@ STROKES = (
 
 @every
 class TestNeverFaster:
-    """**Never faster than commanded** within the tail, and never against the joystick, with two
-    exceptions that the file has to state: with `motion` one axis adds a bounded velocity to
-    another one, whose joystick may be in neutral; with `reversal: brake_shaped` the output runs
-    on for up to `reversal_s` after a reversal, never faster than commanded there before."""
+    """**Never faster than commanded** within the tail, and never against the joystick, but for what
+    the file states: with `motion` one axis adds a bounded velocity to another one, whose joystick
+    may be in neutral; with `reversal: brake_shaped` the output runs on for up to `reversal_s` after
+    a reversal; `allow_faster` and `allow_reverse` lift these bounds."""
 
     def world(self, name: str) -> Worst:
         world = Worst(name)

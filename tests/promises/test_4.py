@@ -10,9 +10,9 @@ from tests.promises.world import REST, World, every
 
 @every
 class TestEveryFrameIsOfItsTick:
-    """**Every frame is computed in the tick that sends it**, in a gateway at most one tick
-    before. Nothing is repeated: no cyclic job of the kernel (BCM), no resend, no frame while
-    the loop stands still."""
+    """**Every valve frame is computed in the tick that sends it**, in a gateway at most one tick
+    before. None is repeated: no cyclic job of the kernel (BCM), no resend, no frame while the loop
+    stands still."""
 
     def world(self, name: str) -> World:
         world = World(name)

@@ -153,9 +153,9 @@ def may_be(world: World, axis: str, steps: int | None) -> bool:
 
 
 @every
-class TestOneWrongCommand:
-    """**One wrong command reaches no valve.** The gate checks each valve frame before the
-    socket, by the file's limits and the bytes alone."""
+class TestNoFrameBeyondTheLimits:
+    """**No valve frame beyond the limits leaves.** The gate checks each one before the socket, by
+    the file's limits and the bytes alone. A wrong command within the limits passes."""
 
     @pytest.mark.parametrize("what", WRONG)
     def test_no_wrong_frame_leaves(self, name: str, what: str) -> None:

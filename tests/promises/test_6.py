@@ -107,11 +107,9 @@ FAULTS = {
 
 @every
 class TestEveryFault:
-    """**Every fault has a name, a reaction and a way back.** No fault of machine or bus ends
-    the loop. An error within the program does: every valve is sent neutral, log and black box
-    have `failed reason=INTERNAL_ERROR` with the place, the service manager starts it again. A
-    valve whose neutral cannot be made gets no frame; the log ends with `stopped
-    valves=not-sent`."""
+    """**Every listed fault has a name, a reaction and a way back.** No received bytes end the loop.
+    An unexpected error within the program does: every valve is sent neutral, and the service
+    manager starts it again. A valve whose neutral cannot be made gets no frame."""
 
     def moving(self, name: str) -> World:
         world = World(name)

@@ -12,10 +12,9 @@ PAGE = Path(__file__).parents[2] / "docs/safety.md"
 def promise(number: int) -> str:
     """The sentences of the page, without links and names of tests."""
     page = PAGE.read_text(encoding="utf-8").partition("## Promises")[2].partition("\n## ")[0]
-    text = " ".join(re.split(r"^\d\. ", page, flags=re.MULTILINE)[number].split())
-    text = re.sub(r" \(\[[^]]*\]\([^)]*\)\)", "", text)
+    text = " ".join(re.split(r"^- P\d ", page, flags=re.MULTILINE)[number].split())
     text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text)
-    return re.sub(r" \([^()]*test_[^()]*\)", "", text)
+    return re.sub(r" `\w+/test_\w+`", "", text)
 
 
 @pytest.mark.parametrize("number", range(1, 7))
