@@ -89,6 +89,23 @@ def test_a_lower_demand_bounds_what_runs_on_beyond_it(sign: float) -> None:
         beyond += (sign * axis.sent - 0.3) * TICK_S
     assert sign * axis.sent == pytest.approx(0.3, abs=STEP)
     assert beyond == pytest.approx(0.5, abs=0.03)
+    way = 0.0  # and from there the whole way again
+    for _ in range(99):  # the tail of what was asked first is over
+        axis.tick(CommandInput())
+        way += sign * axis.sent * TICK_S
+    assert way == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_against_the_joystick_the_way_counts_as_in_neutral(sign: float) -> None:
+    axis = axis_of(Anything(sign), replace(LIMITS, reversal_s=5.0))
+    for _ in range(40):
+        axis.tick(CommandInput(sign))
+    way = 0.0
+    for _ in range(60):
+        axis.tick(CommandInput(-sign))
+        way += sign * axis.sent * TICK_S
+    assert way == pytest.approx(0.5, abs=0.03)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -112,10 +129,14 @@ def test_missed_ticks_count_as_way() -> None:
     axis = axis_of(Anything(1.0))
     for _ in range(40):
         axis.tick(CommandInput(1.0))
-    axis.tick(CommandInput())
-    axis.hold(20)
-    axis.tick(CommandInput())
-    assert axis.sent < 1.0
+    way = 0.0
+    for _ in range(60):
+        axis.tick(CommandInput())
+        way += axis.sent * TICK_S
+        if way == pytest.approx(0.1):
+            axis.hold(8)
+            way += 8 * axis.sent * TICK_S
+    assert way == pytest.approx(0.5, abs=0.03)
 
 
 @pytest.mark.parametrize("lost", [False, True])
@@ -152,8 +173,10 @@ def test_missed_ticks_count_as_time_against_the_joystick() -> None:
     axis = axis_of(Anything(1.0), replace(LIMITS, run_on=9.0))
     for _ in range(40):
         axis.tick(CommandInput(1.0))
-    axis.tick(CommandInput(-1.0))
-    axis.hold(10)
+    for _ in range(5):
+        axis.tick(CommandInput(-1.0))
+    axis.hold(5)
+    assert axis.sent == 1.0
     axis.tick(CommandInput(-1.0))
     assert axis.sent < 1.0
 
