@@ -1,10 +1,11 @@
 """Deployment file and DBC files brought together: codecs, or every problem at once."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
 from canshaper.checksums.kinds import package_line
-from canshaper.codec.signals import special_name
+from canshaper.codec.signals import code_fault, special_name
 from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
@@ -14,6 +15,7 @@ from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.diagnostics import Diagnostics
+from canshaper.machine.distinct import check_ids, check_names
 from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, bind_status, filter_lines
 from canshaper.machine.inputs import BoundValue, Choosing, bind_emergency_stop, bind_switch
@@ -41,6 +43,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     config, source = load_config(path)
     diagnostics = Diagnostics(source)
     check_buses(diagnostics, config)
+    check_names(diagnostics, config)
     messages = load_messages(diagnostics, config, path.parent, inside)
     if messages is None:
         raise ConfigError(diagnostics.problems)
@@ -62,6 +65,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
     lookup.check_groups()
+    check_ids(lookup)
     check_following(diagnostics, config, joysticks)
     check_profiles(diagnostics, config)
     check_control(diagnostics, config)
@@ -99,6 +103,16 @@ def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
     if profile and config:
         codes = config.codes.items()
         _check_values(lookup, profile, {("profile", "codes", name): code for name, code in codes})
+        first: dict[int, str] = {}
+        for name, code in codes:
+            signal, place = profile.signal, ("profile", "codes", name)
+            raw = (code - signal.offset) / signal.scale if signal.scale else math.inf
+            if first.setdefault(code, name) != name:
+                text = f"expected a code of its own, got {code}, that of {first[code]}"
+                lookup.diagnostics.add(place, text)
+            elif not raw.is_integer() or code_fault(signal, int(raw)):
+                text = f"{signal.name} can never be {code}: expected a value of it, or no profile"
+                lookup.diagnostics.add(place, text)
     return profile
 
 

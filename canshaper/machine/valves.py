@@ -7,11 +7,13 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.sense import code_fault
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import (
     command_fault,
     find_signal,
     magnitude_range,
+    named_fault,
     raw_limits,
     set_point_fault,
     symmetrical_range,
@@ -237,6 +239,10 @@ def _bind_direction(
         name = next((str(n) for raw, n in (signal.choices or {}).items() if raw == code), "")
         if code > largest:
             text = f"expected up to {largest}, of {signal.length} bits of {signal.name}, got {code}"
+            used.diagnostics.add((*place, key), text)
+        elif code_fault(name, moves=key != "neutral") or (name and named_fault(name)):
+            text = f'expected a code of {key}, got {code}, in the DBC "{name}": the valve would'
+            text += " rest" if key != "neutral" else " not rest"
             used.diagnostics.add((*place, key), text)
         elif _FLOAT.search(name):
             text = (
