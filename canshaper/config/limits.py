@@ -130,6 +130,8 @@ class Motion(Section):
     Without a radius, or without a near-far axis, slew gets what needs neither.
     """
 
+    off: bool = Field(False, description="as if it were not there; commission takes this out")
+    """As if it were not there, on the first day; the step motion of commission takes this out."""
     slew: str = Field(description="the axis that turns; it needs sway and slewing")
     near_far: str | None = None
     """The axis that moves the tip in and out; it needs sway. Without it slew gets what needs no

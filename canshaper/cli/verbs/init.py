@@ -72,6 +72,7 @@ def init(
 
       canshaper init  # tries it with the shipped forwarder.dbc
     """
+    from canshaper.cli.interview.first import FIRST_MAX_PCT
     from canshaper.cli.interview.first_file import first_deployment
 
     draft = file.with_name(f"{file.stem}.draft.yaml")
@@ -100,7 +101,12 @@ def init(
         if eds:
             _write_dbc(own, nodes)
         _write(file, draft, first_deployment(replace(machine, notes=notes)))
-    echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed.")
+    reduced = f"at reduced speed (max_pct: {FIRST_MAX_PCT})"
+    echo(f"\nWritten: {file}, with {len(machine.axes)} axes {reduced}.")
+    if machine.motion:
+        echo("Two-axis motion is off until the step motion of commission is done.")
+    if assumed := [key for axis in machine.axes for key in axis.assumed()]:
+        echo(f"Assumed until someone measures or types them: {', '.join(assumed)}.")
     for note in notes:
         echo(f"  {note}")
     if writes:
