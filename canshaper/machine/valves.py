@@ -194,6 +194,9 @@ def _rewritten_message(
     if (enable := own_switch(config, joystick)) is None:
         text = "expected one switch of its own message, where its frames leave through the gateway"
         used.diagnostics.add(("joysticks", joystick, "enable"), f"{text}, got another")
+    elif "/" in enable:
+        text = f"expected a whole signal, whose frames leave through the gateway, got {enable!r}"
+        used.diagnostics.add(("joysticks", joystick, "enable"), text)
     if used.any_source:
         text = f"in the DBC {used.message.name} may come from any source address; where its frames"
         used.add("message", f"{text} leave, its joystick needs the key source")
