@@ -1,5 +1,7 @@
 """Machines made wrong as a stranger would: each is refused, or warned of, in one line."""
 
+from typing import Any
+
 import pytest
 
 from tests.machine import traps_of_machines, traps_of_signals
@@ -23,3 +25,41 @@ def test_a_trap_is_named_in_one_line(machine: Machine, trap: Trap) -> None:
     assert place[0] in ("machine.yaml", "machine.dbc")
     assert place[1].isdigit(), "it has a line"
     assert not (trap.warns and problems)
+
+
+@pytest.mark.parametrize(
+    ("make", "zero", "one"),
+    [
+        *(
+            (traps_of_signals.table, zero, one)
+            for zero, one in (
+                ("Released", "Pressed"),
+                ("Inactive", "Active"),
+                ("Not pressed", "Pressed"),
+                ("Disabled", "Enabled"),
+                ("Open", "Closed"),
+                ("losgelassen", "gedrückt"),
+                ("x", "y"),
+            )
+        ),
+        *(
+            (traps_of_signals.stop, zero, one)
+            for zero, one in (
+                ("Released", "Pressed"),
+                ("No stop", "Stop"),
+                ("Emergency stop not active", "Emergency stop active"),
+                ("OK", "Not OK"),
+                ("Closed", "Open"),
+            )
+        ),
+    ],
+)
+def test_a_table_that_agrees_passes(machine: Machine, make: Any, zero: str, one: str) -> None:
+    trap = make(f"{zero}/{one}", "") if make is traps_of_signals.table else make(zero, one)
+    assert said(made(trap, machine)) == ([], [])
+
+
+def test_a_switch_whose_code_is_written_may_have_any_names(machine: Machine) -> None:
+    made(traps_of_signals.seat("Occupied", "Empty"), machine)
+    machine.in_yaml("signal: Stop, ", "signal: Stop, code: 0, ")
+    assert said(machine) == ([], [])
