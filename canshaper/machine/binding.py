@@ -18,7 +18,13 @@ from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.distinct import check_ids, check_names
 from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, bind_status, filter_lines
-from canshaper.machine.inputs import BoundValue, Choosing, bind_emergency_stop, bind_switch
+from canshaper.machine.inputs import (
+    BoundJoystick,
+    BoundValue,
+    Choosing,
+    bind_emergency_stop,
+    bind_switch,
+)
 from canshaper.machine.joysticks import (
     bind_joystick,
     bind_switches,
@@ -64,11 +70,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
-    lookup.check_groups()
-    check_ids(lookup)
-    check_following(diagnostics, config, joysticks)
-    check_profiles(diagnostics, config)
-    check_control(diagnostics, config)
+    _check_together(lookup, joysticks)
     diagnostics.raise_problems()
     return Deployment(
         path,
@@ -94,6 +96,16 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         codes=lookup.codes(),
         starts=lookup.starts(),
     )
+
+
+def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None]) -> None:
+    """Check what is known when all parts are bound."""
+    diagnostics, config = lookup.diagnostics, lookup.config
+    lookup.check_groups()
+    check_ids(lookup)
+    check_following(diagnostics, config, joysticks)
+    check_profiles(diagnostics, config)
+    check_control(diagnostics, config)
 
 
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:

@@ -110,3 +110,11 @@ def test_guesses_are_assumed_until_someone_says_otherwise(tmp_path: Path) -> Non
     keys = [f"axes.slew.sway.{key}" for key in ("period_s", "decay_per_swing", "full_speed_m_s")]
     assert f"Assumed until someone measures or types them: {', '.join(keys)}." in result.output
     assert load_deployment(tmp_path / "machine.yaml").config.assumed == keys
+
+
+def test_bits_of_one_byte_are_switches_of_their_own(tmp_path: Path) -> None:
+    answers = "Cab: enable switch = Buttons/3\nCab: switch that resets = Buttons/4\n"
+    result = of_dbc(tmp_path, [made(tmp_path, BUTTONS)], answers)
+    assert result.exit_code == 0, result.output
+    joystick = load_deployment(tmp_path / "machine.yaml").joysticks["cab"].config
+    assert (joystick.enable, joystick.reset) == (["Buttons/3"], "Buttons/4")

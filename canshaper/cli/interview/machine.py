@@ -149,12 +149,11 @@ def _joystick(
 
     def switch(text: str, default: str | None) -> str | None:
         allowed = [*(signal.name for signal in left), NONE]
-        listed = ", ".join(
-            [*allowed[:MOST_LISTED], *([NONE] if len(allowed) > MOST_LISTED else [])]
-        )
-        default = NONE if default is None else default
-        answer = ask(f"{message.name}: {text}, of {listed}", one(allowed), default)
-        left[:] = [s for s in left if s.name.partition("/")[0] != answer.partition("/")[0]]
+        listed = ", ".join([*allowed[: min(MOST_LISTED, len(left))], NONE])
+        likely = NONE if default is None else default
+        answer = ask(f"{message.name}: {text}, of {listed}", one(allowed), likely)
+        gone = {answer, answer.partition("/")[0]}  # itself, and the whole of a bit or its bits
+        left[:] = [s for s in left if s.name not in gone and s.name.partition("/")[0] != answer]
         return None if answer == NONE else answer
 
     cycle = message.cycle_time or period_ms(message.name)
