@@ -62,6 +62,8 @@ def free(name: str) -> bool | None:
 def of_signal(name: str, *, stop: bool = False) -> bool | None:
     """Sense of the 1 of a signal by the last word of its name, as ``on``, or as ``free``."""
     last = words(name).rpartition(" ")[2]
+    if last == "no":  # SwitchNo1
+        return None
     return free(last) if stop else on(last)
 
 

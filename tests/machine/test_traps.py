@@ -63,3 +63,10 @@ def test_a_switch_whose_code_is_written_may_have_any_names(machine: Machine) -> 
     made(traps_of_signals.seat("Occupied", "Empty"), machine)
     machine.in_yaml("signal: Stop, ", "signal: Stop, code: 0, ")
     assert said(machine) == ([], [])
+
+
+def test_a_number_in_a_name_is_no_sense(machine: Machine) -> None:
+    machine.in_yaml("enable: Enable", "enable: SwitchNo1")
+    machine.in_dbc("SG_ Enable", "SG_ SwitchNo1")
+    machine.in_dbc(traps_of_signals.ENABLE, "")
+    assert said(machine) == ([], [])
