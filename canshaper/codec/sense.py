@@ -72,7 +72,7 @@ def shows_sway_control(name: str) -> bool:
     return bool(_SWAY.search(name)) and not _RAW.search(words(name))
 
 
-def code_fault(name: str, *, moves: bool) -> bool:
+def direction_fault(name: str, *, moves: bool) -> bool:
     """Whether the name of a direction code says that it is for rest, or else for a move."""
     text = words(name)
     return bool(_REST.search(text) if moves else _MOVE.search(text) or "care" in text)

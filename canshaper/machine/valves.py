@@ -7,7 +7,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
-from canshaper.codec.sense import code_fault
+from canshaper.codec.sense import direction_fault
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import (
     command_fault,
@@ -243,7 +243,7 @@ def _bind_direction(
         if code > largest:
             text = f"expected up to {largest}, of {signal.length} bits of {signal.name}, got {code}"
             used.diagnostics.add((*place, key), text)
-        elif code_fault(name, moves=key != "neutral") or (name and named_fault(name)):
+        elif direction_fault(name, moves=key != "neutral") or (name and named_fault(name)):
             text = f'expected a code of {key}, got {code}, in the DBC "{name}": the valve would'
             text += " rest" if key != "neutral" else " not rest"
             used.diagnostics.add((*place, key), text)
