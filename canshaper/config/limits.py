@@ -130,8 +130,6 @@ class Motion(Section):
     Without a radius, or without a near-far axis, slew gets what needs neither.
     """
 
-    off: bool = Field(False, description="as if it were not there; commission takes this out")
-    """As if it were not there, on the first day; the step motion of commission takes this out."""
     slew: str = Field(description="the axis that turns; it needs sway and slewing")
     near_far: str | None = None
     """The axis that moves the tip in and out; it needs sway. Without it slew gets what needs no
@@ -151,6 +149,8 @@ class Motion(Section):
     max_s: Annotated[
         float, number(0.5, 60, "s", "longest motion of an axis that its operator left alone")
     ] = 6.0
+    waits: bool = Field(False, description="as if it were not there; commission takes this out")
+    """As if it were not there, on the first day; the step motion of commission takes this out."""
 
     @model_validator(mode="after")
     def _one_radius(self) -> Self:

@@ -55,7 +55,7 @@ def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
         "expected one of TipPosition.Radius, -, got 'Radius'",
     ):
         assert reported in result.output
-    file.write_text(file.read_text().replace("    off: true\n", ""))
+    file.write_text(file.read_text().replace("    waits: true\n", ""))
     config = load_deployment(file).config
     assert config.buses["crane"].bitrate == 500_000
     assert config.axes["turn"].valve.timeout_ms == 300

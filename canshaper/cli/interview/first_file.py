@@ -214,10 +214,10 @@ def _codes(codes: Mapping[str, str]) -> str:
 
 def _motion(motion: FirstMotion) -> Iterator[str]:
     yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
-    yield "# `off` until the first motion is done: the step motion of commission takes it out."
+    yield "# It waits until the first motion is done: the step motion of commission takes that out."
     yield "motion:"
     yield "  crane:"
-    yield "    off: true"
+    yield "    waits: true"
     yield f"    slew: {motion.slew}"
     yield f"    near_far: {motion.near_far}"
     if motion.radius:

@@ -24,7 +24,7 @@ def described(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def machine(first_day: Path) -> Path:
     """Its two-axis motion is on, as after the first motion."""
-    first_day.write_text(first_day.read_text().replace("    off: true\n", ""))
+    first_day.write_text(first_day.read_text().replace("    waits: true\n", ""))
     return first_day
 
 

@@ -228,6 +228,6 @@ def test_two_axis_motion_begins_after_the_first_motion(first_day: Path) -> None:
     assert load_deployment(first_day).motions == {}
     one = Procedure(Files(first_day), Otherwise(lambda t: t), load_deployment, STEPS, first_day)
     proposal = one.run(one.step("motion"))
-    assert "-    off: true" in proposal.diff
+    assert "-    waits: true" in proposal.diff
     one.accept(proposal)
     assert {*load_deployment(first_day).motions} == {"crane"}

@@ -74,8 +74,8 @@ def run(context: Context) -> Outcome:
         outcome.sheet.print(f"enable let go in motion: neutral after {slowest_s:.3f} s")
     if not context.bench.simulated:
         outcome.sheet.print("Accept it only if each axis moved, and in its right direction.")
-    off = Source(deployment.path).data.get("motion", {})
-    if names := [name for name, motion in off.items() if motion.get("off")]:
+    data = Source(deployment.path).data.get("motion", {})
+    if names := [name for name, motion in data.items() if motion.get("waits")]:
         outcome.sheet.print(f"Two-axis motion begins with the next step: {', '.join(names)}")
         outcome.edit = partial(_begin, names=names)
     outcome.figures[""] = lambda: figure(traffic, "First motion, at reduced speed")
@@ -84,7 +84,7 @@ def run(context: Context) -> Outcome:
 
 def _begin(deployment: Deployment, names: list[str]) -> list[str]:
     for name in names:
-        set_values(deployment.path, ("motion", name), {"off": None})
+        set_values(deployment.path, ("motion", name), {"waits": None})
     return []
 
 
@@ -137,6 +137,6 @@ FIRST_MOTION = Step(
     "first motion at reduced speed: each valve follows its joystick, and is neutral when the"
     " enable is let go",
     run,
-    writes="`motion` without `off`",
+    writes="`motion` without `waits`",
     needs=("valve", "filter"),
 )
