@@ -6,7 +6,7 @@ everything here is decoded raw (``Layout``) and judged raw.
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,12 +107,13 @@ def _not_reached(signal: Signal) -> str | None:
     return None
 
 
-def neutral_fault(signal: Signal, band: float) -> str | None:
+def neutral_fault(signal: Signal, band: float, listed: Container[str] = ()) -> str | None:
     """Why a joystick is never in neutral, so that its axis is never ready, or None.
 
     Args:
         signal: with its full scale (``symmetrical_range``, ``magnitude_range``).
         band: what counts as neutral, part of full scale.
+        listed: names of values of which the file says what they are.
     """
     if signal.is_float:
         return None
@@ -123,8 +124,9 @@ def neutral_fault(signal: Signal, band: float) -> str | None:
     if value > band * full_scale(signal) + ROUNDING:
         return f"{text}, got {value:g} next to it: its axis is never ready"
     choices: Mapping[int, object] = signal.choices or {}
-    if zero in special_codes(signal):
-        return f'{text}, got {zero} "{choices[zero]}" there in the DBC: its axis is never ready'
+    name = str(choices.get(zero, ""))
+    if named_fault(name) and name not in listed:
+        return f'{text}, got {zero} "{name}" there in the DBC: its axis is never ready'
     return None
 
 

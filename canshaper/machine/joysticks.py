@@ -199,7 +199,7 @@ def _bind_velocity(
 
 
 def _check_neutral(used: UsedMessage, place: Place, signal: Signal, command: Command) -> None:
-    if fault := neutral_fault(signal, command.neutral_pct / 100.0):
+    if fault := neutral_fault(signal, command.neutral_pct / 100.0, command.codes):
         used.diagnostics.add(place, fault)
 
 
