@@ -28,11 +28,21 @@ def layout_fault(message: Message) -> str | None:
             return f"{signal.name}: expected a multiplexor (M) in its message, got none for it"
         if signal.start < 0:
             return f"{signal.name}: expected a start bit of 0 or more, got {signal.start}"
-        first = signal.raw_initial or 0
-        if not isinstance(first, int | float) or not math.isfinite(first):
-            return f"GenSigStartValue of {signal.name}: expected a number, got {first!r}"
-        if signal.is_float and signal.length not in (16, 32, 64):
-            return f"{signal.name}: expected a float of 16, 32 or 64 bits, got {signal.length}"
+        if fault := _number_fault(signal):
+            return fault
+    return None
+
+
+def _number_fault(signal: Signal) -> str | None:
+    """Why a signal is no number, or None."""
+    first = signal.raw_initial or 0
+    if not isinstance(first, int | float) or not math.isfinite(first):
+        return f"GenSigStartValue of {signal.name}: expected a number, got {first!r}"
+    if signal.is_float and signal.length not in (32, 64):  # all that SIG_VALTYPE_ has
+        return f"{signal.name}: expected a float of 32 or 64 bits, got {signal.length}"
+    if not (math.isfinite(signal.scale) and math.isfinite(signal.offset)):
+        got = f"({signal.scale:g},{signal.offset:g})"
+        return f"{signal.name}: expected finite factor and offset, got {got}"
     return None
 
 

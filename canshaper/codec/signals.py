@@ -6,6 +6,7 @@ everything here is decoded raw (``Layout``) and judged raw.
 
 import math
 import re
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,6 +107,37 @@ def _not_reached(signal: Signal) -> str | None:
     return None
 
 
+def neutral_fault(signal: Signal, band: float, listed: Container[str] = ()) -> str | None:
+    """Why a joystick is never in neutral, so that its axis is never ready, or None.
+
+    Args:
+        signal: with its full scale (``symmetrical_range``, ``magnitude_range``).
+        band: what counts as neutral, part of full scale.
+        listed: names of values of which the file says what they are.
+    """
+    if signal.is_float:
+        return None
+    zero, (low, high) = round(-signal.offset / signal.scale), raw_limits(signal)
+    zero = min(max(zero, low), high)
+    value = abs(zero * signal.scale + signal.offset)
+    text = f"{signal.name}: expected neutral, within {100.0 * band:g} % (neutral_pct) of 0"
+    if value > band * full_scale(signal) + ROUNDING:
+        return f"{text}, got {value:g} next to it: its axis is never ready"
+    choices: Mapping[int, object] = signal.choices or {}
+    name = str(choices.get(zero, ""))
+    if named_fault(name) and name not in listed:
+        return f'{text}, got {zero} "{name}" there in the DBC: its axis is never ready'
+    return None
+
+
+def few_steps(signal: Signal, full: float) -> str | None:
+    """Why a signal cannot be read finely enough, or None; ``full`` is its value at full."""
+    steps = full / abs(signal.scale)
+    if signal.is_float or signal.length <= 4 or steps + STEP_ROUNDING >= LEAST_STEPS:
+        return None
+    return f"expected {LEAST_STEPS} steps of {signal.name} or more, got {steps:.2g}"
+
+
 def valve_steps(full: float, scale: float) -> int:
     """Raw steps from zero to full command; rounded down so that full is never passed."""
     return int(full / scale + STEP_ROUNDING)
@@ -163,6 +195,28 @@ def in_range(signal: Signal, value: float) -> bool:
     return bool(low - rounding <= value <= high + rounding)
 
 
+def code_fault(signal: Signal, raw: int) -> str | None:
+    """Why a signal can never have a code that is waited for: by its bits, or by its range."""
+    if signal.is_float:
+        return None  # noted as no integer
+    low, high = raw_limits(signal)
+    value = raw * signal.scale + signal.offset
+    if low <= raw <= high and in_range(signal, value):
+        return None
+    got = f"{low} to {high}"
+    if low <= raw <= high:
+        got = f"[{signal.minimum:g}|{signal.maximum:g}] in the DBC"
+    return f"{signal.name} can never be {raw}: expected a signal that has it, got {got}"
+
+
+def raw_fault(signal: Signal) -> str | None:
+    """Why the values of a switch are others in the DBC than its raw values, which count."""
+    if (signal.scale, signal.offset) == (1, 0):
+        return None
+    text = f"{signal.name}: expected (1,0) in the DBC, as the raw value of a switch counts, got"
+    return f"{text} ({signal.scale:g},{signal.offset:g}), by which its 0 and 1 mean something else"
+
+
 def special_codes(signal: Signal) -> dict[Any, Reason]:
     """Raw values that are no measurement, with the reason: all that the DBC names, but neutral.
 
@@ -185,6 +239,8 @@ def special_name(signal: Signal, value: float) -> str | None:
 
 # Unit of a length in a DBC file; many have none.
 LENGTHS = (None, "", "m")
+# Largest radius of a crane, with room; a range in mm or cm is far beyond.
+FARTHEST_M = 100.0
 
 
 def radius_range(signal: Signal) -> str | None:
@@ -196,6 +252,9 @@ def radius_range(signal: Signal) -> str | None:
         return f"{signal.name} has no range in the DBC; what lies outside is no radius"
     if low < 0.0:
         return f"{signal.name}: expected a range from 0 m or more, got [{low:g}|{high:g}]"
+    if high > FARTHEST_M:
+        text = f"expected a radius in m, up to {FARTHEST_M:g}"
+        return f"{signal.name}: {text}, got [{low:g}|{high:g}]"
     return None
 
 

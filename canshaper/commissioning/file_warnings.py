@@ -1,5 +1,7 @@
 """Warnings about a valid deployment file, whose numbers may be meant otherwise."""
 
+from canshaper.commissioning.assumed import assumptions
+from canshaper.commissioning.likely_mistakes import likely_mistakes
 from canshaper.config.source import Source
 from canshaper.errors import Problem
 from canshaper.machine.deployment import Deployment
@@ -8,8 +10,8 @@ from canshaper.machine.stopping import rehearsed, unstated
 
 
 def warnings_of(deployment: Deployment) -> list[Problem]:
-    """Filters that do not fit, travel that no one has stated, numbers of a simulated crane."""
+    """Filters that do not fit, travel that no one has stated, guesses, likely mistakes."""
     source = Source(deployment.path)
     config = deployment.config
-    warnings = (*unfit(config), *unstated(deployment), *rehearsed(config))
-    return [source.problem(place, text) for place, text in warnings]
+    numbers = (*unfit(config), *unstated(deployment), *rehearsed(config), *assumptions(config))
+    return [source.problem(*one) for one in (*numbers, *likely_mistakes(deployment))]

@@ -10,6 +10,9 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.signals import LEAST_STEPS, command_fault, raw_limits, symmetrical_range
 from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
+from canshaper.machine.contraries import ENABLE as CONTRARY_ENABLE
+from canshaper.machine.contraries import contrary_fault
+from canshaper.machine.corrections import bit_of
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, UNITS
 
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
@@ -22,9 +25,13 @@ NEGATIVE = re.compile(r"neg|left|back|down|minus", re.IGNORECASE)
 POSITIVE = re.compile(r"pos|right|forward|fwd|up|plus", re.IGNORECASE)
 RADIUS = re.compile(r"radius|reach", re.IGNORECASE)
 COUNTER = re.compile(r"alive|count|rolling", re.IGNORECASE)
-_JOYSTICK = re.compile(r"lever|joy|joystick", re.IGNORECASE)
+_JOYSTICK = re.compile(r"lever|joy|joystick|stick|paddle", re.IGNORECASE)
+_VALVE = re.compile(r"valve|command|cmd|set.?point|pump|flow|actuat|motor", re.IGNORECASE)
+_WORD = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[a-z]+\d*")
+_GENERIC = {"velocity", "speed", "command", "cmd", "valve", "flow", "position", "value", "axis"}
 # A switch has two bits at most: off, on, error, not available.
 _SWITCH_BITS = 2
+_BYTE = 8
 # Part of a name that two have in common, from which on they are likely to belong together.
 LIKELY = 0.6
 
@@ -100,6 +107,24 @@ def switches(message: Message) -> list[Signal]:
     return [s for s in message.signals if not s.is_signed and s.length <= _SWITCH_BITS]
 
 
+def switch_parts(message: Message) -> list[Signal]:
+    """Other signals that can be a switch as a whole, and each bit of them: SIGNAL/BIT."""
+    parts: list[Signal] = []
+    for s in message.signals:
+        bits = s.length <= _SWITCH_BITS if s.is_signed else _SWITCH_BITS < s.length <= _BYTE
+        apart = s.is_float or s.is_multiplexer or s.unit or COUNTER.search(s.name)
+        if bits and not apart and (s.is_signed or not s.choices):
+            parts += [] if s.is_signed else [s]
+            parts += [bit_of(s, number) for number in range(s.length)]
+    return parts
+
+
+def enabling(signals: Sequence[Signal]) -> str | None:
+    """The likely enable switch, by its name; none whose values mean the contrary."""
+    fine = [s for s in signals if contrary_fault(s, "enable", CONTRARY_ENABLE) is None]
+    return named(fine, ENABLE)
+
+
 def modes(message: Message) -> list[Signal]:
     """Signals of more bits whose values the DBC names: one of these may be what enables."""
     return [
@@ -129,17 +154,30 @@ def counter(message: Message) -> str | None:
 
 def joysticks(messages: Sequence[Message]) -> list[Message]:
     """Messages that can be of a joystick, the likely ones first."""
+    possible = [m for m in messages if not is_status(m) and (velocities(m) or one_sided(m))]
     return sorted(
-        (m for m in messages if not is_status(m) and (velocities(m) or one_sided(m))),
-        key=lambda m: (_tier(m, axes(m) and switches(m)), not _JOYSTICK.search(m.name)),
+        possible,
+        key=lambda m: (*_rank(m, possible), not _JOYSTICK.search(m.name)),
     )
 
 
 def likely_joysticks(messages: Sequence[Message]) -> list[Message]:
     """Return messages as likely as the first: cyclic with a switch, or two-sided, or all."""
     candidates = joysticks(messages)
-    tiers = [_tier(m, axes(m) and switches(m)) for m in candidates]
-    return [m for m, tier in zip(candidates, tiers, strict=True) if tier == tiers[0]]
+    ranks = [_rank(m, candidates) for m in candidates]
+    return [m for m, rank in zip(candidates, ranks, strict=True) if rank == ranks[0]]
+
+
+def _rank(message: Message, others: Sequence[Message]) -> tuple[int, int]:
+    """How likely a message is a joystick's: by who gets it and by its name, and how described."""
+    senders = {node for m in others for node in m.senders} - {*message.senders}
+    readers = {node for m in others if m is not message for s in m.signals for node in s.receivers}
+    up = any(node in senders for s in message.signals for node in s.receivers)
+    down = any(node in readers for node in message.senders)
+    if bool(_JOYSTICK.search(message.name)) != bool(_VALVE.search(message.name)):
+        down = bool(_VALVE.search(message.name))
+        up = not down
+    return down - up, _tier(message, axes(message) and switches(message))
 
 
 def _tier(message: Message, described: object) -> int:
@@ -231,6 +269,12 @@ def _with(signals: set[str], messages: Sequence[Message]) -> Message | None:
 def axis_name(signal: str) -> str:
     """A name for an axis after its joystick: NearFar is near_far."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", signal).lower()
+
+
+def alike(one: str, other: str) -> bool:
+    """Whether two names have a word in common that says more than what every valve has."""
+    first, second = ({word.lower() for word in _WORD.findall(name)} for name in (one, other))
+    return bool(first & second - _GENERIC)
 
 
 def likeness(one: str, other: str) -> float:

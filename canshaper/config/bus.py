@@ -201,6 +201,10 @@ class Control(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
+        if int(self.mode, 8) & 0o002:
+            others = f"0{int(self.mode, 8) & ~0o007:03o}"
+            text = f"expected no right to write for others, such as {others!r}, got {self.mode!r}"
+            raise ValueError(f"mode: {text}: every user of this PC could change the numbers")
         for key, (low, high) in self.adjustable.items():
             if not low <= high:
                 text = f"{key}: expected the lower end first, got {low:g} to {high:g}"

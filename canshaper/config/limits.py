@@ -149,6 +149,8 @@ class Motion(Section):
     max_s: Annotated[
         float, number(0.5, 60, "s", "longest motion of an axis that its operator left alone")
     ] = 6.0
+    waits: bool = Field(False, description="as if it were not there; commission takes this out")
+    """As if it were not there, on the first day; the step motion of commission takes this out."""
 
     @model_validator(mode="after")
     def _one_radius(self) -> Self:

@@ -85,7 +85,8 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
     config, problems = _validated(source, DeploymentConfig)
     if config is None or moved:
         raise ConfigError(_sorted(moved + problems))
-    return config, source
+    on = {name: motion for name, motion in config.motion.items() if not motion.waits}
+    return config if on == config.motion else config.model_copy(update={"motion": on}), source
 
 
 def check_packages() -> None:

@@ -26,14 +26,20 @@ from canshaper.config.section import VERSION, Section, number
 from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.shaping.registry import KINDS
 
+WITHOUT_ENABLE = (
+    ": nothing moves without a switch that is held. It may be a signal of the joystick's message"
+    " (enable: SIGNAL, or SIGNAL/BIT), one of another message (a section in switches), or that of"
+    " another joystick (enable_of)"
+)
+
 
 class Joystick(InputSection):
     """A joystick message and the switches in it."""
 
     enable: SwitchNames | None = None
-    """Signal of the enable switch: 1 on, 0 off, everything else is invalid. Or several switches,
-    all needed, the one to press first: signals of the joystick's own message, JOYSTICK.SIGNAL of
-    another one's, names of switches."""
+    """Signal of the enable switch: 1 on, 0 off, everything else is invalid; SIGNAL/BIT is one bit
+    of a signal, 0 the lowest. Or several switches, all needed, the one to press first: signals of
+    the joystick's own message, JOYSTICK.SIGNAL of another one's, names of switches."""
     enable_of: str | None = None
     """Instead of enable: a joystick whose switches enable this one too, such as the grip rollers of
     one."""
@@ -54,7 +60,7 @@ class Joystick(InputSection):
     def _enabled(self) -> Self:
         if (self.enable is None) == (self.enable_of is None):
             got = "neither" if self.enable is None else "both"
-            raise ValueError(f"expected one of enable and enable_of, got {got}")
+            raise ValueError(f"expected one of enable and enable_of, got {got}{WITHOUT_ENABLE}")
         return self
 
 
@@ -276,6 +282,9 @@ class DeploymentConfig(Section):
     )
     control: Control | None = None
     """Numbers that may be changed while the machine works."""
+    assumed: list[str] = Field([], description="keys of numbers that no one has measured or typed")
+    """Keys of numbers that are guesses of init until someone measures them (a verb with --write
+    takes them out) or has them from a manual (then take them out here)."""
     uncertainty: Uncertainty = Uncertainty()
     """Ranges from which a campaign draws its drives."""
     accept: Accept = Accept()

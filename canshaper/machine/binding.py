@@ -1,10 +1,11 @@
 """Deployment file and DBC files brought together: codecs, or every problem at once."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
 from canshaper.checksums.kinds import package_line
-from canshaper.codec.signals import special_name
+from canshaper.codec.signals import code_fault, special_name
 from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
@@ -14,9 +15,16 @@ from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.diagnostics import Diagnostics
+from canshaper.machine.distinct import check_ids, check_names
 from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, bind_status, filter_lines
-from canshaper.machine.inputs import BoundValue, Choosing, bind_emergency_stop, bind_switch
+from canshaper.machine.inputs import (
+    BoundJoystick,
+    BoundValue,
+    Choosing,
+    bind_emergency_stop,
+    bind_switch,
+)
 from canshaper.machine.joysticks import (
     bind_joystick,
     bind_switches,
@@ -41,6 +49,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     config, source = load_config(path)
     diagnostics = Diagnostics(source)
     check_buses(diagnostics, config)
+    check_names(diagnostics, config)
     messages = load_messages(diagnostics, config, path.parent, inside)
     if messages is None:
         raise ConfigError(diagnostics.problems)
@@ -61,10 +70,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
-    lookup.check_groups()
-    check_following(diagnostics, config, joysticks)
-    check_profiles(diagnostics, config)
-    check_control(diagnostics, config)
+    _check_together(lookup, joysticks)
     diagnostics.raise_problems()
     return Deployment(
         path,
@@ -92,6 +98,16 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     )
 
 
+def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None]) -> None:
+    """Check what is known when all parts are bound."""
+    diagnostics, config = lookup.diagnostics, lookup.config
+    lookup.check_groups()
+    check_ids(lookup)
+    check_following(diagnostics, config, joysticks)
+    check_profiles(diagnostics, config)
+    check_control(diagnostics, config)
+
+
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
     """Bind the switch that says which profile is in force, where there is one."""
     config = lookup.config.profile
@@ -99,6 +115,16 @@ def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
     if profile and config:
         codes = config.codes.items()
         _check_values(lookup, profile, {("profile", "codes", name): code for name, code in codes})
+        first: dict[int, str] = {}
+        for name, code in codes:
+            signal, place = profile.signal, ("profile", "codes", name)
+            raw = (code - signal.offset) / signal.scale if signal.scale else math.inf
+            if first.setdefault(code, name) != name:
+                text = f"expected a code of its own, got {code}, that of {first[code]}"
+                lookup.diagnostics.add(place, text)
+            elif not raw.is_integer() or code_fault(signal, int(raw)):
+                text = f"{signal.name} can never be {code}: expected a value of it, or no profile"
+                lookup.diagnostics.add(place, text)
     return profile
 
 

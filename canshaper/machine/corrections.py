@@ -1,9 +1,13 @@
 """Corrections of the deployment file, where the DBC has nothing, or something wrong."""
 
+import re
+from collections import OrderedDict
 from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass
 from operator import is_
+from types import MappingProxyType
+from typing import Any
 
 from cantools.database.can import Message, Signal
 
@@ -11,6 +15,7 @@ from canshaper.codec.layout import Chosen, frame_length
 from canshaper.codec.signals import STEP_ROUNDING, raw_limits
 from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig, Scaling
+from canshaper.config.section import sections
 from canshaper.machine.named_codes import Listing
 
 
@@ -43,11 +48,55 @@ def scalings(config: DeploymentConfig, bus: str, message: str) -> dict[str, Corr
     return {name: one for name, one in result.items() if one.scaling.corrects}
 
 
+_BIT = re.compile(r"([^/.]+)/(\d{1,2})")
+
+
+def bit_names(config: DeploymentConfig, bus: str, message: str) -> dict[str, set[int]]:
+    """Bits that the file names as SIGNAL/BIT in a message, by signal."""
+    names: list[str] = []
+    for _, section in sections(config):
+        if isinstance(section, Protected) and (section.bus, section.message) == (bus, message):
+            for _, value in section:
+                names += [value] if isinstance(value, str) else value if type(value) is list else []
+    for joystick in config.joysticks.values():
+        for text in joystick.enable or ():
+            of, dot, name = text.partition(".")
+            owner = config.joysticks.get(of)
+            if dot and owner and (owner.bus, owner.message) == (bus, message):
+                names.append(name)
+    bits: dict[str, set[int]] = {}
+    for match in filter(None, map(_BIT.fullmatch, map(str, names))):
+        bits.setdefault(match[1], set()).add(int(match[2]))
+    return bits
+
+
+def bit_of(signal: Signal, number: int) -> Signal:
+    """One bit of a signal, 0 the lowest, as a switch of its own: SIGNAL/BIT."""
+    result, at = copy(signal), signal.start
+    for _ in range(signal.length - 1 - number if signal.byte_order == "big_endian" else 0):
+        at += -1 if at % 8 else 15  # after the lowest bit of a byte comes the highest of the next
+    result.name, result.length, result.byte_order = f"{signal.name}/{number}", 1, "little_endian"
+    result.start = at + (number if signal.byte_order == "little_endian" else 0)
+    result.is_signed, result.scale, result.offset = False, 1, 0
+    result.minimum = result.maximum = result.raw_initial = None
+    choices: Mapping[int, Any] = signal.choices or {}
+    named = OrderedDict((abs(raw), name) for raw, name in choices.items())
+    result.choices = named if signal.length == 1 else None
+    return result
+
+
+def _cut(signal: Signal, bits: Mapping[str, set[int]]) -> list[Signal]:
+    """The bits of a signal that are named, or itself."""
+    numbers = sorted(n for n in bits.get(signal.name, ()) if n < signal.length)
+    return [bit_of(signal, n) for n in numbers] if numbers and not signal.is_float else [signal]
+
+
 def corrected(
     message: Message,
     config: Protected,
     signals: Mapping[str, Correction],
     listings: Iterable[Listing] = (),
+    bits: Mapping[str, set[int]] = MappingProxyType({}),
 ) -> Message | str:
     """Return the message as it is on the bus of this machine, or why it cannot be.
 
@@ -56,6 +105,7 @@ def corrected(
         config: the section that names it.
         signals: the signals whose scaling it does not have right.
         listings: which of its named values are measurements.
+        bits: which bits of its signals are switches.
     """
     value = config.multiplexor
     length = frame_length(message)
@@ -65,8 +115,10 @@ def corrected(
         of_value = [scaled(s, one) if s.name == name else s for s in of_value]
     for listing in listings:
         of_value = [listing.without_values(s) if s.name in listing.signals else s for s in of_value]
+    if bits:
+        of_value = [part for s in of_value for part in _cut(s, bits)]
     own = length == message.length and config.cycle_ms is None
-    if own and all(map(is_, of_value, message.signals)):
+    if own and not bits and all(map(is_, of_value, message.signals)):
         return message
     return Message(
         message.frame_id,

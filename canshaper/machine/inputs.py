@@ -17,6 +17,7 @@ from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Radius
 from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
+from canshaper.machine.contraries import ENABLE, STOP
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
 from canshaper.machine.used_message import UsedMessage
@@ -159,7 +160,7 @@ def bind_input(
         used.add_fault("has no GenMsgCycleTime; cycle_ms may say it")
     for at, signal in enable:
         used.integer(at, signal, "enable")
-        used.check_switch(at, signal, {1: "on"}, "not on")
+        used.check_switch(at, signal, {1: "on"}, "not on", ENABLE)
     for key in switches:
         used.integer((*place, key), getattr(config, key), key)
     if value is not None:
@@ -178,7 +179,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[Emergenc
     if (result := bind_input(lookup, ("emergency_stop",), config, ("signal",))) is None:
         return None
     used, bound = result
-    used.check_switch(("emergency_stop", "signal"), config.signal, {0: "free"}, "stop")
+    used.check_switch(("emergency_stop", "signal"), config.signal, {0: "free"}, "stop", STOP)
     check_source(used, "the emergency stop")
     return bound
 

@@ -3,18 +3,24 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from cantools.database.can import Signal
+
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
+from canshaper.codec.sense import flag_fault
 from canshaper.codec.signals import (
     VelocitySignal,
+    few_steps,
     find_signal,
+    full_scale,
     magnitude_range,
-    raw_limits,
+    neutral_fault,
     symmetrical_range,
 )
 from canshaper.config.enable import conditions, named_by
 from canshaper.config.inputs import InputSection, SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
 from canshaper.config.source import Place
+from canshaper.machine.contraries import SWITCH, SWITCHES, flag_of
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.inputs import Bound, BoundJoystick, bind_input, check_source
 from canshaper.machine.lookup import Lookup
@@ -92,12 +98,10 @@ def _bind(lookup: Lookup, switches: dict[str, SwitchSection]) -> BoundSwitches |
     for other in others:
         used.integer(("switches", other, "signal"), switches[other].signal, f"switch {other}")
     for name, one in switches.items():
-        agrees, at = {one.code: f"{name} agrees"}, ("switches", name, "signal")
-        used.check_switch(at, one.signal, agrees, f"{name} does not agree")
-        signal = find_signal(bound.message, one.signal)
-        if signal and one.code > (largest := raw_limits(signal)[1]):
-            text = f"expected up to {largest}, of {signal.length} bits of {signal.name}"
-            lookup.diagnostics.add(("switches", name, "code"), f"{text}, got {one.code}")
+        said = "code" in one.model_fields_set
+        agrees, wrong = {one.code: f"{name} agrees"}, None if said else SWITCH
+        at = ("switches", name, "code" if said else "signal")
+        used.check_switch(at, one.signal, agrees, f"{name} does not agree", wrong)
     names = {name: (one.signal, one.code) for name, one in switches.items()}
     return BoundSwitches(**vars(bound), switches=names)
 
@@ -118,8 +122,13 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
         return None
     used, bound = result
     for key in switches:
-        used.check_switch((*place, key), getattr(config, key), {1: key}, f"no {key}")
+        used.check_switch((*place, key), getattr(config, key), {1: key}, f"no {key}", SWITCHES[key])
     lookup.check_node(place, config.bus, config.node)
+    for i, condition in enumerate(named_by(lookup.config, name)):
+        if condition.joystick is None and find_signal(used.message, condition.name):
+            text = f"expected another name for one of both: {condition.name} is a signal of"
+            text += f" {used.message.name} and one of switches, which would enable instead"
+            lookup.diagnostics.add(_place(config.enable, name, i), text)
     of_axes = {n: a.command for n, a in lookup.config.axes.items() if a.command.joystick == name}
     _check_scaling(used, of_axes)
     moves = {s.signal: f"the joystick of {axis}" for axis, s in reversed(of_axes.items())}
@@ -164,7 +173,10 @@ def _bind_velocity(
         if flag := used.find(at, name):
             used.check_integer(at, flag, signed=False)
             used.check_unused(at, flag, moves)
-            used.check_switch(at, name, {0: f"not {key}", 1: key}, "fault")
+            if flag_fault(key, name):
+                text = f"expected the flag of {key}, got {name!r}: {axis} would move by another one"
+                used.diagnostics.add(at, text)
+            used.check_switch(at, name, {0: f"not {key}", 1: key}, "fault", flag_of(key))
             used.uses[name] = f"the {key} flag of {axis}"
     signal = used.find((*place, "signal"), command.signal)
     if signal is None:
@@ -175,11 +187,20 @@ def _bind_velocity(
         used.add_fault(fault)
         return None
     used.check_unused((*place, "signal"), signal)
+    _check_neutral(used, place, signal, command)
+    if command.full is not None and (fault := few_steps(signal, full_scale(signal))):
+        text = f"{fault}: {axis} would jump; full is the value at the end stop"
+        used.diagnostics.add((*place, "full"), text)
     velocity = VelocitySignal.of(signal)
     if not flags:
         return velocity
     used.uses[signal.name] = moves[signal.name]  # with other flags it would be another one
     return FlaggedVelocity(velocity, **flags)
+
+
+def _check_neutral(used: UsedMessage, place: Place, signal: Signal, command: Command) -> None:
+    if fault := neutral_fault(signal, command.neutral_pct / 100.0, command.codes):
+        used.diagnostics.add(place, fault)
 
 
 def _bind_rocker(
@@ -199,6 +220,7 @@ def _bind_rocker(
             used.add_fault(fault)
             continue
         used.check_unused(place, signal, also)
+        _check_neutral(used, place, signal, command)
         velocities.append(VelocitySignal.of(signal))
     if len(velocities) < 2:
         return None

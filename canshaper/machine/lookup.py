@@ -21,7 +21,7 @@ from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import sections
 from canshaper.config.source import Place
-from canshaper.machine.corrections import chosen, corrected, scalings
+from canshaper.machine.corrections import bit_names, chosen, corrected, scalings
 from canshaper.machine.database import MOST_BYTES, Messages, load_dbc, too_many
 from canshaper.machine.dbc_parse import MOST_PARSED
 from canshaper.machine.diagnostics import Diagnostics
@@ -75,7 +75,8 @@ class Lookup:
             return None
         file, in_dbc = result
         listed = self._listings.get((bus, name), []) if received else []
-        message = corrected(in_dbc, config, scalings(self.config, bus, name), listed)
+        bits = bit_names(self.config, bus, name) if received else {}
+        message = corrected(in_dbc, config, scalings(self.config, bus, name), listed, bits)
         if isinstance(message, str):
             add((*place, "multiplexor"), message)
             message = in_dbc

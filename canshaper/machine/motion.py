@@ -25,6 +25,10 @@ def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
         for key in ("slew", "near_far"):
             _check_axis(lookup, (*place, key), getattr(motion, key), moved, turns=key == "slew")
         _check_crane(lookup, (*place, "near_far"), motion)
+        slewing = lookup.config.axes[motion.slew].slewing if motion.slew in moved else None
+        if slewing and motion.radius_m and motion.radius_m > slewing.largest_radius_m:
+            text = f"expected up to largest_radius_m of {motion.slew}, {slewing.largest_radius_m:g}"
+            lookup.diagnostics.add((*place, "radius_m"), f"{text}, got {motion.radius_m:g}")
         radius = bind_radius(lookup, (*place, "radius"), motion.radius) if motion.radius else None
         motions[name] = BoundMotion(motion, radius)
     return motions

@@ -8,9 +8,16 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.identifier import STATE_BITS
 from canshaper.codec.layout import Chosen, is_j1939
-from canshaper.codec.signals import find_signal, names_broken, raw_limits
+from canshaper.codec.signals import (
+    code_fault,
+    find_signal,
+    names_broken,
+    raw_fault,
+    raw_limits,
+)
 from canshaper.config.source import Place
 from canshaper.errors import there_are
+from canshaper.machine.contraries import Contrary, contrary_fault
 from canshaper.machine.database import DbcFile
 from canshaper.machine.diagnostics import Diagnostics
 
@@ -93,19 +100,32 @@ class UsedMessage:
         return signal
 
     def check_switch(
-        self, place: Place, name: str | None, means: Mapping[int, str], other: str
+        self,
+        place: Place,
+        name: str | None,
+        means: Mapping[int, str],
+        other: str,
+        wrong: Contrary | None = None,
     ) -> None:
-        """Note what the codes of a switch mean; one that counts may have no name of an error.
+        """Note what the codes of a switch mean, and a problem where the DBC has them otherwise.
 
         Args:
             place: of the key that names it.
             name: its signal; one that is missing is noted elsewhere.
             means: what the codes mean that count.
             other: what all others mean.
+            wrong: what it would do where its names mean the contrary; None where the file says
+                which code counts.
         """
         signal = None if name is None else find_signal(self.message, name)
-        for raw, choice in ((signal and signal.choices) or {}).items():
-            assert signal is not None
+        if signal is None:
+            return
+        fault = next((f for raw in means if (f := code_fault(signal, raw))), None)
+        if wrong and not fault:
+            fault = raw_fault(signal) or contrary_fault(signal, place[-1], wrong)
+        if fault:
+            self.diagnostics.add(place, fault)
+        for raw, choice in (signal.choices or {}).items():
             code = NamedCode(
                 self.message.name, signal.name, raw, str(choice), means.get(raw, other)
             )

@@ -7,11 +7,13 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.sense import direction_fault
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import (
     command_fault,
     find_signal,
     magnitude_range,
+    named_fault,
     raw_limits,
     set_point_fault,
     symmetrical_range,
@@ -192,6 +194,9 @@ def _rewritten_message(
     if (enable := own_switch(config, joystick)) is None:
         text = "expected one switch of its own message, where its frames leave through the gateway"
         used.diagnostics.add(("joysticks", joystick, "enable"), f"{text}, got another")
+    elif "/" in enable:
+        text = f"expected a whole signal, whose frames leave through the gateway, got {enable!r}"
+        used.diagnostics.add(("joysticks", joystick, "enable"), text)
     if used.any_source:
         text = f"in the DBC {used.message.name} may come from any source address; where its frames"
         used.add("message", f"{text} leave, its joystick needs the key source")
@@ -237,6 +242,10 @@ def _bind_direction(
         name = next((str(n) for raw, n in (signal.choices or {}).items() if raw == code), "")
         if code > largest:
             text = f"expected up to {largest}, of {signal.length} bits of {signal.name}, got {code}"
+            used.diagnostics.add((*place, key), text)
+        elif direction_fault(name, moves=key != "neutral") or (name and named_fault(name)):
+            text = f'expected a code of {key}, got {code}, in the DBC "{name}": the valve would'
+            text += " rest" if key != "neutral" else " not rest"
             used.diagnostics.add((*place, key), text)
         elif _FLOAT.search(name):
             text = (

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from canshaper.commissioning import control_client as client
+from canshaper.commissioning.assumed import confirm
 from canshaper.config.adjust import Key, value
 from canshaper.config.load import load_config
 from canshaper.edit.edit import edited, sections_of, write_numbers
@@ -168,6 +169,7 @@ class LiveNumbers:
                 raise ControlError(said("filechanged", file=self._file))
             values = self._unwritten()
             write_numbers(self._file, values)
+            confirm(self._file, values)
             keys = ", ".join(values) or "-"
             self._report(said("wrote", who=who, keys=keys, file=self._file.name))
             self.version += 1

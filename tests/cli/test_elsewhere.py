@@ -151,6 +151,7 @@ def test_a_first_deployment_of_eds_files_is_written_on_any_system(tmp_path: Path
         write(tmp_path / f"{name}.eds", objects)
     answers = tmp_path / "answers.txt"
     answers.write_text(
+        "joystick_TPDO1: enable switch = Buttons_1\n"
         "Axis of joystick_TPDO1.Slew = slew\nslew: valve command = valve_RPDO1.SetPoint"
     )
     file = tmp_path / "machine.yaml"

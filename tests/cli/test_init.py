@@ -134,7 +134,9 @@ def test_a_first_deployment_is_of_the_kind_that_is_recommended(tmp_path: Path) -
         assert ours.filter.kind == theirs.filter.kind
         assert ours.limits.reversal == theirs.limits.reversal
         assert (ours.slewing is None) == (theirs.slewing is None)
-    assert config.motion == shipped.motion
+    assert config.motion == {}, "not on the first day"
+    file.write_text(file.read_text().replace("    waits: true\n", ""))
+    assert load_deployment(file).config.motion == shipped.motion
 
 
 def test_a_crane_that_no_axis_turns_has_no_motion(tmp_path: Path) -> None:

@@ -113,7 +113,10 @@ def test_two_axes_do_not_share_a_joystick_with_flags(machine: Machine) -> None:
 def test_a_float_is_no_flag(machine: Machine) -> None:
     machine.in_yaml("    alive_counter: AliveCounter\n", "")
     line = flagged(machine, FLAGS.replace("SlewNeutral", "AliveCounter"))
-    machine.in_dbc("AliveCounter : 56|8@1+", "AliveCounter : 38|16@1+")
+    machine.in_dbc("NearFar : 16|16@1- (0.1,0)", "NearFar : 16|8@1- (1,0)")
+    for signal, before, then in (("Enable", 32, 24), ("AntiSwayOff", 34, 26), ("Reset", 36, 28)):
+        machine.in_dbc(f"{signal} : {before}|", f"{signal} : {then}|")
+    machine.in_dbc("AliveCounter : 56|8@1+", "AliveCounter : 32|32@1+")
     machine.dbc += "SIG_VALTYPE_ 272 AliveCounter : 1;\n"
     assert machine.problems() == [
         f"machine.yaml:{line}: axes.slew.command.flags.neutral: AliveCounter: expected an"

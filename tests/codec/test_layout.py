@@ -69,7 +69,7 @@ def messages(draw: st.DrawFn) -> Message:
 
 def values_of(signal: Signal) -> st.SearchStrategy[Any]:
     if signal.is_float:
-        return st.floats(width=signal.length)  # type: ignore[arg-type]  # 16, 32 or 64
+        return st.floats(width=signal.length)  # type: ignore[arg-type]  # 32 or 64
     low, high = raw_limits(signal)
     return st.one_of(st.integers(low, high), st.sampled_from(sorted({low, 0, high})))
 
@@ -211,7 +211,7 @@ def test_what_has_no_layout() -> None:
     (message,) = cantools.database.load_string(DBC, "dbc").messages
     assert layout_fault(message) is None
     (message,) = cantools.database.load_string(DBC.replace("32|32@1-", "32|24@1-"), "dbc").messages
-    assert layout_fault(message) == "Ratio: expected a float of 16, 32 or 64 bits, got 24"
+    assert layout_fault(message) == "Ratio: expected a float of 32 or 64 bits, got 24"
     wide = DBC.replace("32|32@1-", "0|64@1-").replace("4|12@1-", "0|12@1-")
     (message,) = cantools.database.load_string(wide, "dbc", strict=False).messages
     assert layout_fault(message) is None
@@ -242,7 +242,7 @@ def float_of_9_bits(machine: Machine, number: int, message: str, name: str) -> s
     line = machine.in_dbc(f"BO_ {number} {message}", f"BO_ {number} {message}")
     machine.in_dbc(f"{name} : 16|16@1-", f"{name} : 16|9@1-")
     machine.dbc += f"SIG_VALTYPE_ {number} {name} : 1;\n"
-    fault = f"{name}: expected a float of 16, 32 or 64 bits, got 9"
+    fault = f"{name}: expected a float of 32 or 64 bits, got 9"
     return f"machine.dbc:{line}: {message}: {fault}"
 
 

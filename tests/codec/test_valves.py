@@ -187,7 +187,10 @@ def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Ma
 def test_the_largest_code_of_the_bits_is_a_direction(machine: Machine) -> None:
     codes = CODES.replace("negative: 2", "negative: 15")
     valve = f"message: AVC0, signal: PortFlow, timeout_ms: 200, {codes}"
-    codec = with_valves(machine, ("Slew", valve)).load().axes["slew"].valve
+    with_valves(machine, ("Slew", valve))
+    named = DBC.replace('15 "DontCare"', '14 "DontCare"')
+    (machine.directory / "valves.dbc").write_text(named, encoding="cp1252")
+    codec = machine.load().axes["slew"].valve
     assert command_raw(codec, -10)["State"] == 15
 
 

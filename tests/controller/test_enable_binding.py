@@ -27,8 +27,16 @@ def test_the_way_to_stop_counts_the_slowest_switch(switched: Machine) -> None:
         (", mode,", ",", "switches.mode: expected a joystick that mode enables, got none"),
         ("signal: Door", "signal: Seated", "expected a free signal, got 'Seated'"),
         ("signal: Mode, code", "signal: Mode, cycle_ms: 200, code", "timeout_ms: expected 400 ms"),
-        ("code: 3", "code: 256", "mode.code: expected up to 255, of 8 bits of Mode, got 256"),
-        ("signal: Door", "signal: Door, code: 4", "door.code: expected up to 3, of 2 bits of Door"),
+        (
+            "code: 3",
+            "code: 256",
+            "mode.code: Mode can never be 256: expected a signal that has it, got 0 to 255",
+        ),
+        (
+            "signal: Door",
+            "signal: Door, code: 4",
+            "door.code: Door can never be 4: expected a signal that has it, got 0 to 3",
+        ),
         ("Door, alive_counter: Count,", "Door,", "the same as switches.seat, which reads the"),
         ("message: Ecu", "message: JoystickLeft", "which is used already by"),
         ("[Enable, seat, door, mode, right.Enable]", "[]", "enable: expected 1 or more entries"),

@@ -89,5 +89,7 @@ def test_the_guide_leads_to_a_calm_grapple(
         options = ("--lockstep", "--set", crane, "--script", f"pulse-{axis}")
         measures = demo_report(*options)["axes"][axis]
         assert measures["residual_reduction_pct"] > 90.0, (length, axis, measures)
+    text = Path("machine.yaml").read_text().replace("    waits: true\n", "")  # after first motion
+    Path("machine.yaml").write_text(text)
     measures = demo_report("--lockstep", "--set", crane)["crane"]  # both at once
     assert measures["residual_reduction_pct"] > 90.0, (length, measures)

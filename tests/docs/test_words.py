@@ -17,7 +17,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 630,
+    "CHANGELOG.md": 640,
     "CONTRIBUTING.md": 500,
     "README.md": 590,
     "SECURITY.md": 430,
@@ -27,10 +27,10 @@ BUDGET = {
     "docs/campaign.md": 760,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
-    "docs/commission.md": 610,
+    "docs/commission.md": 650,
     "docs/comparison.md": 650,
     "docs/decisions.md": 880,
-    "docs/deployment.md": 1760,
+    "docs/deployment.md": 1840,
     "docs/devices.md": 540,
     "docs/doctor.md": 420,
     "docs/glossary.md": 400,

@@ -150,8 +150,10 @@ def test_a_gateway_needs_the_address_of_a_joystick_of_j1939(tmp_path: Path) -> N
 def test_a_float_has_the_full_scale_of_the_file_alone(machine: Machine, signal: str) -> None:
     """No step of it goes beyond that, as one of two's complement does."""
     machine.in_yaml(f"signal: {signal}, neutral_pct", f"signal: {signal}, full: 80, neutral_pct")
-    start = {"Slew": 0, "NearFar": 16}[signal]
-    machine.in_dbc(f"{signal} : {start}|16@1- (0.1,0)", f"{signal} : {start}|16@1- (1,0)")
+    other = "NearFar" if signal == "Slew" else "Slew"
+    place = {"Slew": 0, "NearFar": 16}
+    machine.in_dbc(f"{other} : {place[other]}|16@1-", f"{other} : 40|16@1-")
+    machine.in_dbc(f"{signal} : {place[signal]}|16@1- (0.1,0)", f"{signal} : 0|32@1- (1,0)")
     machine.dbc += f"SIG_VALTYPE_ 272 {signal} : 1;\n"
     message = machine.load().joysticks["left"].message
     of_file = next(one for one in message.signals if one.name == signal)

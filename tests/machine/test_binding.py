@@ -147,6 +147,7 @@ def test_one_name_gone_is_one_problem(machine: Machine) -> None:
 
 def test_a_joystick_that_is_the_enable_switch_too(machine: Machine) -> None:
     machine.in_yaml("enable: Enable", "enable: Slew")
+    machine.in_dbc("(0.1,0)", "(1,0)")
     line = machine.in_yaml("signal: Slew,", "signal: Slew,")
     assert machine.problems() == [
         f"machine.yaml:{line}: axes.slew.command.signal: expected a free signal, got 'Slew', which"

@@ -98,7 +98,7 @@ def test_the_switches_of_one_message_are_bound_together(switched: Machine) -> No
         (
             "code: 3",
             "code: 4",
-            "switches.door.code: expected up to 3, of 2 bits of Door, got 4",
+            "switches.door.code: Door can never be 4: expected a signal that has it, got 0 to 3",
         ),
     ],
 )

@@ -264,3 +264,9 @@ def test_what_one_node_sends_to_another_is_held_back_at_every_priority(tmp_path:
 
 def sent_steps(deployment: Deployment) -> int:
     return deployment.axes["slew"].valve.steps
+
+
+def test_a_bit_does_not_leave_through_the_gateway_as_a_switch(tmp_path: Path) -> None:
+    (problem,) = problems(tmp_path, ("enable: Enable", "enable: Enable/0"))
+    text = "expected a whole signal, whose frames leave through the gateway, got 'Enable/0'"
+    assert problem.endswith(f": joysticks.left.enable: {text}")

@@ -118,6 +118,7 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
 )
 def test_what_an_emergency_stop_may_not_say(stoppable: Machine, text: str, says: str) -> None:
     line = stop(stoppable, text + " }")
+    stoppable.in_dbc("(0.8,0)", "(1,0)")
     (problem,) = stoppable.problems()
     assert problem.startswith(f"machine.yaml:{line}: {says}")
 

@@ -17,11 +17,15 @@ class Machine:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self.yaml = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-        self.yaml = self.yaml.replace("../dbc/forwarder.dbc", "machine.dbc")
+        self.become("forwarder.yaml", "forwarder.dbc")
+
+    def become(self, config: str, dbc: str) -> None:
+        """Begin with these shipped files."""
+        self.yaml = (ROOT / "config" / config).read_text(encoding="utf-8")
+        self.yaml = self.yaml.replace(f"../dbc/{dbc}", "machine.dbc")
         # Tests change tails and cycles, which take a long way to stop.
         self.yaml = re.sub(r"stop_distance_m: [\d.]+", "stop_distance_m: 200", self.yaml)
-        self.dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+        self.dbc = (ROOT / "dbc" / dbc).read_text(encoding="cp1252")
 
     def in_yaml(self, old: str, new: str) -> int:
         """Replace the first ``old`` of the deployment file; return its line."""

@@ -42,7 +42,7 @@ def add_axes(
         scaling, of_valve = command_scaling(command, message), valve_scaling(signal)
         back = [s for s in message.signals if s.name == scaling.negative]
         codes = {n: m for s in (command, *back) for n, m in code_meanings(s, scaling).items()}
-        timeout_ms = _timeout(axis, cycle, nodes.timer_ms(sender.name))
+        timeout_ms, known = _timeout(axis, cycle, nodes.timer_ms(sender.name))
         cia408 = nodes.cia408(sender.name)
         status = suggest.status_of(others, axis)
         swing = swing_of(axis, cycle / 1000.0)
@@ -69,6 +69,7 @@ def add_axes(
                 cia408,
                 None if cia408 else nodes.supervised(sender.name),
                 codes,
+                known,
             )
         )
 
@@ -86,7 +87,7 @@ def _valve_of(
         echo("  no message is left that can command its valve; axis left out")
         return None
     first, *_ = commands
-    alike = suggest.likeness(possible[0].name, command.name) >= suggest.LIKELY
+    alike = suggest.alike(possible[0].name, command.name)
     text = f"  {axis}: valve command, such as {', '.join([*commands][:MOST_OFFERED])}, - for none"
     answer = ask(text, one([*commands, NONE]), first if alike else NONE)
     if answer == NONE:
@@ -106,11 +107,19 @@ def _valve_timeouts(cycle_ms: int) -> tuple[int, int] | None:
     return (shortest, most) if shortest <= most else None
 
 
-def _timeout(axis: str, cycle_ms: int, set_ms: int) -> int:
-    """Ask for the timeout of a valve; ``set_ms`` is what it has by its EDS, 0 for none."""
+def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
+    """Ask for the timeout of a valve; ``set_ms`` is what it has by its EDS, 0 for none.
+
+    Returns:
+        It, and whether it is no mere proposal.
+    """
+    from canshaper.cli.interview.first import VALVE_TIMEOUT_MS
+
     timeouts = _valve_timeouts(cycle_ms)
     if timeouts is None:
         raise UsageError(f"{axis}: its valve has no timeout of three periods of {cycle_ms} ms")
     shortest, most = timeouts
     text = f"  {axis}: silence after which the valve closes by itself, ms (its manual)"
-    return ask(text, whole(shortest, most), str(min(max(set_ms or 200, shortest), most)))
+    likely = min(max(set_ms or VALVE_TIMEOUT_MS, shortest), most)
+    answer = ask(text, whole(shortest, most), str(likely))
+    return answer, bool(set_ms) or answer != likely

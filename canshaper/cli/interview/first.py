@@ -10,6 +10,9 @@ from canshaper.config.load import limits
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.stopping import allowed_s
 
+# Proposals where nothing is known: ten swings in s, speeds of the tip (m/s) and of slewing (rad/s),
+# largest radius in m, timeout of a valve in ms. What stays as it is, the file says as assumed.
+TEN_SWINGS_S, TIP_M_S, SLEWING_RAD_S, RADIUS_M, VALVE_TIMEOUT_MS = 23.6, 1.0, 0.5, 9.0, 200
 # Of the measured radius of the tip.
 RADIUS_TIMEOUT_MS = 200
 # Of full speed, for the first motion; raised step by step while it works.
@@ -174,6 +177,21 @@ class FirstAxis:
     """CANopen node of a valve without CiA 408."""
     codes: Mapping[str, str] = field(default_factory=dict)
     """Codes of its command, see ``NamedCodes``."""
+    timeout_known: bool = False
+    """Whether the timeout is that of an EDS, or typed."""
+
+    def assumed(self) -> list[str]:
+        """Keys of numbers that are proposals still."""
+        keys = [] if self.timeout_known else ["valve.timeout_ms"]
+        if self.swing and self.swing.ten_swings_s == TEN_SWINGS_S:
+            keys += ["sway.period_s", "sway.decay_per_swing"]
+        if self.swing and self.swing.full_speed_m_s == TIP_M_S:
+            keys.append("sway.full_speed_m_s")
+        if self.slewing and self.slewing.full_speed_rad_s == SLEWING_RAD_S:
+            keys.append("slewing.full_speed_rad_s")
+        if self.slewing and self.slewing.largest_radius_m == RADIUS_M:
+            keys.append("slewing.largest_radius_m")
+        return [f"axes.{self.name}.{key}" for key in keys]
 
 
 @dataclass(frozen=True)

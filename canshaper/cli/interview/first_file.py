@@ -8,6 +8,7 @@ from canshaper.cli.interview.first import (
     FIRST_TAIL_S,
     PERIOD_RANGE,
     RADIUS_TIMEOUT_MS,
+    TEN_SWINGS_S,
     FirstAxis,
     FirstCanopen,
     FirstCia408,
@@ -62,6 +63,12 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
         if (message := getattr(machine, key)) is not None:
             yield f"{key}: {{ bus: crane, message: {message} }}"
             yield ""
+    if assumed := [key for axis in machine.axes for key in axis.assumed()]:
+        yield "# Guesses that no one has measured or typed: a verb with --write takes out what it"
+        yield "# measures. What stands in a manual: correct it above, and take it out here."
+        yield "assumed:"
+        yield from (f"  - {key}" for key in assumed)
+        yield ""
     yield "# What `canshaper set` may change while the machine works."
     yield "control:"
     yield "  adjustable:"
@@ -108,8 +115,10 @@ def _joystick(joystick: FirstJoystick) -> Iterator[str]:
         yield f"    multiplexor: {joystick.multiplexor}"
     if joystick.enable_of:
         yield f"    enable_of: {joystick.enable_of}"
-    else:
+    elif joystick.enable:
         yield f"    enable: {f'{joystick.name}_enable' if joystick.switch else joystick.enable}"
+    else:
+        yield "    # enable: the switch that is held; without one this file is refused"
     for key in ("reset", "anti_sway_off", "alive_counter"):
         if (signal := getattr(joystick, key)) is not None:
             yield f"    {key}: {signal}"
@@ -159,7 +168,9 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     if slewing := axis.slewing:
         speeds = f"full_speed_rad_s: {slewing.full_speed_rad_s:g}"
         yield f"    slewing: {{ {speeds}, largest_radius_m: {slewing.largest_radius_m:g} }}"
-    yield f"    # Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
+    guess = " Assumed: no one has measured it." if swing.ten_swings_s == TEN_SWINGS_S else ""
+    swings = f"Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
+    yield f"    # {swings}{guess}"
     sway = swing.sway
     shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
     yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
@@ -203,8 +214,10 @@ def _codes(codes: Mapping[str, str]) -> str:
 
 def _motion(motion: FirstMotion) -> Iterator[str]:
     yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
+    yield "# It waits until the first motion is done: the step motion of commission takes that out."
     yield "motion:"
     yield "  crane:"
+    yield "    waits: true"
     yield f"    slew: {motion.slew}"
     yield f"    near_far: {motion.near_far}"
     if motion.radius:

@@ -1,11 +1,12 @@
 """Questions of ``canshaper init`` on a machine: its bus, joysticks and switches."""
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from canshaper.cli.common import echo
 from canshaper.cli.interview.answers import (
+    MOST_LISTED,
     MOST_OFFERED,
     NONE,
     ask,
@@ -143,25 +144,27 @@ def _joystick(
     from canshaper.config.schema import Joystick
 
     message, page = _page(whole_message)
-    left = suggest.switches(message)  # a switch has one meaning
+    whole = suggest.switches(message)
+    left = [*whole, *suggest.switch_parts(message)]  # a switch has one meaning
 
-    def switch(text: str, looks: re.Pattern[str], *, needed: bool = False) -> str | None:
-        allowed = [signal.name for signal in left] + ([] if needed else [NONE])
-        default = suggest.named(left, looks) or (allowed[0] if needed else NONE)
-        answer = ask(f"{message.name}: {text}, of {', '.join(allowed)}", one(allowed), default)
-        left[:] = [signal for signal in left if signal.name != answer]
+    def switch(text: str, default: str | None) -> str | None:
+        allowed = [*(signal.name for signal in left), NONE]
+        listed = ", ".join([*allowed[: min(MOST_LISTED, len(left))], NONE])
+        likely = NONE if default is None else default
+        answer = ask(f"{message.name}: {text}, of {listed}", one(allowed), likely)
+        gone = {answer, answer.partition("/")[0]}  # itself, and the whole of a bit or its bits
+        left[:] = [s for s in left if s.name not in gone and s.name.partition("/")[0] != answer]
         return None if answer == NONE else answer
 
     cycle = message.cycle_time or period_ms(message.name)
-    enable: str | None
     of = other = code = None
-    if left:
-        enable = switch("enable switch", suggest.ENABLE, needed=True)
-    else:
+    likely = suggest.enabling(left) or (whole[0].name if len(whole) == 1 else None)
+    enable = switch("enable switch", likely or ("" if whole else NONE)) if left else None
+    if enable is None:
         of, enable, other, code = _switch_elsewhere(message, messages, before)
     least, most = limits(Joystick, "timeout_ms")
-    reset = switch("switch that resets a trip", suggest.RESET)
-    off = switch("switch for anti-sway off", suggest.ANTI_SWAY_OFF)
+    reset = switch("switch that resets a trip", suggest.named(left, suggest.RESET))
+    off = switch("switch for anti-sway off", suggest.named(left, suggest.ANTI_SWAY_OFF))
     counter = suggest.counter(message)
     joystick = FirstJoystick(
         suggest.axis_name(nodes.name_of(message.name) or message.name),
@@ -194,21 +197,21 @@ def _switch_elsewhere(
 
     others = [one for one in messages if one.name != message.name]
     joysticks = [joystick.name for joystick in before]
-    switches = [f"{m.name}.{s.name}" for m in others for s in suggest.switches(m)]
+    signals = {f"{m.name}.{s.name}": s for m in others for s in suggest.switches(m)}
+    parts = {f"{m.name}.{s.name}": s for m in others for s in suggest.switch_parts(m)}
     modes = {f"{m.name}.{s.name}": s for m in others for s in suggest.modes(m)}
-    names = [*joysticks, *switches, *modes]
+    names = [*joysticks, *signals, *modes, *parts]
     if not names:
-        text = (
-            "no message has a signal of one or two bits, or with named values (VAL_), which could"
-        )
-        text += " be its enable switch"
-        raise UsageError(f"{message.name}: {text}")
-    enabling = (name for name in names if suggest.ENABLE.search(name))
-    likely = names[0] if joysticks else next(enabling, names[0])
+        echo(f"  {message.name}: no message has a signal that could be its enable switch")
+        return None, None, None, None
+    fine = {n for n, s in signals.items() if suggest.enabling([s])}
+    named = (n for n in names if suggest.ENABLE.search(n) and (n not in signals or n in fine))
+    likely = names[0] if joysticks else next(named, "")
     offered = ", ".join(names[:MOST_OFFERED])
-    answer = ask(f"{message.name}: enable switch, such as {offered}", one(names), likely)
-    if answer in joysticks:
-        return None, None, answer, None
+    text = f"{message.name}: enable switch, such as {offered}, - for none"
+    answer = ask(text, one([*names, NONE]), likely)
+    if answer in (*joysticks, NONE):
+        return None, None, answer if answer in joysticks else None, None
     of, _, signal = answer.partition(".")
     return of, signal, None, _code(modes[answer]) if answer in modes else None
 

@@ -28,18 +28,20 @@ _FASTEST_M_S = 40.0
 
 def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
-    from canshaper.cli.interview.first import Stopwatch
+    from canshaper.cli.interview.first import TEN_SWINGS_S, TIP_M_S, Stopwatch
     from canshaper.config.limits import Sway
     from canshaper.config.load import limits
 
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
         return None
-    seconds = ask("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
+    seconds = ask(
+        "    time of ten full swings, s", number(*_ten_swings_s(period_s)), f"{TEN_SWINGS_S:g}"
+    )
     first = ask("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
     last = ask("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
     allowed = number(*limits(Sway, "full_speed_m_s"))
-    speed = ask("    speed of the tip at full deflection, m/s", allowed, "1")
+    speed = ask("    speed of the tip at full deflection, m/s", allowed, f"{TIP_M_S:g}")
     return Stopwatch(seconds, first, last, speed)
 
 
@@ -84,17 +86,19 @@ def sensor_of(
 
 def slewing_of(axis: str) -> "FirstSlewing | None":
     """How an axis turns the crane; None where it does not."""
-    from canshaper.cli.interview.first import FirstSlewing
+    from canshaper.cli.interview.first import RADIUS_M, SLEWING_RAD_S, FirstSlewing
     from canshaper.config.limits import Slewing
     from canshaper.config.load import limits
 
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
-    speed = ask("    speed at full deflection, rad/s (a turn is 6.28)", allowed, "0.5")
+    speed = ask(
+        "    speed at full deflection, rad/s (a turn is 6.28)", allowed, f"{SLEWING_RAD_S:g}"
+    )
     least, most = limits(Slewing, "largest_radius_m")
     allowed = number(least, min(most, _FASTEST_M_S / speed))
-    return FirstSlewing(speed, ask("    largest radius of the tip, m", allowed, "9"))
+    return FirstSlewing(speed, ask("    largest radius of the tip, m", allowed, f"{RADIUS_M:g}"))
 
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:

@@ -44,7 +44,8 @@ def check(
     is a warning; so is an interface of this machine that is not the device of its bus, and an axis
     that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
     not start; and a filter that was designed for another swing, valve or tail than the file has
-    now; and what was measured on a simulated crane.
+    now; and what was measured on a simulated crane, or is assumed; and what a machine may have but
+    is more often a mistake, such as one joystick signal on two valves.
 
     Examples:
 

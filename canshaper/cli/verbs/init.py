@@ -50,7 +50,9 @@ def init(
     stands in brackets, "-" leaves a thing out. What the DBC does not say is asked: full deflection,
     value in the middle, direction by flags or by a second signal. Written with reduced
     speed, and as we recommend: a robust shaper for each axis that swings (without SciPy a G_FF to
-    begin with), slew and near-far as one motion. Ctrl-C writes nothing; should the check of the
+    begin with), slew and near-far as one motion, which is off until the step motion of commission
+    is done. What is a guess of its own stands under assumed. A switch may be one bit of a signal,
+    as SIGNAL/BIT; without one a draft is kept. Ctrl-C writes nothing; should the check of the
     whole file find something after all, the answers stay in a draft next to it. Machines of J1939
     begin with a copy of the shipped j1939-forwarder.yaml.
 
@@ -72,6 +74,7 @@ def init(
 
       canshaper init  # tries it with the shipped forwarder.dbc
     """
+    from canshaper.cli.interview.first import FIRST_MAX_PCT
     from canshaper.cli.interview.first_file import first_deployment
 
     draft = file.with_name(f"{file.stem}.draft.yaml")
@@ -100,7 +103,12 @@ def init(
         if eds:
             _write_dbc(own, nodes)
         _write(file, draft, first_deployment(replace(machine, notes=notes)))
-    echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed.")
+    reduced = f"at reduced speed (max_pct: {FIRST_MAX_PCT})"
+    echo(f"\nWritten: {file}, with {len(machine.axes)} axes {reduced}.")
+    if machine.motion:
+        echo("Two-axis motion is off until the step motion of commission is done.")
+    if assumed := [key for axis in machine.axes for key in axis.assumed()]:
+        echo(f"Assumed until someone measures or types them: {', '.join(assumed)}.")
     for note in notes:
         echo(f"  {note}")
     if writes:

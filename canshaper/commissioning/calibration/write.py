@@ -1,5 +1,6 @@
 """A measured valve curve in the file."""
 
+from canshaper.commissioning.assumed import confirm
 from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.config.origin import note, written_by
 from canshaper.edit.edit import set_values
@@ -74,3 +75,4 @@ def write_curve(deployment: Deployment, axis: str, result: Calibration, *, simul
         "curve_origin": written_by("calibrate", simulated=simulated),
     }
     set_values(deployment.path, ("axes", axis, "limits"), values, note("calibrate"))
+    confirm(deployment.path, (f"axes.{axis}.limits.{key}" for key in values))

@@ -5,6 +5,7 @@ import statistics
 from collections.abc import Sequence
 from typing import Any
 
+from canshaper.commissioning.assumed import confirm
 from canshaper.commissioning.identification.decay import Value
 from canshaper.commissioning.identification.recommend import Advice, advise, flow
 from canshaper.commissioning.identification.series import Kind
@@ -172,4 +173,6 @@ def write_sway(
         values: dict[str, FileValue] = {**dict.fromkeys(sorted(gone)), **one.sway}
         values["origin"] = origin
         set_values(deployment.path, ("axes", one.axis, "sway"), values, note("identify"))
+        same = {"full_speed_m_s"} if sway.full_speed_m_s == one.sway["full_speed_m_s"] else set()
+        confirm(deployment.path, (f"axes.{one.axis}.sway.{k}" for k in values.keys() - same))
     return [one.axis for one in usable]

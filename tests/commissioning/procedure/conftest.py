@@ -22,7 +22,14 @@ def described(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def machine(described: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def machine(first_day: Path) -> Path:
+    """Its two-axis motion is on, as after the first motion."""
+    first_day.write_text(first_day.read_text().replace("    waits: true\n", ""))
+    return first_day
+
+
+@pytest.fixture
+def first_day(described: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for path in described.iterdir():
         shutil.copy(path, tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -221,3 +221,13 @@ def test_where_the_old_controller_may_move_the_crane_the_person_is_warned(
     for task in bench.tasks:
         assert "the controller of before moves the crane wherever it is connected" in task.words
         assert "Nothing has to move" not in task.words
+
+
+@pytest.mark.slow
+def test_two_axis_motion_begins_after_the_first_motion(first_day: Path) -> None:
+    assert load_deployment(first_day).motions == {}
+    one = Procedure(Files(first_day), Otherwise(lambda t: t), load_deployment, STEPS, first_day)
+    proposal = one.run(one.step("motion"))
+    assert "-    waits: true" in proposal.diff
+    one.accept(proposal)
+    assert {*load_deployment(first_day).motions} == {"crane"}

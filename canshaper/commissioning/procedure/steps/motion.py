@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from statistics import fmean
 
@@ -11,7 +12,10 @@ from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.check import FIRST_PCT, MOTION
 from canshaper.commissioning.procedure.steps.dry import PAUSE_S, ends, figure, show_states
 from canshaper.commissioning.procedure.traffic import AxisTraffic, read_traffic
+from canshaper.config.source import Source
+from canshaper.edit.edit import set_values
 from canshaper.errors import UsageError
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.strokes import Script, Stroke
 
 LEVEL = 0.4  # of full deflection
@@ -70,8 +74,18 @@ def run(context: Context) -> Outcome:
         outcome.sheet.print(f"enable let go in motion: neutral after {slowest_s:.3f} s")
     if not context.bench.simulated:
         outcome.sheet.print("Accept it only if each axis moved, and in its right direction.")
+    data = Source(deployment.path).data.get("motion", {})
+    if names := [name for name, motion in data.items() if motion.get("waits")]:
+        outcome.sheet.print(f"Two-axis motion begins with the next step: {', '.join(names)}")
+        outcome.edit = partial(_begin, names=names)
     outcome.figures[""] = lambda: figure(traffic, "First motion, at reduced speed")
     return outcome
+
+
+def _begin(deployment: Deployment, names: list[str]) -> list[str]:
+    for name in names:
+        set_values(deployment.path, ("motion", name), {"waits": None})
+    return []
 
 
 def _follows(axis: AxisTraffic) -> bool:
@@ -123,5 +137,6 @@ FIRST_MOTION = Step(
     "first motion at reduced speed: each valve follows its joystick, and is neutral when the"
     " enable is let go",
     run,
+    writes="`motion` without `waits`",
     needs=("valve", "filter"),
 )

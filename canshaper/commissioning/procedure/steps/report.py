@@ -3,6 +3,7 @@
 from datetime import datetime
 from pathlib import Path
 
+from canshaper.commissioning.assumed import MEASURE, origins
 from canshaper.commissioning.procedure.files import shown
 from canshaper.commissioning.procedure.pictures import embedded
 from canshaper.commissioning.procedure.state import (
@@ -31,7 +32,12 @@ def run(context: Context) -> Outcome:
     undone = [name for name, one in steps.items() if one.status is not Status.DONE]
     if undone:
         outcome.sheet.print(f"NOTE: not done: {', '.join(undone)}; the report says so")
-    outcome.sheet.print(f"Report: {path}, to print and sign")
+    assumed = context.deployment.config.assumed
+    if assumed:
+        text = f"NOT FIT TO SIGN: a guess decides about movement: {', '.join(assumed)}; {MEASURE}"
+        outcome.sheet.print(text)
+    fit = "" if assumed or undone else ", fit to sign"
+    outcome.sheet.print(f"Report: {path}, to print{fit}")
     return outcome
 
 
@@ -54,7 +60,12 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     for name, one in steps.items():
         done = one.status is Status.DONE
         summary.add_row(name, _standing(one) if done else one.status.value, one.at, one.version)
-    parts = [html.table(summary)]
+    if assumed := deployment.config.assumed:
+        facts.insert(0, ("NOT FIT TO SIGN", f"assumed, not measured: {', '.join(assumed)}"))
+    numbers = new_table("number", "is", "by", title="Origins")
+    for row in origins(deployment.config):
+        numbers.add_row(*row)
+    parts = [html.table(summary), html.table(numbers)]
     for name, one in steps.items():
         parts += _step(name, one, folder)
     return html.document(title, facts, parts)
