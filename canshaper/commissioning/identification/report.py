@@ -11,7 +11,7 @@ from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.config.limits import Sway
 from canshaper.config.origin import note
-from canshaper.edit.edit import FileValue, set_values
+from canshaper.edit.edit import Change, FileValue, change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
@@ -165,11 +165,13 @@ def write_sway(
                 f"axis {one.axis}: with sway: {flow(one.sway)}, limits.stop_distance_m: {fault};"
                 " change the limits first"
             )
+    changes: list[Change] = []
     for one in usable:
         sway = deployment.axes[one.axis].config.sway
         assert sway is not None
         gone = sway.model_dump(exclude_none=True).keys() - one.sway.keys()
         values: dict[str, FileValue] = {**dict.fromkeys(sorted(gone)), **one.sway}
         values["origin"] = origin
-        set_values(deployment.path, ("axes", one.axis, "sway"), values, note("identify"))
+        changes.append((("axes", one.axis, "sway"), values, note("identify")))
+    change(deployment.path, changes)
     return [one.axis for one in usable]
