@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.daemon import realtime
 from canshaper.daemon.realtime import Collector
 
 pytestmark = pytest.mark.processes
@@ -184,3 +185,36 @@ def test_a_refusal_of_the_kernel_is_reported() -> None:
     said, locked, _size = lock(drop)
     assert said == "Cannot allocate memory"
     assert locked == 0
+
+
+# -- priority and rights ---------------------------------------------------------------------------
+
+
+def in_a_process(code: str) -> str:
+    """What a program prints, with its log."""
+    code = (
+        "import logging, os; logging.basicConfig()\nfrom canshaper.daemon.realtime import *\n"
+        + code
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=ANSWER_S)
+    return done.stdout + done.stderr
+
+
+def test_what_the_loop_does_not_need_of_roots_rights_is_given_up() -> None:
+    status = in_a_process("drop_capabilities(); print(open('/proc/self/status').read())")
+    fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
+    needed = sum(1 << one for one in realtime.NEEDED)
+    assert int(fields["CapEff"], 16) == int(fields["CapPrm"], 16)
+    assert int(fields["CapEff"], 16) & ~needed == 0
+    if os.geteuid() == 0:
+        assert int(fields["CapEff"], 16) & 1 << realtime.CAP_DAC_OVERRIDE
+
+
+def test_the_priority_is_that_of_the_loop_alone_or_the_log_says_why() -> None:
+    code = "take_priority(PRIORITY); print('policy', os.sched_getscheduler(0))"
+    allowed = f"policy {os.SCHED_FIFO | os.SCHED_RESET_ON_FORK}\n"
+    refused = "priority=ordinary (Operation not permitted)"
+    text = in_a_process(code.replace("PRIORITY", "1"))
+    assert allowed in text or refused in text
+    assert "priority=ordinary (Invalid argument)" in in_a_process(code.replace("PRIORITY", "1000"))
