@@ -172,7 +172,8 @@ class Daemon:
             self._line.check(now_ns, neutral=controller.neutral)
         if self._control:
             self._control.serve(self._answer, now_ns)
-        if self._reporter.status(now_ns):
+        trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
+        if self._reporter.status(now_ns, trouble):
             for name, port in self._ports.items():
                 if news := port.look():
                     log.warning("bus=%s %s", name, news)

@@ -76,8 +76,13 @@ class Reporter:
         """Take the lateness of a tick."""
         self._latest_ns = max(self._latest_ns, late_ns)
 
-    def status(self, now_ns: int) -> bool:
-        """Renew the service manager's line once a second; whether it was time."""
+    def status(self, now_ns: int, trouble: list[str]) -> bool:
+        """Renew the service manager's line once a second; whether it was time.
+
+        Args:
+            now_ns: time of the tick.
+            trouble: what stands first in it.
+        """
         if now_ns < self._status_ns:
             return False
         self._status_ns = now_ns + SECOND_NS
@@ -85,7 +90,7 @@ class Reporter:
             if port.waited != self._waited[name]:
                 self._waited[name] = port.waited
                 log.warning("bus=%s waited=%d: valve frames, in a queue", name, port.waited)
-        self._manager.status(self._summary())
+        self._manager.status(self._summary(trouble))
         self._latest_ns = 0
         return True
 
@@ -113,14 +118,14 @@ class Reporter:
         for place, fault in unfit(deployment.config):
             log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
 
-    def _summary(self) -> str:
+    def _summary(self, trouble: list[str]) -> str:
         """Axes, buses, lateness of the last second, deadlines missed."""
         axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
         buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
         late = f"late {self._latest_ns / 1000:.0f} us"
         missed = self._controller.counters.values["MissedDeadlines"]
         first = ["listen-only"] if self._controller.deployment.listen_only else []
-        return ", ".join([*first, *axes, *buses, late, f"missed {missed}"])
+        return ", ".join([*trouble, *first, *axes, *buses, late, f"missed {missed}"])
 
 
 def flush() -> None:
