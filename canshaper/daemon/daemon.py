@@ -2,6 +2,7 @@
 
 import logging
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -173,6 +174,7 @@ class Daemon:
         if self._control:
             self._control.serve(self._answer, now_ns)
         trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
+        trouble += ["tick plain"] if self._follower and not self._follower.follows else []
         if self._reporter.status(now_ns, trouble):
             for name, port in self._ports.items():
                 if news := port.look():
@@ -184,7 +186,9 @@ class Daemon:
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
         """Answer one request from the control socket."""
         values = request.get("set", {})
-        if request.keys() - {"set", "black_box"} or not isinstance(values, dict):
+        if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
+            peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
+        if request.keys() - {"set", "black_box", "by"} or not isinstance(values, dict):
             expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
             raise ValueError(f"expected {expected}, got another object")
         if "black_box" in request:
