@@ -79,8 +79,7 @@ def drop_capabilities() -> None:
     permitted = int(status.partition("CapPrm:")[2].split()[0], 16)
     kept = permitted & sum(1 << one for one in NEEDED)
     header = (ctypes.c_uint32 * 2)(CAPABILITY_VERSION_3, 0)
-    low, high = kept & 0xFFFFFFFF, kept >> 32
-    ctypes.CDLL(None).capset(header, (ctypes.c_uint32 * 6)(low, low, 0, high, high, 0))
+    ctypes.CDLL(None).capset(header, (ctypes.c_uint32 * 6)(kept, kept))
 
 
 def lock_memory() -> str | None:

@@ -1,6 +1,6 @@
 """The daemon and its buses: one that fails, one of another device, and the last frames on it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +9,7 @@ import pytest
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.ports import seen_sent
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import BUS, Bench, FakePort, at
@@ -122,6 +123,24 @@ def test_the_last_words_are_what_is_known_of_the_last_frames(
     at(bench, {})
     assert any(f"started file={bench.file}" in one and f"valves={said}" in one for one in log())
     assert log()[-1] == f"INFO stopped valves={said}"
+
+
+def test_what_comes_while_the_last_frames_are_waited_for_is_received() -> None:
+    class Confirming(FakePort):
+        def __init__(self) -> None:
+            self.frames_left = [Frame("crane", 0x201, False, b""), None, None]
+
+        @property
+        def confirmed(self) -> bool:  # type: ignore[override]
+            return not self.frames_left
+
+        def background(self) -> Iterator[Frame]:
+            if (frame := self.frames_left.pop(0)) is not None:
+                yield frame
+
+    received: list[Frame] = []
+    assert seen_sent([Confirming()], received.append) == "neutral"
+    assert [frame.can_id for frame in received] == [0x201]
 
 
 def test_a_bus_that_changes_all_the_time_does_not_flood_the_log(

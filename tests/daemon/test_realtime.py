@@ -8,6 +8,7 @@ import sys
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -190,31 +191,51 @@ def test_a_refusal_of_the_kernel_is_reported() -> None:
 # -- priority and rights ---------------------------------------------------------------------------
 
 
-def in_a_process(code: str) -> str:
-    """What a program prints, with its log."""
-    code = (
-        "import logging, os; logging.basicConfig()\nfrom canshaper.daemon.realtime import *\n"
-        + code
-    )
+class Library:
+    """Keeps what the kernel would be asked for."""
+
+    def capset(self, header: Any, data: Any) -> None:
+        self.header, self.data = [*header], [*data]
+
+
+def test_what_the_loop_does_not_need_of_roots_rights_is_given_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    library = Library()
+    monkeypatch.setattr(realtime.ctypes, "CDLL", lambda _name: library)
+    realtime.drop_capabilities()
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    permitted = int(status.partition("CapPrm:")[2].split()[0], 16)
+    kept = permitted & sum(1 << one for one in realtime.NEEDED)
+    assert library.header == [0x20080522, 0]
+    assert library.data == [kept, kept, 0, 0, 0, 0]
+
+
+def test_the_kernel_takes_them() -> None:
+    code = "from canshaper.daemon.realtime import *; drop_capabilities()"
+    code += "; print(open('/proc/self/status').read())"
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=ANSWER_S)
-    return done.stdout + done.stderr
+    fields = dict(line.split(":", 1) for line in done.stdout.splitlines() if ":" in line)
+    assert fields["CapEff"] == fields["CapPrm"]
+    assert int(fields["CapEff"], 16) & ~sum(1 << one for one in realtime.NEEDED) == 0
 
 
-def test_what_the_loop_does_not_need_of_roots_rights_is_given_up() -> None:
-    status = in_a_process("drop_capabilities(); print(open('/proc/self/status').read())")
-    fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
-    needed = sum(1 << one for one in realtime.NEEDED)
-    assert int(fields["CapEff"], 16) == int(fields["CapPrm"], 16)
-    assert int(fields["CapEff"], 16) & ~needed == 0
-    if os.geteuid() == 0:
-        assert int(fields["CapEff"], 16) & 1 << realtime.CAP_DAC_OVERRIDE
+def test_the_priority_is_that_of_the_loop_alone_or_the_log_says_why(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    taken: list[tuple[int, int, int]] = []
+    monkeypatch.setattr(
+        realtime.os,
+        "sched_setscheduler",
+        lambda *one: taken.append((*one[:2], one[2].sched_priority)),
+    )
+    realtime.take_priority(40)
+    assert taken == [(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 40)]
 
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
 
-def test_the_priority_is_that_of_the_loop_alone_or_the_log_says_why() -> None:
-    code = "take_priority(PRIORITY); print('policy', os.sched_getscheduler(0))"
-    allowed = f"policy {os.SCHED_FIFO | os.SCHED_RESET_ON_FORK}\n"
-    refused = "priority=ordinary (Operation not permitted)"
-    text = in_a_process(code.replace("PRIORITY", "1"))
-    assert allowed in text or refused in text
-    assert "priority=ordinary (Invalid argument)" in in_a_process(code.replace("PRIORITY", "1000"))
+    monkeypatch.setattr(realtime.os, "sched_setscheduler", refuse)
+    realtime.take_priority(40)
+    assert caplog.messages == ["priority=ordinary (Operation not permitted)"]
