@@ -164,11 +164,6 @@ CLASS_CONTROLLER, CLASS_BUS_OFF, CLASS_RESTARTED = 0x4, 0x40, 0x100
 OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 
 
-def restarted(word: int) -> bool:
-    """Whether an error frame says that the controller is on the bus again after bus-off."""
-    return bool(word & CLASS_RESTARTED)
-
-
 def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
     """Return the fault to count, and the state of the bus; None where the frame does not say.
 
@@ -181,6 +176,6 @@ def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
         return FrameFault.BUS_OFF, BusState.BUS_OFF
     if controller & PASSIVE:
         return FrameFault.BUS_PASSIVE, BusState.PASSIVE
-    if restarted(word) or controller & (ACTIVE | WARNING):  # less than passive
+    if word & CLASS_RESTARTED or controller & (ACTIVE | WARNING):  # less than passive
         return FrameFault.ERROR_FRAME, BusState.UP
     return FrameFault.FRAMES_LOST if controller & OVERFLOW else FrameFault.ERROR_FRAME, None

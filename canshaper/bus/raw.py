@@ -16,6 +16,7 @@ from canshaper.bus.packet import (
     ANCILLARY_BYTES,
     BRS,
     CAN_FRAME,
+    CLASS_RESTARTED,
     FD_FRAME,
     FD_SIZE,
     FDF,
@@ -26,7 +27,6 @@ from canshaper.bus.packet import (
     frame_of,
     kernel_ids,
     read_error,
-    restarted,
 )
 from canshaper.bus.socketcan import (
     ERROR_CLASSES,
@@ -210,7 +210,7 @@ class RawPort:
             self._block(state)
         elif state is UP:
             # Without an echo nothing else says so, and what is sent before that is dropped.
-            if self._confirms or self.state is not BusState.BUS_OFF or restarted(word):
+            if self._confirms or self.state is not BusState.BUS_OFF or word & CLASS_RESTARTED:
                 self._up()
         elif state is not None and self.state is self._good:
             self.state = state
