@@ -123,7 +123,7 @@ def test_what_is_not_allowed_changes_nothing(machine: Machine) -> None:
 
 
 @pytest.mark.slow
-def test_only_who_has_the_address_changes_and_the_journal_names_him(
+def test_only_who_has_the_address_changes_and_the_log_names_the_person(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Other users of the PC reach the port too."""
