@@ -38,6 +38,7 @@ LISTED: Mapping[str, str] = {
     "tests/closed_loop/test_sway_sensor_slewing.py::test_a_slew_is_damped": "with a sensor",
     "tests/closed_loop/test_twin.py::test_both_axes_at_fourteen": "a crane that shares no code",
     "tests/commissioning/identification/test_identify_command.py::test_empty_and_loaded": "swings",
+    "tests/commissioning/test_killed_writers.py::test_killed_at_any_call": "never half a file",
     "tests/commissioning/procedure/test_commission.py::test_answers_come_from_a_file": "the whole",
     "tests/controller/test_any_frames.py": "whatever frames come, nothing moves unasked",
     "tests/docs/test_commands.py::test_a_page_shows_what_the_command_prints[README": "read first",

@@ -130,15 +130,22 @@ ROWS = (
     Row("SEND_FAILED", "send queue full", "hil/test_interface_faults::full_queue", "tick"),
     Row(
         "NOT_CONFIRMED",
-        "bus blocked, nothing more is queued; only where the driver confirms what is on the wire,"
-        " which the kernel's slcan does not",
-        "hil/test_interface_faults::piled_up",
+        "bus blocked, nothing more is queued; where the driver confirms nothing (slcan) no valve is"
+        " driven, but for `unconfirmed: true`",
+        "hil/test_interface_faults::piled_up hil/test_lying_buses::by_consent_only",
         "fourth frame of a valve, 20 ms or more",
         TRIP,
     ),
     Row("BUS_DOWN", "", "hil/test_daemon::down_and_up", "tick", TRIP),
     Row("BUS_GONE", "", "hil/test_interface_faults::removed_and_back", "tick", TRIP),
-    Row("BUS_OFF", "", "hil/test_interface_faults::bus_off", "tick", TRIP),
+    Row(
+        "BUS_OFF",
+        "by slcan until its controller restarts or it was down; no carrier is the same, a second"
+        " later",
+        "hil/test_interface_faults::bus_off hil/test_lying_buses::bus_off_without_echo",
+        "tick",
+        TRIP,
+    ),
     Row(
         "BUS_WRONG_DEVICE",
         "with `match`; and silence, nothing is received",
@@ -170,8 +177,10 @@ ROWS = (
     ),
     Row(
         "R5",
-        "another device than `match` at the start: exit code 3, systemd tries again",
-        "hil/test_device::at_the_start systemd/test_device",
+        "bus missing, unfit (back without CAN FD) or another device than `match`: the service waits"
+        " at the start; by hand exit code 3",
+        "hil/test_device::at_the_start systemd/test_device hil/test_lying_buses::service_waits"
+        " hil/test_lying_buses::without_can_fd",
         reaction=SILENCE,
     ),
     Row(
@@ -218,8 +227,8 @@ ROWS = (
     ),
     Row(
         "R12",
-        "flood of foreign frames: sockets of their own",
-        "hil/test_faults::flood",
+        "flood of foreign frames: sockets of their own; of error frames: left to the kernel",
+        "hil/test_faults::flood hil/test_lying_buses::flood",
         reaction=NONE,
     ),
     Row("FRAMES_LOST", "a lost frame is a silent input", "bus/test_raw::run_over", reaction=NONE),

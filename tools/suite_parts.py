@@ -106,7 +106,7 @@ TOGETHER = "socketcan daemon closed_loop doctor"
 MACHINES = (
     "j1939 j1939_read canopen canopen_shipped canfd calibrate gateway gateway_rules commission"
 )
-FAULTS = "faults process_faults interface_faults"
+FAULTS = "faults process_faults interface_faults lying_buses"
 
 
 def rows_of_test() -> list[list[Part]]:
@@ -115,7 +115,7 @@ def rows_of_test() -> list[list[Part]]:
     repeatable = "--hypothesis-profile=repeatable"
     fast = pytest(*SPREAD, "--budget", repeatable, "-m", "not slow and not study")
     few = browser("--budget", "-m", "not slow")
-    kernel = hil("socketcan daemon", "-m", "not slow")
+    kernel = hil("socketcan daemon lying_buses", "-m", "not slow")
     return [
         [Part("lint", "style and format", style)],
         [Part("fast", "all tests of less than a second of a processor", [fast])],

@@ -101,7 +101,8 @@ def _checked(header: dict[str, Any]) -> dict[str, Any]:
     Raises:
         ValueError, KeyError, TypeError: it is not.
     """
-    names = {key: [str(one) for one in header[key]] for key in ("buses", "identity")}
+    header.setdefault("carried", [])  # of an older program
+    names = {key: [str(one) for one in header[key]] for key in ("buses", "identity", "carried")}
     numbers = {key: int(header[key]) for key in ("time_ns", "clock_ns")}
     listens = bool(header["listen_only"])
     return {**names, **numbers, "listen_only": listens, "why": str(header["why"])}

@@ -1,20 +1,23 @@
 """Keeps the black box of a daemon, and writes it to a file after a trip or when it is asked for.
 
-The file is written by a process of its own, begun while every axis is neutral: that costs the loop
-about a millisecond, and the disk costs it nothing.
+The file is written by a process of its own: that costs the loop about a millisecond, and the disk
+costs it nothing. It is written at once, then again with what came after the trip; until then the
+first one stays, whatever becomes of the daemon.
 """
 
+import errno
 import logging
 import os
+import signal
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from canshaper.blackbox.recorder import Recorder
 from canshaper.blackbox.ring import Ring, Segment
 from canshaper.blackbox.state import States
-from canshaper.blackbox.write import write_box
+from canshaper.blackbox.write import last_number, write_box
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
@@ -30,17 +33,35 @@ STATE_NS = 10_000_000_000
 SHORT_TICK_MS = 5
 # How long after a trip the recording goes on.
 AFTER_NS = 5_000_000_000
-# A machine that trips again and again writes one file a minute, with all of them in it.
-BETWEEN_NS = 60_000_000_000
+# A machine that trips again and again has one file for so long, with all of them in it, and begins
+# to write it no more often than that.
+BETWEEN_NS = 30_000_000_000
+LEAST_NS = 250_000_000
+# How often a file that could not be written is tried again.
+RETRY_NS = 5_000_000_000
+NEVER_NS = 1 << 63
 STOPPED = frozenset((State.TRIPPED, State.STOPPING))
 NO_FOLDER = "no folder for black boxes: see canshaper run --black-box"
+
+
+class Kept(NamedTuple):
+    """Content of one file."""
+
+    deployment: Deployment
+    number: int
+    why: str
+    segments: tuple[Segment, ...]
+    at_ns: int
 
 
 class BlackBox:
     """The black box of a daemon.
 
     Args:
-        folder: where files are written; None for nowhere.
+        folder: where files are written, made where it is not there; None for nowhere.
+
+    Attributes:
+        fault: why the last file could not be written, until it is.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -51,13 +72,24 @@ class BlackBox:
         self._states: States | None = None
         self._short = False
         self._next_ns = 0  # when the next state is due
+        self._now_ns = 0
+        self._number = 0  # of the newest file
+        self._begun_ns = 0  # what is in it as the first
         self._why = ""  # what happened, and is to be written
-        self._due_ns = 0
-        self._not_before_ns = 0
-        self._frozen: tuple[Segment, ...] = ()  # to be written when every axis is neutral
-        self._frozen_why = ""
+        self._due_ns = NEVER_NS  # when the file is written next
+        self._last_ns = 0  # and for the last time
+        self._least_ns = 0  # not before that
+        self._kept: Kept | None = None  # what is written now, or could not be
         self._writer = 0  # process
-        self._done, self._fault = 0, ""
+        self._done, self.fault = 0, ""
+        self._logged = 0  # number
+        if folder:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                if not os.access(folder, os.W_OK):
+                    raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            except OSError as error:
+                self._log_fault(error.errno or 1)
 
     def around(self, guarded: Guarded, controller: Controller) -> Recorder:
         """Return a recorder of all calls to a controller and their results; ``begin`` starts it."""
@@ -65,7 +97,7 @@ class BlackBox:
         self._flush()
         self._ring.pause()
         if self._deployment and self._deployment.identity != deployment.identity:
-            self._freeze()
+            self._finish()
             self._ring.clear()  # its frames would be read with the wrong files
         self._deployment, self._states = deployment, None
         self._short = deployment.config.tick_ms < SHORT_TICK_MS
@@ -73,6 +105,8 @@ class BlackBox:
             self._states = States(guarded, controller)
         except StateError as error:  # of a filter of another package
             log.warning("black-box=none %s", error)
+        if self._folder:
+            self._number = max(self._number, last_number(self._folder, deployment.path.stem))
         self._recorder = Recorder(guarded, controller, self._ring)
         return self._recorder
 
@@ -90,50 +124,62 @@ class BlackBox:
             neutral: whether every axis is.
         """
         self._flush()
+        self._now_ns = now_ns
         for event in events:
-            if isinstance(event, StateEvent) and event.transition.new in STOPPED and not self._why:
-                self._why = event.text
-                self._due_ns = max(now_ns + AFTER_NS, self._not_before_ns)
-        if self._why and now_ns >= self._due_ns:
-            self._not_before_ns = now_ns + BETWEEN_NS
-            self._freeze()
-            self._keep_state(now_ns, follows=True)
-        elif now_ns >= self._next_ns and (neutral or not self._short or self._ring.cut_off):
+            if isinstance(event, StateEvent) and event.transition.new in STOPPED:
+                self._happened(event.text, now_ns + AFTER_NS)
+        if now_ns >= self._next_ns and (neutral or not self._short or self._ring.cut_off):
             self._keep_state(now_ns, follows=True)
         if self._writer:
-            self._look_after_writer()
-        elif self._frozen and neutral:
-            self._start_writer()
+            self._look_after_writer(now_ns)
+        elif now_ns >= self._due_ns:
+            self._start_writer(now_ns)
+
+    def _happened(self, why: str, last_ns: int) -> None:
+        """Have a file written now, and again at a later time."""
+        if not self._folder or not self._ring.segments:
+            return
+        now_ns = self._now_ns
+        if not self._why or now_ns >= self._begun_ns + BETWEEN_NS:
+            self._number += 1
+            self._why, self._begun_ns = why, now_ns
+        self._last_ns = last_ns
+        if not (self.fault and self._kept):  # which comes first
+            self._due_ns = min(self._due_ns, max(now_ns, self._least_ns))
 
     def request(self) -> None:
-        """Have a file written as soon as every axis is neutral.
+        """Have a file written.
 
         Raises:
             ValueError: there is nowhere to write one.
         """
         if self._folder is None:
             raise ValueError(NO_FOLDER)
-        if not self._frozen and not self._writer:
-            self._why, self._due_ns = self._why or "requested", 0
+        self._happened("requested", self._last_ns)
 
     def report(self) -> dict[str, object]:
         """How many files were tried to be written, and what was wrong with the last one."""
-        waits = bool(self._frozen or self._writer or self._why)
-        return {"tried": self._done, "fault": self._fault, "folder": str(self._folder or ""),
+        waits = bool(self._writer or self._due_ns != NEVER_NS)
+        return {"tried": self._done, "fault": self.fault, "folder": str(self._folder or ""),
                 "waits": waits}  # fmt: skip
 
     def failed(self, why: str) -> None:
         """Note a failure of the program: what is recorded so far is written at the end."""
-        self._why = why
+        self._happened(why, 0)
 
     def close(self) -> None:
         """End with the daemon: write now what is to be written; every valve is neutral."""
         self._flush()
+        self._finish()
+
+    def _finish(self) -> None:
+        """Write to the end what is to be written, of a machine in neutral."""
         if self._writer:
-            self._ended(os.waitpid(self._writer, 0)[1])
-        self._freeze()
-        if self._frozen:
-            self._ended(_exit_status(self._write()))
+            self._ended(os.waitpid(self._writer, 0)[1], NEVER_NS)
+        if self._due_ns != NEVER_NS:
+            self._keep()
+            self._ended(self._write() << 8, NEVER_NS)
+        self._kept, self._due_ns, self._why = None, NEVER_NS, ""
 
     def _flush(self) -> None:
         if self._recorder is not None:
@@ -148,36 +194,44 @@ class BlackBox:
         except StateError as error:
             self._states = None
             self._ring.clear()
+            self._due_ns = NEVER_NS
             log.warning("black-box=none %s", error)
             return
         self._ring.begin(state, now_ns, follows=follows)
 
-    def _freeze(self) -> None:
-        """Put aside what there is, where something has happened."""
-        if self._why and not self._frozen and not self._writer and self._folder:
-            self._frozen_why = self._why
-            self._frozen = self._ring.segments
-            for segment in self._frozen:
+    def _keep(self) -> None:
+        """Put aside what there is, where nothing else waits to be written."""
+        segments = self._ring.segments
+        if self._kept is None:
+            assert self._deployment is not None
+            if segments[0].begin_ns > self._begun_ns:  # the file has more than there is now
+                self._number += 1
+                self._begun_ns = self._now_ns
+            self._kept = Kept(self._deployment, self._number, self._why, segments, self._now_ns)
+            for segment in segments:
                 segment.held = True
-        self._why = ""
 
     # -- the writer ----------------------------------------------------------------------------
 
     def _write(self) -> int:
         """Write what was put aside; an error number, 0 for none."""
         assert self._folder is not None
-        assert self._deployment is not None
+        assert self._kept is not None
+        deployment, number, why, segments, _ = self._kept
         try:
-            write_box(self._folder, self._deployment, self._frozen, self._frozen_why)
+            write_box(self._folder, deployment, segments, why, number)
         except OSError as error:
             return error.errno or 1
         return 0
 
-    def _start_writer(self) -> None:
+    def _start_writer(self, now_ns: int) -> None:
+        self._keep()
+        self._least_ns = now_ns + LEAST_NS
+        self._due_ns = self._last_ns if now_ns < self._last_ns else NEVER_NS
         try:
             self._writer = os.fork()
         except OSError as error:
-            self._ended(_exit_status(error.errno or 1))
+            self._ended((error.errno or 1) << 8, now_ns)
             return
         if self._writer == 0:
             self._as_writer()
@@ -185,28 +239,41 @@ class BlackBox:
     def _as_writer(self) -> NoReturn:
         status = 1
         try:
+            for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+                signal.signal(number, signal.SIG_IGN)  # they are the daemon's
             with suppress(OSError):  # with the loop's priority it could keep it from the processor
                 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
             status = self._write()
         finally:
             os._exit(status)
 
-    def _look_after_writer(self) -> None:
+    def _look_after_writer(self, now_ns: int) -> None:
         done, status = os.waitpid(self._writer, os.WNOHANG)
         if done:
-            self._ended(status)
+            self._ended(status, now_ns)
 
-    def _ended(self, status: int) -> None:
-        self._writer, self._frozen = 0, ()
+    def _ended(self, status: int, now_ns: int) -> None:
+        assert self._kept is not None
+        self._writer = 0
         self._done += 1
-        number = os.waitstatus_to_exitcode(status)
-        self._fault = os.strerror(number) if number > 0 else "killed" if number else ""
-        if self._fault:
-            log.error("black-box=not-written folder=%s %s", self._folder, self._fault)
-        else:
-            log.warning("black-box=written folder=%s %s", self._folder, self._frozen_why)
+        if number := os.waitstatus_to_exitcode(status):
+            self._log_fault(number)
+            self._due_ns = now_ns + RETRY_NS
+            return
+        for segment in self._kept.segments:
+            segment.held = False
+        if self.fault:  # what came meanwhile is next, and what came after it while it is there
+            newer = self._last_ns - AFTER_NS > self._kept.at_ns
+            there = any(one.begin_ns <= self._begun_ns for one in self._ring.segments)
+            self._due_ns = min(self._due_ns, now_ns) if newer or there else NEVER_NS
+        if self._kept.number != self._logged:
+            self._logged = self._kept.number
+            log.warning("black-box=written folder=%s %s", self._folder, self._kept.why)
+        self._kept, self.fault = None, ""
 
-
-def _exit_status(number: int) -> int:
-    """The status that waitpid gives for a process that ended with this number."""
-    return number << 8
+    def _log_fault(self, number: int) -> None:
+        """Log why a file cannot be written, once."""
+        fault = os.strerror(number) if number > 0 else "killed"
+        if fault != self.fault:
+            log.error("black-box=not-written folder=%s %s", self._folder, fault)
+        self.fault = fault

@@ -1,12 +1,15 @@
 """Writes a black box as a bundle: with the deployment file and its DBC files."""
 
+import errno
 import json
 import os
 import platform
 import re
 import time
+import zlib
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -23,31 +26,66 @@ MOST_FILES = 20
 PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpack", "crccheck")
 
 
-def write_box(folder: Path, deployment: Deployment, segments: Iterable[Segment], why: str) -> Path:
+def last_number(folder: Path, stem: str) -> int:
+    """Number of the newest black box of a deployment in a folder; 0 where there is none."""
+    try:
+        return max(_numbered(folder, stem), default=0)
+    except OSError:
+        return 0
+
+
+def _numbered(folder: Path, stem: str) -> dict[int, Path]:
+    numbered = re.compile(rf"{re.escape(stem)}-(\d+)\.zip")
+    return {int(m[1]): p for p in folder.iterdir() if (m := numbered.fullmatch(p.name))}
+
+
+def write_box(
+    folder: Path, deployment: Deployment, segments: Iterable[Segment], why: str, number: int
+) -> Path:
     """Write a black box into a folder, and remove the oldest where there are too many.
 
-    It is on the disk when this returns: who turns the key off next does not lose it.
+    It is on the disk when this returns: who turns the key off next does not lose it. Until then a
+    file with its number stays. On a full disk the oldest ones make room.
 
     Args:
-        folder: it has to be there.
+        folder: made where it is not there.
         deployment: whose black box it is.
         segments: what there is.
         why: it is written.
+        number: of the file.
 
     Raises:
         OSError: it cannot be written.
     """
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = deployment.path.stem
+    path = folder / f"{stem}-{number:04d}.zip"
+    for part in folder.glob(f"{stem}-*.zip.part"):  # of a process that was killed
+        part.unlink(missing_ok=True)
+    old = sorted(_numbered(folder, stem).keys() - {number})
+    there = _numbered(folder, stem)
+    while True:
+        try:
+            _write(path, deployment, [*segments], why)
+            break
+        except OSError as error:
+            path.with_name(f"{path.name}.part").unlink(missing_ok=True)
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT) or not old:
+                raise
+            there[old.pop(0)].unlink()
+    for one in old[: max(0, len(old) + 1 - MOST_FILES)]:
+        there[one].unlink()
+    return path
+
+
+def _write(path: Path, deployment: Deployment, segments: list[Segment], why: str) -> None:
     import zipfile  # noqa: PLC0415  (the daemon has no need of it, the process that writes has)
 
-    stem = deployment.path.stem
-    numbered = re.compile(rf"{re.escape(stem)}-(\d+)\.zip")
-    there = {int(m[1]): p for p in folder.iterdir() if (m := numbered.fullmatch(p.name))}
-    path = folder / f"{stem}-{max(there, default=0) + 1:04d}.zip"
     part = path.with_name(path.name + ".part")
     inside, files = carried(deployment)
     about = about_of(deployment, inside, BOX) | {"why": why}
     with part.open("wb") as file:
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as bundle:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as bundle:
             with bundle.open(BOX, "w") as box:
                 for chunk in chunks(header_of(deployment, why), segments):
                     box.write(chunk)
@@ -57,9 +95,11 @@ def write_box(folder: Path, deployment: Deployment, segments: Iterable[Segment],
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)
-    for number in sorted(there)[: max(0, len(there) + 1 - MOST_FILES)]:
-        there[number].unlink()
-    return path
+    directory = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
 
 
 def header_of(deployment: Deployment, why: str) -> dict[str, Any]:
@@ -67,42 +107,51 @@ def header_of(deployment: Deployment, why: str) -> dict[str, Any]:
 
     Returns:
         ``buses``: their names by the numbers in the records; ``listen_only``; ``identity`` of
-        deployment and program; ``why`` it was written; ``clock_ns`` and ``time_ns``: now, by the
-        clock of the records and since 1970.
+        deployment and program; ``carried``: hashes of the files as they are in the bundle; ``why``
+        it was written; ``clock_ns`` and ``time_ns``: now, by the clock of the records and since
+        1970.
     """
     return {
         "buses": list(deployment.config.buses),
         "listen_only": deployment.listen_only,
         "identity": deployment.identity.lines(),
+        "carried": [
+            sha256(_text(deployment)[1].encode()).hexdigest(),
+            *deployment.identity.content,
+        ],
         "why": why,
         "clock_ns": boottime_ns(),
         "time_ns": time.time_ns(),
     }
 
 
-def carried(deployment: Deployment) -> tuple[str, dict[str, str | bytes]]:
-    """The files of a deployment for a bundle, so that the paths in them hold when it is unpacked.
+def carried(deployment: Deployment) -> tuple[str, dict[str, bytes]]:
+    """The files of a deployment, as they were loaded, so that their paths hold in a bundle.
 
     Returns:
         (name of the deployment file in the bundle, content of every file by its name there).
-
-    Raises:
-        OSError: a file cannot be read.
     """
+    names, text = _text(deployment)
+    packed = [file.packed for file in deployment.messages.files]
+    files = {n: zlib.decompress(p) for n, p in zip(names[1:], packed, strict=True)}
+    return names[0], files | {names[0]: text.encode()}
+
+
+def _text(deployment: Deployment) -> tuple[list[str], str]:
+    """Names in a bundle of the deployment file and its DBC files, and the text of the first."""
     file = deployment.path.resolve()
-    text = file.read_text(encoding="utf-8")
+    text = deployment.source.content.decode("utf-8")
     sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
     relative = [source for name, source in sources if not Path(name).is_absolute()]
     root = Path(os.path.commonpath([file.parent, *(source.parent for source in relative)]))
-    files: dict[str, str | bytes] = {}
+    names = [str(Path(FOLDER) / file.relative_to(root))]
     for name, source in sources:
         if Path(name).is_absolute():
-            files[str(Path(FOLDER) / OUTSIDE / source.name)] = source.read_bytes()
+            names.append(str(Path(FOLDER) / OUTSIDE / source.name))
             text = text.replace(name, os.path.relpath(root / OUTSIDE / source.name, file.parent))
         else:
-            files[str(Path(FOLDER) / source.relative_to(root))] = source.read_bytes()
-    inside = str(Path(FOLDER) / file.relative_to(root))
-    return inside, files | {inside: text}
+            names.append(str(Path(FOLDER) / source.relative_to(root)))
+    return names, text
 
 
 def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
 
 ROOT = Path("/")
+IFF_ECHO = 1 << 18  # linux/if.h: the driver hands a frame back once it is on the bus
 # linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
 GET_LINK = 18
 FD_MTU = 72  # linux/can.h, CANFD_MTU
@@ -147,6 +148,26 @@ def check_mtu(bus: Bus, root: Path = ROOT) -> None:
     if mtu is not None and mtu < FD_MTU:
         text = f"expected an interface with CAN FD, which has the MTU {FD_MTU}, got {mtu}"
         raise OSError(errno.EINVAL, text)
+
+
+def has_echo(name: str, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates) -> bool:
+    """Whether a frame of ours that comes back from an interface is on the bus.
+
+    Without an echo of the driver (slcan) the kernel hands it back as soon as it takes it, also in
+    bus-off. On a virtual bus both are the same. Where the kernel cannot be asked: no.
+    """
+    directory = root / "sys/class/net" / name
+    if (_number(directory / "flags") or 0) & IFF_ECHO:
+        return True
+    try:
+        return query_kernel(interface_index(name, root) or 0)[0] in ("vcan", "vxcan")
+    except OSError:
+        return False
+
+
+def interface_index(name: str, root: Path = ROOT) -> int | None:
+    """Number of the interface that has a name now; None where none has it."""
+    return _number(root / "sys/class/net" / name / "ifindex")
 
 
 def device_fault(bus: Bus, device: Device) -> str | None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Protocol
 
-from canshaper.bus.device import whereabouts
+from canshaper.bus.device import has_echo, whereabouts
 from canshaper.bus.python_can import PythonCanPort
 from canshaper.bus.raw import RawPort
 from canshaper.bus.socketcan import open_sockets
@@ -26,6 +26,10 @@ class Port(Protocol):
 
     name: str
     waited: int  # valve frames that were in the kernel's queue for longer than their cycle
+
+    @property
+    def why(self) -> str:
+        """Cause of a state that does not say it; else empty."""
 
     @property
     def state(self) -> BusState:
@@ -46,6 +50,13 @@ class Port(Protocol):
 
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; False when the frame did not go out."""
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether every valve frame that was sent is on the bus; None where nothing says so."""
+
+    def look(self) -> str:
+        """Look after the interface, once a second; what to say of it."""
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment: its name of the bus, its messages."""
@@ -87,6 +98,8 @@ def open_port(
             ids,
             on_fault,
             confirms=ids is not None,
+            echo=partial(has_echo, config.channel),
+            channel=config.channel,
             matched=config.match is not None,
             fd=fd if config.fd else None,
             brs=config.data_bitrate is not None,
@@ -126,6 +139,16 @@ class ListeningPort:
         return self._port.state
 
     @property
+    def why(self) -> str:
+        """Cause of the state."""
+        return self._port.why
+
+    @property
+    def confirmed(self) -> bool | None:
+        """No valve frame is sent."""
+        return None
+
+    @property
     def arrived_ns(self) -> int:
         """When the frame arrived that was just handed out."""
         return self._port.arrived_ns
@@ -141,6 +164,10 @@ class ListeningPort:
     def send(self, frame: Frame) -> bool:
         """Send a status; drop anything else, and return True for it."""
         return frame[1:3] not in self._sent or self._port.send(frame)
+
+    def look(self) -> str:
+        """Look after the interface."""
+        return self._port.look()
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment."""

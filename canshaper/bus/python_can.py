@@ -64,6 +64,8 @@ class PythonCanPort:
         self._fd, self._fd_bus = frozenset(fd), config.fd
         self._brs = config.data_bitrate is not None
         self.state = BusState.UP
+        self.why = ""
+        self.confirmed = None  # python-can does not say when a frame has left
         self.waited = 0  # what does not leave in time is dropped, see ``BusApart``
         self.arrived_ns = 0
         self._arrivals = Arrivals()  # before a frame can arrive
@@ -144,6 +146,10 @@ class PythonCanPort:
         if self._echoes is not None:
             self._echoes.append(frame)
         return True
+
+    def look(self) -> str:
+        """Return nothing: python-can knows no more of an interface."""
+        return ""
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment: its name of the bus, its messages of CAN FD."""

@@ -8,12 +8,15 @@ import errno
 import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
+from canshaper.bus.device import FD_MTU
 from canshaper.bus.packet import (
     ANCILLARY_BYTES,
     BRS,
     CAN_FRAME,
+    CLASS_RESTARTED,
     FD_FRAME,
     FD_SIZE,
     FDF,
@@ -25,7 +28,17 @@ from canshaper.bus.packet import (
     kernel_ids,
     read_error,
 )
-from canshaper.bus.socketcan import UnderWay, dropped_frames, readable, set_filters
+from canshaper.bus.socketcan import (
+    ERROR_CLASSES,
+    STATE_CLASSES,
+    UnderWay,
+    carrier,
+    dropped_frames,
+    readable,
+    receive_errors,
+    renamed,
+    set_filters,
+)
 from canshaper.codec.frame import EFF_FLAG, ERR_FLAG, BusState, Frame, FrameFault
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
@@ -35,6 +48,10 @@ from canshaper.machine.routing import BusRoutes
 MOST_FRAMES = 2000
 # Frames of unknown ids read in one tick at most; the rest is dropped, so their count is a minimum.
 MOST_UNKNOWN = 20
+# With so many error frames in one tick, the kernel keeps those without a state to itself for a
+# while; so their count is a minimum.
+MOST_ERRORS = 50
+QUIET_NS = 1_000_000_000
 # How often a bus that took no frames is tried again, with one frame, neutral by then.
 PROBE_NS = 500_000_000
 # How often an interface that has gone is looked for; it shall work again within a second.
@@ -45,7 +62,10 @@ SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, Bus
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
 LOST = frozenset((BusState.DOWN, BusState.FAILED))
 # States in which the sockets are closed, to be opened again.
-AWAY = frozenset((BusState.GONE, BusState.DOWN, BusState.WRONG_DEVICE))
+AWAY = frozenset((BusState.GONE, BusState.DOWN, BusState.WRONG_DEVICE, BusState.UNFIT))
+# Sending or opening failed for what the interface of that name is.
+NOT_FIT = frozenset((errno.EINVAL, errno.EOPNOTSUPP))
+NO_FD = f"expected an interface with CAN FD, which has the MTU {FD_MTU}, got one without"
 UP = BusState.UP
 _EACH_FRAME = range(MOST_FRAMES)  # made once: it takes as long as a poll
 
@@ -60,7 +80,9 @@ class RawPort:
             the interface was gone.
         ids: the messages that matter, handed to it.
         on_fault: called with every fault of the bus.
-        confirms: whether our own frames come back when they were sent, with MSG_CONFIRM.
+        confirms: whether our own frames come back, with MSG_CONFIRM.
+        echo: asks of the interface just opened whether they come back from the bus itself.
+        channel: name of the interface in the deployment file.
         matched: whether ``open_sockets`` looks at the device: then an interface that was down is
             opened again too, because name and bit rate may be others when it is back.
         fd: what is sent in frames of CAN FD; None on a bus of classical CAN.
@@ -68,6 +90,7 @@ class RawPort:
 
     Attributes:
         state: of the bus, as far as seen.
+        why: cause of a state that does not say it; empty for the others.
         arrived_ns: when the frame arrived that ``frames`` has just handed out, by
             ``boottime_ns``.
 
@@ -84,16 +107,20 @@ class RawPort:
         on_fault: Callable[[FrameFault], None],
         *,
         confirms: bool,
+        echo: Callable[[], bool] = lambda: True,
+        channel: str = "",
         matched: bool = False,
         fd: Iterable[tuple[int, bool]] | None = None,
         brs: bool = False,
     ) -> None:
         self.name = name
-        self.state = UP
+        self.why = ""
         self.arrived_ns = self.waited = 0
         self._open = open_sockets
         self._on_fault = on_fault
-        self._confirms = confirms
+        self._own = confirms
+        self._echo = echo
+        self._channel, self._renamed = channel, ""
         self._matched = matched
         self._under_way = UnderWay()
         self._unconfirmed = self._under_way.counts
@@ -106,6 +133,7 @@ class RawPort:
         self._claims = kernel_ids(ids.claims if ids else ())
         self._claimed = self._under_way.claims
         self._use()
+        self.state = self._good
 
     # -- receiving -----------------------------------------------------------------------------
 
@@ -131,7 +159,7 @@ class RawPort:
             if frame is None:
                 self._no_frame(data)
                 continue
-            if self.state is not UP and self.state in LOST:
+            if self.state is not self._good and self.state in LOST:
                 self._up()
             self.arrived_ns = arrivals.of(ancillary)
             yield frame
@@ -141,6 +169,9 @@ class RawPort:
 
         Frames of other senders with our ids, and of ids that no one knows, are handed out.
         """
+        self._errors = 0
+        if self._quiet_until_ns and time.monotonic_ns() >= self._quiet_until_ns:
+            self._receive_errors(ERROR_CLASSES, 0)
         for number, most in ((1, MOST_FRAMES), (2, MOST_UNKNOWN)):
             yield from self._background(number, most)
         if self._sockets and (dropped := dropped_frames(self._sockets[:2])) != self._dropped:
@@ -175,12 +206,24 @@ class RawPort:
             return
         fault, state = read_error(word, payload)
         if state is BusState.BUS_OFF:
+            self._no_carrier = False
             self._block(state)
         elif state is UP:
-            self._up()
-        elif state is not None and self.state is UP:
+            # Without an echo nothing else says so, and what is sent before that is dropped.
+            if self._confirms or self.state is not BusState.BUS_OFF or word & CLASS_RESTARTED:
+                self._up()
+        elif state is not None and self.state is self._good:
             self.state = state
         self._on_fault(fault)
+        self._errors += 1
+        if self._errors == MOST_ERRORS:
+            self._receive_errors(STATE_CLASSES, time.monotonic_ns() + QUIET_NS)
+
+    def _receive_errors(self, classes: int, until_ns: int) -> None:
+        """Let the kernel hand out error frames of these classes; others wait until a time."""
+        self._quiet_until_ns = until_ns
+        with suppress(OSError, IndexError):  # it is gone, and opened again with all of them
+            receive_errors(self._sockets[min(1, len(self._sockets) - 1)], classes)
 
     # -- sending -------------------------------------------------------------------------------
 
@@ -206,6 +249,8 @@ class RawPort:
         except OSError as error:
             self._failed(error)
             return False
+        if not self._confirms and self.state in LOST:
+            self._up()
         if word in self._claims:
             self._claimed.append(CAN_FRAME.unpack(packed))
         elif self._confirms:
@@ -213,6 +258,8 @@ class RawPort:
         return True
 
     def _confirmed(self, word: int) -> None:
+        if not self._confirms:
+            return
         self._under_way.confirmed(word)
         if self.state in SILENT:
             self._up()
@@ -247,6 +294,8 @@ class RawPort:
         now_ns = time.monotonic_ns()
         if now_ns < self._not_before_ns:
             return True
+        if self.state is BusState.BUS_OFF and not self._confirms:
+            return True  # what is sent now looks as if it had left
         self._not_before_ns = now_ns + PROBE_NS
         self._under_way.clear()
         return False
@@ -254,8 +303,35 @@ class RawPort:
     # -- the interface -------------------------------------------------------------------------
 
     def _up(self) -> None:
-        self.state = UP
+        self.state = self._good
         self._not_before_ns = 0
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Whether every valve frame that was sent is on the bus; None where nothing says so."""
+        if not self._confirms:
+            return None
+        return not any(self._unconfirmed.get(word) for word in self._valves)
+
+    def look(self) -> str:
+        """Look after carrier and name of the interface, now and then; what to say of its name."""
+        if not self._sockets:
+            return ""
+        one = self._sockets[0]
+        try:
+            has_carrier = carrier(one)
+            text = renamed(one, self._channel)
+        except OSError:  # it goes: seen by the next frame
+            return ""
+        if not self._confirms and has_carrier is not None:
+            if has_carrier and self._no_carrier:
+                self._up()
+            elif not has_carrier and self.state is not BusState.BUS_OFF:
+                self._block(BusState.BUS_OFF)
+                self._on_fault(FrameFault.BUS_OFF)
+            self._no_carrier = not has_carrier and self.state is BusState.BUS_OFF
+        before, self._renamed = self._renamed, text
+        return text if text != before else ""
 
     def _failed(self, error: OSError) -> None:
         if error.errno in GONE:
@@ -269,22 +345,28 @@ class RawPort:
             self.state = BusState.DOWN
             self._under_way.clear()  # the queue is emptied with the interface
             self._claimed.clear()
+        elif error.errno == errno.EINVAL and self._size == FD_SIZE:
+            self._away(BusState.UNFIT, FrameFault.BUS_ERROR, NO_FD)
         elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: the send has failed
             self.state = BusState.FAILED
             self._on_fault(FrameFault.BUS_ERROR)
 
-    def _away(self, state: BusState, fault: FrameFault) -> None:
+    def _away(self, state: BusState, fault: FrameFault, why: str = "") -> None:
         """Stop sending and receiving until the interface is opened again; report a fault once."""
         self.close()
         self._not_before_ns = time.monotonic_ns() + REOPEN_NS
         if self.state is not state:
-            self.state = state
+            self.state, self.why = state, why
             self._on_fault(fault)
 
     def _use(self) -> None:
         """Begin with new sockets, of which nothing is known yet."""
         arrivals = Arrivals()  # before a frame can arrive
         self._sockets = sockets = self._open(self._ids)
+        self._confirms = self._own and self._echo()
+        self._good = BusState.UNCONFIRMED if self._own and not self._confirms else UP
+        self._errors = self._quiet_until_ns = 0
+        self._no_carrier = False
         self._arrivals = arrivals
         sockets[0].setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self._waiting = [readable(one) for one in sockets]
@@ -307,10 +389,13 @@ class RawPort:
         except OSError as error:
             if error.errno in GONE:
                 self._away(BusState.GONE, FrameFault.BUS_GONE)
+            elif error.errno in NOT_FIT:
+                self._away(BusState.UNFIT, FrameFault.BUS_ERROR, error.strerror or "")
             self._not_before_ns = time.monotonic_ns() + REOPEN_NS
             return False
+        self.why = ""
         if self.state is not BusState.DOWN:  # which is over with the first frame
-            self.state = UP
+            self.state = self._good
         return True
 
     def watch(self, name: str, ids: BusRoutes) -> None:

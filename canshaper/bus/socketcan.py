@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from canshaper.bus.device import ROOT, check_device, check_mtu
+from canshaper.bus.device import ROOT, check_device, check_mtu, has_echo, interface_index
 from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
@@ -27,6 +27,14 @@ SO_MEMINFO = 55
 MOST_FILTERS = 512  # CAN_RAW_FILTER_MAX
 # linux/can/error.h: all classes but 0x2, a lost arbitration, which is the daily life of a bus.
 ERROR_CLASSES = 0x1FFFFFFD
+# Those that say the state of the controller: 0x4, 0x40, 0x100. A disturbed bus floods by others.
+STATE_CLASSES = 0x144
+# linux/sockios.h, linux/if.h
+SIOCGIFFLAGS, IFF_UP, IFF_RUNNING = 0x8913, 0x1, 0x40
+NO_ECHO = (
+    "it does not say whether a frame got onto the bus (no echo, as slcan), so a cut line to a valve"
+    " would trip no axis; another adapter, or unconfirmed: true in its section"
+)
 # Room for the backlog of a long stall; the default holds about 300 frames.
 RECEIVE_BUFFER_BYTES = 1 << 20
 
@@ -43,7 +51,8 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
     one for everything.
 
     Raises:
-        OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD.
+        OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD, or it
+            would drive valves and confirms no frame.
         WrongDeviceError: the interface is another device; nothing was sent or received.
     """
     opened: list[socket.socket] = []
@@ -54,9 +63,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
             if bus.fd:
                 opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
         opened[0].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-        opened[0 if ids is None else 1].setsockopt(
-            socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, ERROR_CLASSES
-        )
+        receive_errors(opened[0 if ids is None else 1], ERROR_CLASSES)
         if ids is not None:
             # What is sent on the first comes back on the second as another socket's frame, without
             # MSG_CONFIRM; so it is sent on the second.
@@ -67,6 +74,8 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
         for one in opened:
             one.bind((bus.channel,))
         check_mtu(bus)
+        if ids is not None and ids.valves and not bus.unconfirmed and not has_echo(bus.channel):
+            raise OSError(errno.EOPNOTSUPP, NO_ECHO)
         check_device(opened, bus)
     except (OSError, WrongDeviceError):
         for one in opened:
@@ -88,6 +97,41 @@ def check_present(bus: Bus, root: Path = ROOT) -> None:
     names = root / "sys/class/net"
     if not bus.channel or (names.is_dir() and not (names / bus.channel).exists()):
         raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+
+
+def receive_errors(one: socket.socket, classes: int) -> None:
+    """Let a socket receive the error frames of these classes."""
+    one.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, classes)
+
+
+def carrier(one: socket.socket) -> bool | None:
+    """Whether an interface has its bus, up to a second late; None where it is down or gone.
+
+    Asked without the lock that a change of any interface holds.
+
+    Args:
+        one: a socket that is bound to it.
+
+    Raises:
+        OSError: it goes in this moment.
+    """
+    from fcntl import ioctl  # noqa: PLC0415  (only POSIX has it)
+
+    name = one.getsockname()[0].encode()
+    if not name:  # it is gone, and the kernel would look for a module of no name
+        return None
+    flags = struct.unpack_from("=16xH", ioctl(one, SIOCGIFFLAGS, struct.pack("=16s24x", name)))[0]
+    return bool(flags & IFF_RUNNING) if flags & IFF_UP else None
+
+
+def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
+    """What to say where the interface of a socket has lost its name; empty where it has it."""
+    name = one.getsockname()[0]
+    if name in ("", channel):
+        return ""
+    other = interface_index(channel, root)
+    text = f"interface={name} ifindex={interface_index(name, root)}: no longer {channel}"
+    return f"{text}, which is another one now, ifindex {other}" if other else text
 
 
 def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:

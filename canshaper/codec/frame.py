@@ -52,6 +52,8 @@ class BusState(Enum):
     """State of a bus, as far as it is seen from our sockets."""
 
     UP = "up"
+    UNCONFIRMED = "unconfirmed"
+    """Up, as far as known: its interface does not say whether a frame of ours got onto the bus."""
     PASSIVE = "passive"
     """The controller counts many errors."""
     BUS_OFF = "bus-off"
@@ -64,6 +66,8 @@ class BusState(Enum):
     """The interface is removed."""
     WRONG_DEVICE = "wrong-device"
     """The interface of that name is not the device of the deployment."""
+    UNFIT = "unfit"
+    """The interface of that name cannot carry this bus."""
     FAILED = "failed"
     """Reading or sending failed in another way."""
 

@@ -1,6 +1,8 @@
 """The other end of the control socket: for ``canshaper set`` and the live page."""
 
+import getpass
 import json
+import os
 import socket
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -24,23 +26,27 @@ def table(path: Path) -> dict[str, dict[str, float]]:
     return answer["adjustable"]
 
 
-def change(path: Path, values: Mapping[str, float]) -> None:
+def person() -> str:
+    """Name of who runs this program, also by sudo."""
+    return os.environ.get("SUDO_USER") or getpass.getuser()
+
+
+def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
     """Change numbers of a running daemon, all or none, until it ends or reads its file again.
 
     Args:
         path: its control socket.
         values: numbers by their keys, such as ``axes.slew.sway.period_s``.
+        by: who else than the person, for the daemon's log.
 
     Raises:
         ControlError: no daemon answers, or it refuses; then nothing has changed.
     """
-    _ask(path, {"set": dict(values)})
+    _ask(path, {"set": dict(values), "by": f"{person()}/{by}" if by else person()})
 
 
 def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
     """Let a running daemon write its black box, and wait for that.
-
-    It does so as soon as every axis is neutral.
 
     Args:
         path: its control socket.

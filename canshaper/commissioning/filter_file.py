@@ -1,35 +1,13 @@
-"""Writing of results into the deployment file: a filter with its tail, any section."""
+"""Writing of a filter with its tail into the deployment file."""
 
-from collections.abc import Iterator, Mapping
-from difflib import unified_diff
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisSection
-from canshaper.config.source import Place
-from canshaper.edit.edit import FileValue, set_values
-from canshaper.errors import ConfigError
-from canshaper.machine.binding import load_deployment
+from canshaper.edit.edit import Change, FileValue, change
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
-
-
-def write_section(
-    path: Path, place: Place, values: Mapping[str, FileValue], comment: str
-) -> list[str]:
-    """Write values into a section of the file, and a comment; see ``set_values``.
-
-    Returns:
-        Lines that have changed.
-
-    Raises:
-        ConfigError: the file cannot be changed, or is no good deployment with them. The file is as
-            it was.
-    """
-    before = path.read_bytes()
-    _set_checked(path, place, values, comment)
-    return list(_changed(before.decode(), path.read_text(encoding="utf-8")))
 
 
 def write_filter(
@@ -46,7 +24,7 @@ def write_filter(
     Args:
         deployment: the machine, as its file says.
         axis: the axis.
-        filter_values: its kind and the other keys of its section filter; see ``set_values``.
+        filter_values: its kind and the other keys of its section filter; see ``change``.
         tail_s: tail that the filter needs; None or less than that of the file changes nothing.
         verb: that designed the filter.
 
@@ -58,17 +36,17 @@ def write_filter(
             in which the sway may be adjusted can be too wide for it. The file is as it was.
     """
     path, config = deployment.path, deployment.axes[axis].config
-    before = path.read_bytes()
-    _set_checked(
-        path, ("axes", axis, "filter"), _with_origin(config, filter_values, verb), note(verb)
-    )
+    written = _with_origin(config, filter_values, verb)
+    changes: list[Change] = [(("axes", axis, "filter"), written, note(verb))]
     kept = None
     if tail_s is not None and tail_s > config.limits.tail_s:
         limits = config.limits.model_copy(update={"tail_s": tail_s})
         kept = stop_fault(deployment, axis, config.model_copy(update={"limits": limits}))
-        if not kept:
-            _write_tail(path, axis, tail_s, section="limits" in config.model_fields_set)
-    lines = list(_changed(before.decode(), path.read_text(encoding="utf-8")))
+        if not kept and "limits" in config.model_fields_set:
+            changes.append((("axes", axis, "limits"), {"tail_s": tail_s}, ""))
+        elif not kept:
+            changes.append((("axes", axis), {"limits": {"tail_s": tail_s}}, ""))
+    lines = change(path, changes)
     was, kind = config.filter.kind, filter_values["kind"]
     if was != kind:
         lines.append(f"NOTE: axes.{axis}.filter.kind: {kind} replaces {was}")
@@ -90,34 +68,6 @@ def _with_origin(
     return {**filter_values, "designed_for": {**designed_for, "origin": made}}
 
 
-def _set_checked(path: Path, place: Place, values: Mapping[str, FileValue], comment: str) -> None:
-    """Write values; where the file is no good deployment with them it is as it was."""
-    before = path.read_bytes()
-    set_values(path, place, values, comment)
-    try:
-        load_deployment(path)
-    except ConfigError:
-        path.write_bytes(before)
-        raise
-
-
 def written_line(path: Path) -> str:
     """Return the next thing to do, after the file was written."""
     return f"Written to {path}; a running daemon takes it with SIGHUP."
-
-
-def _write_tail(path: Path, axis: str, tail_s: float, *, section: bool) -> None:
-
-    values: dict[str, Any] = {"tail_s": tail_s}
-    if section:
-        set_values(path, ("axes", axis, "limits"), values)
-    else:
-        set_values(path, ("axes", axis), {"limits": values})
-
-
-def _changed(before: str, after: str) -> Iterator[str]:
-    """Lines of the file that went and came."""
-    lines = unified_diff(before.splitlines(), after.splitlines(), n=0, lineterm="")
-    for line in list(lines)[2:]:
-        if not line.startswith("@@"):
-            yield line

@@ -127,6 +127,10 @@ class Bus(Section):
     match: Match | None = Field(
         None, description="the device behind the channel; without it the name alone counts"
     )
+    unconfirmed: bool = Field(
+        False, description="drive valves by an interface of SocketCAN without an echo (slcan) too"
+    )
+    """Such an interface never says whether a frame got onto the bus: a cut line trips no axis."""
     network: bool = Field(
         False, description="share a bus of udp_multicast over the network; else it stays local"
     )

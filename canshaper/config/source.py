@@ -91,7 +91,8 @@ class Source:
     """A YAML file as data, with the line of every key.
 
     Attributes:
-        sha256: of its bytes, in hexadecimal digits.
+        content: its bytes.
+        sha256: of them, in hexadecimal digits.
 
     Raises:
         ConfigError: the file cannot be read or is not YAML, or a key stands twice.
@@ -104,7 +105,7 @@ class Source:
         self._count = 0
         content = ""
         try:
-            data = read_bounded(path, MOST_BYTES)
+            self.content = data = read_bounded(path, MOST_BYTES)
             self.sha256 = sha256(data).hexdigest()
             content = data.decode("utf-8")
             node = yaml.compose(content, Loader=_Loader)

@@ -2,7 +2,9 @@
 
 import logging
 import os
+import re
 import signal
+import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import FrameType
@@ -26,6 +28,7 @@ from canshaper.daemon.ports import (
     new_ports,
     open_ports,
     received_at_first,
+    seen_sent,
     send_neutral,
     waiting,
 )
@@ -42,9 +45,11 @@ if TYPE_CHECKING:
 log = logging.getLogger("canshaper")
 
 # States in which no one receives our frames, or we receive none.
-_AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE)
+_AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE, BusState.UNFIT)
 INTERNAL_ERROR = "INTERNAL_ERROR"
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))
+# How often buses are tried that cannot be opened at the start.
+WAIT_S = 0.5
 
 
 class Daemon:
@@ -57,7 +62,8 @@ class Daemon:
 
     Raises:
         ConfigError: the deployment is not valid.
-        BusError: a bus cannot be opened.
+        BusError: a bus cannot be opened, and no service manager has started us: under one the
+            daemon waits until it can be.
     """
 
     def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
@@ -69,7 +75,7 @@ class Daemon:
         self._black_box = BlackBox(folder)
         deployment = load()
         program_sha256()  # kept from now on: to read the program takes longer than a tick
-        self._ports = open_ports(deployment, {}, self._on_fault)
+        self._ports = self._opened(deployment)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)
         self._use(deployment)
@@ -92,9 +98,11 @@ class Daemon:
         why = lock_memory()
         log.info("memory=%s", f"not-locked ({why})" if why else "locked")
         self._collector.freeze()
-        self._send_neutral()  # most valves want to see it before they listen to anything else
+        # Most valves want to see it before they listen to anything else.
+        valves = self._send_neutral(wait=True)
         self._black_box.begin(boottime_ns())
-        log.info("started file=%s axes=%s", self._controller.deployment.path, names)
+        path = self._controller.deployment.path
+        log.info("started file=%s axes=%s valves=%s", path, names, valves)
         self._reporter.identity()
         self._manager.ready(f"started, axes {names}")
         try:
@@ -105,10 +113,8 @@ class Daemon:
             failure = f"reason={INTERNAL_ERROR} {raised(error)}"
         finally:
             self._manager.stopping()
-            valves = "not-sent" if self._controller.deployment.listen_only else "neutral"
             try:
-                if not self._send_neutral():
-                    valves = "not-sent"
+                valves = self._send_neutral(wait=True)
             except Exception as error:  # the first failure is the one to report
                 valves, failure = "not-sent", failure or f"reason={INTERNAL_ERROR} {raised(error)}"
             if failure:
@@ -158,7 +164,7 @@ class Daemon:
         for name, port in self._ports.items():
             if port.state in OFF_BUS:
                 self._recorder.on_bus_off(name)
-        self._reporter.buses()
+        self._reporter.buses(now_ns)
         if self._follower and (news := self._follower.news()):
             log.warning("%s", news)
         self._reporter.faults(now_ns)
@@ -167,7 +173,12 @@ class Daemon:
             self._line.check(now_ns, neutral=controller.neutral)
         if self._control:
             self._control.serve(self._answer, now_ns)
-        if self._reporter.status(now_ns):
+        trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
+        trouble += ["tick plain"] if self._follower and not self._follower.follows else []
+        if self._reporter.status(now_ns, trouble):
+            for name, port in self._ports.items():
+                if news := port.look():
+                    log.warning("bus=%s %s", name, news)
             self._send_identity()
             flush()  # a reader that was slow may be back
         self._collector.pause(now_ns)
@@ -175,7 +186,9 @@ class Daemon:
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
         """Answer one request from the control socket."""
         values = request.get("set", {})
-        if request.keys() - {"set", "black_box"} or not isinstance(values, dict):
+        if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
+            peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
+        if request.keys() - {"set", "black_box", "by"} or not isinstance(values, dict):
             expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
             raise ValueError(f"expected {expected}, got another object")
         if "black_box" in request:
@@ -193,6 +206,25 @@ class Daemon:
             for change in changes:
                 log.info("set %s %s", change, peer)
         return {"adjustable": self._adjuster.table()}
+
+    def _opened(self, deployment: Deployment) -> dict[str, Port]:
+        """Open the buses; under a service manager, wait for them.
+
+        A restart for each try would load the program each time, and take the processor from the
+        instance of another machine.
+        """
+        said = ""
+        while True:
+            try:
+                return open_ports(deployment, {}, self._on_fault)
+            except BusError as error:
+                if not self._manager.present:
+                    raise
+                if str(error) != said:
+                    said = str(error)
+                    log.error("waiting for a bus: %s", said)
+                self._manager.waiting(f"waiting: {said.splitlines()[0]}")
+                time.sleep(WAIT_S)
 
     # -- deployments ---------------------------------------------------------------------------
 
@@ -287,23 +319,32 @@ class Daemon:
 
     # -- ends ----------------------------------------------------------------------------------
 
-    def _send_neutral(self) -> bool:
+    def _send_neutral(self, *, wait: bool = False) -> str:
         """Send every valve neutral.
 
+        Args:
+            wait: a moment for the frames to get onto the buses.
+
         Returns:
-            Whether the gate refused none.
+            What is known of these frames: see ``seen_sent``; ``not-sent`` where one was not.
 
         Raises:
             Exception: what kept a frame from being made, after all others were sent.
         """
-        send_neutral(self._ports, self._recorder.neutral_frames())
+        sent = send_neutral(self._ports, self._recorder.neutral_frames())
         events = self._controller.events
         refused = any(isinstance(one, RefusalEvent) for one in events)
         self._reporter.events()
         events.clear()
         if error := self._controller.not_neutral:
             raise error
-        return not refused
+        if refused or not sent or self._controller.deployment.listen_only:
+            return "not-sent"
+        if not wait:
+            return "sent"
+        return seen_sent(
+            self._ports.values(), lambda frame: self._recorder.receive(frame, boottime_ns())
+        )
 
     def _send_identity(self) -> None:
         """Send the digest of what runs, where a message carries it and its bus may be used."""

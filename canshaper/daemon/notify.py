@@ -39,6 +39,16 @@ class ServiceManager:
         limit = f"\nWATCHDOG_USEC={self._limit_us}" if self._limit_us else ""
         self._send_surely(f"READY=1\nSTATUS={status}{limit}")
 
+    @property
+    def present(self) -> bool:
+        """Whether there is one."""
+        return self._socket is not None
+
+    def waiting(self, status: str) -> None:
+        """Report that the service waits for an adapter; its loop, watched more closely, comes."""
+        limit = f"\nWATCHDOG=1\nWATCHDOG_USEC={RELOAD_US}" if self._limit_us else ""
+        self._send(f"READY=1\nSTATUS={status}{limit}")
+
     def reloading(self) -> None:
         """Report that a reload is being applied, and the loop waits; ``ready`` ends it.
 

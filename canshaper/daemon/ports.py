@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 from canshaper.bus.port import ListeningPort, Port, open_port
 from canshaper.codec.frame import Frame, FrameFault
@@ -35,8 +36,10 @@ def open_ports(
     try:
         for name, bus in deployment.config.buses.items():
             ids = deployment.routing.buses[name]
-            port = opened.get(bus) or open_port(name, bus, on_fault, ids)
             listens = deployment.listen_only and bus not in opened
+            if listens:
+                ids = replace(ids, valves=frozenset())
+            port = opened.get(bus) or open_port(name, bus, on_fault, ids)
             ports[name] = ListeningPort(port, ids) if listens else port
     except BusError as error:
         close_ports(new_ports(ports, opened))
@@ -78,8 +81,12 @@ def close_ports(ports: Iterable[Port]) -> None:
         port.close()
 
 
-def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> None:
-    """Send neutral frames, for a while again where a queue is full; what was not sent is logged."""
+def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> bool:
+    """Send neutral frames, for a while again where a queue is full; what was not sent is logged.
+
+    Returns:
+        Whether all were sent.
+    """
     until = time.monotonic() + NEUTRAL_TRIES_S
     while frames:
         frames = [f for f in frames if not ports[f.bus].send(f)]
@@ -89,3 +96,28 @@ def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> None:
             time.sleep(0.005)
     for frame in frames:
         log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)
+    return not frames
+
+
+def seen_sent(ports: Iterable[Port], receive: Callable[[Frame], object]) -> str:
+    """What is known, within a moment, of valve frames that were all sent.
+
+    Args:
+        ports: the buses.
+        receive: called with what comes meanwhile.
+
+    Returns:
+        ``neutral`` where each frame is on its bus, ``not-confirmed`` where one is not, ``sent``
+        where a bus does not say so.
+    """
+    until = time.monotonic() + ON_THE_BUS_S
+    while True:
+        for port in ports:
+            for frame in port.background():
+                receive(frame)
+        known = [port.confirmed for port in ports]
+        if False not in known:
+            return "sent" if None in known else "neutral"
+        if time.monotonic() > until:
+            return "not-confirmed"
+        time.sleep(0.002)

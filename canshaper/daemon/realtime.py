@@ -1,16 +1,22 @@
-"""Requests of a control loop to interpreter and kernel: no surprises from memory.
-
-The scheduling policy is set from outside (``CPUSchedulingPolicy=`` of the unit, ``chrt``).
-"""
+"""Requests of a control loop to interpreter and kernel: memory, priority, rights."""
 
 import ctypes
 import gc
+import logging
 import os
 import resource
+from pathlib import Path
+
+log = logging.getLogger("canshaper")
 
 # sys/mman.h and linux/prctl.h
 MCL_CURRENT, MCL_FUTURE = 1, 2
 PR_SET_THP_DISABLE = 41
+# linux/capability.h; to read and write files of others, to lock memory, to set a priority.
+CAP_CHOWN, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_FOWNER = 0, 1, 2, 3
+CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
+NEEDED = CAP_CHOWN, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_FOWNER, CAP_IPC_LOCK, CAP_SYS_NICE
+CAPABILITY_VERSION_3 = 0x20080522
 
 
 class Collector:
@@ -52,6 +58,28 @@ def refuse_huge_pages() -> None:
     its memory. A kernel without huge pages has nothing to refuse.
     """
     ctypes.CDLL(None).prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0)
+
+
+def take_priority(priority: int) -> None:
+    """Run this thread by SCHED_FIFO from now on, not its children; log why where it may not."""
+    try:
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(priority))
+    except OSError as error:
+        log.warning("priority=ordinary (%s)", error.strerror)
+
+
+def drop_capabilities() -> None:
+    """Give up the rights of root that a control loop does not need.
+
+    With those over the network the kernel would look for a module for each interface that is
+    missing; to set up a bus or a route is not the daemon's.
+    """
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    permitted = int(status.partition("CapPrm:")[2].split()[0], 16)
+    kept = permitted & sum(1 << one for one in NEEDED)
+    header = (ctypes.c_uint32 * 2)(CAPABILITY_VERSION_3, 0)
+    ctypes.CDLL(None).capset(header, (ctypes.c_uint32 * 6)(kept, kept))
 
 
 def lock_memory() -> str | None:

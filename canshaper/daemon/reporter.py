@@ -15,6 +15,8 @@ from canshaper.shaping.states import State
 log = logging.getLogger("canshaper")
 
 SECOND_NS = 1_000_000_000
+# Lines of one bus in a second at most.
+MOST_BUS_LINES = 4
 
 
 class Reporter:
@@ -30,6 +32,7 @@ class Reporter:
         self._log_again_ns = 0
         self._status_ns = 0
         self._latest_ns = 0
+        self._bus_lines_ns = 0
 
     def use(self, controller: Controller, ports: Mapping[str, Port]) -> None:
         """Report of these from now on."""
@@ -37,6 +40,7 @@ class Reporter:
         self._ports = ports
         self._bus_states = dict.fromkeys(ports, BusState.UP)
         self._waited = {name: port.waited for name, port in ports.items()}
+        self._bus_lines = dict.fromkeys(ports, 0)
 
     def events(self) -> None:
         """Log what the axes said in this tick."""
@@ -44,13 +48,19 @@ class Reporter:
             tripped = isinstance(event, StateEvent) and event.transition.new is State.TRIPPED
             log.log(logging.WARNING if tripped else logging.INFO, "%s", event.text)
 
-    def buses(self) -> None:
-        """Log every bus whose state changed."""
+    def buses(self, now_ns: int) -> None:
+        """Log every bus whose state changed; of one that changes all the time now and then one."""
+        if now_ns >= self._bus_lines_ns:
+            self._bus_lines_ns = now_ns + SECOND_NS
+            self._bus_lines = dict.fromkeys(self._bus_lines, 0)
         for name, port in self._ports.items():
-            if port.state is not self._bus_states[name]:
-                self._bus_states[name] = port.state
-                level = logging.INFO if port.state is BusState.UP else logging.WARNING
-                log.log(level, "bus=%s state=%s", name, port.state.value)
+            state = port.state
+            if state is not self._bus_states[name] and self._bus_lines[name] < MOST_BUS_LINES:
+                self._bus_states[name] = state
+                self._bus_lines[name] += 1
+                level = logging.INFO if state is BusState.UP else logging.WARNING
+                why = f" why={port.why}" if port.why else ""
+                log.log(level, "bus=%s state=%s%s", name, state.value, why)
 
     def faults(self, now_ns: int) -> None:
         """Log the fault of a frame when it is another one, at most one a second."""
@@ -66,8 +76,13 @@ class Reporter:
         """Take the lateness of a tick."""
         self._latest_ns = max(self._latest_ns, late_ns)
 
-    def status(self, now_ns: int) -> bool:
-        """Renew the service manager's line once a second; whether it was time."""
+    def status(self, now_ns: int, trouble: list[str]) -> bool:
+        """Renew the service manager's line once a second; whether it was time.
+
+        Args:
+            now_ns: time of the tick.
+            trouble: what stands first in it.
+        """
         if now_ns < self._status_ns:
             return False
         self._status_ns = now_ns + SECOND_NS
@@ -75,7 +90,7 @@ class Reporter:
             if port.waited != self._waited[name]:
                 self._waited[name] = port.waited
                 log.warning("bus=%s waited=%d: valve frames, in a queue", name, port.waited)
-        self._manager.status(self._summary())
+        self._manager.status(self._summary(trouble))
         self._latest_ns = 0
         return True
 
@@ -103,15 +118,14 @@ class Reporter:
         for place, fault in unfit(deployment.config):
             log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
 
-    def _summary(self) -> str:
+    def _summary(self, trouble: list[str]) -> str:
         """Axes, buses, lateness of the last second, deadlines missed."""
         axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
         buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
+        late = f"late {self._latest_ns / 1000:.0f} us"
         missed = self._controller.counters.values["MissedDeadlines"]
         first = ["listen-only"] if self._controller.deployment.listen_only else []
-        return ", ".join(
-            [*first, *axes, *buses, f"late {self._latest_ns / 1000:.0f} us", f"missed {missed}"]
-        )
+        return ", ".join([*trouble, *first, *axes, *buses, late, f"missed {missed}"])
 
 
 def flush() -> None:

@@ -1,8 +1,8 @@
 """Change single values of a deployment file and leave every other byte as it is.
 
-The YAML parser says where keys and values stand; only those spans are replaced. The result is
-written next to the file, must load as a deployment, and then takes the file's place in one step: at
-no moment is there a half-written file, and a file that cannot be changed stays as it was.
+The YAML parser says where keys and values stand; only those spans are replaced. All changes of a
+call are written next to the file, must load as a deployment with its DBC files, and then take the
+file's place in one step: whenever the program is killed, the old file stands there or the new one.
 """
 
 import copy
@@ -11,18 +11,20 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from canshaper.config.adjust import Key
-from canshaper.config.load import load_config
 from canshaper.config.section import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source, read_bounded
 from canshaper.edit.spans import Edit
 from canshaper.errors import ConfigError, Problem
+from canshaper.machine.binding import load_deployment
 
 # Text that is read as itself: a path, a word, several, a run of numbers, a date.
 _PLAIN = re.compile(
@@ -67,8 +69,19 @@ def read_back(value: Any) -> Any:
     return yaml.safe_load(flow(value))
 
 
-def set_values(path: Path, place: Place, values: Mapping[str, FileValue], note: str = "") -> None:
-    """Write values into a section of a deployment file.
+Change = tuple[Place, Mapping[str, FileValue], str]
+"""Keys down to a section, values by key, and one line in place of comments on them or none."""
+
+
+def set_values(
+    path: Path, place: Place, values: Mapping[str, FileValue], note: str = ""
+) -> list[str]:
+    """Write values into a section of a deployment file; see ``change``."""
+    return change(path, [(place, values, note)])
+
+
+def change(path: Path, changes: Iterable[Change]) -> list[str]:
+    """Write values into sections of a deployment file, all of them or none.
 
     Keys that are there get the new value, keys that are not are put in, keys with None are taken
     out. Comments, order, spacing, line ends and everything else stay.
@@ -79,9 +92,10 @@ def set_values(path: Path, place: Place, values: Mapping[str, FileValue], note: 
 
     Args:
         path: the deployment file; a symbolic link is followed.
-        place: keys down to the section, such as ("axes", "slew", "filter").
-        values: values by key.
-        note: one line in place of comments on them.
+        changes: section, such as ("axes", "slew", "filter"), values and note of each.
+
+    Returns:
+        Lines that have changed.
 
     Raises:
         ConfigError: the section is not there or cannot be changed without touching anything
@@ -89,9 +103,31 @@ def set_values(path: Path, place: Place, values: Mapping[str, FileValue], note: 
             it was.
     """
     path = path.resolve()
-    before = _read(path)
-    text = edited(before, place, values, str(path), note)
-    _replace(path, before, text, _expected(Source(path).data, place, values))
+    text = before = _read(path)
+    expected = Source(path).data
+    for place, values, note in changes:
+        text = edited(text, place, values, str(path), note)
+        expected = _expected(expected, place, values)
+    _replace(path, before, text, expected)
+    return list(_changed(before, text))
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Put another text in place of a deployment file, by the same way.
+
+    Raises:
+        ConfigError: it is no valid deployment, or cannot be written. The file is as it was.
+    """
+    path = path.resolve()
+    _replace(path, _read(path), text, None)
+
+
+def _changed(before: str, after: str) -> Iterator[str]:
+    """Lines of the file that went and came."""
+    lines = unified_diff(before.splitlines(), after.splitlines(), n=0, lineterm="")
+    for line in list(lines)[2:]:
+        if not line.startswith("@@"):
+            yield line
 
 
 def edited(
@@ -145,7 +181,7 @@ def _replace(path: Path, before: str, text: str, expected: Any) -> None:
     temporary: Path | None = None
     try:
         status = path.stat()
-        number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".yaml")
+        number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
         temporary = Path(name)
         with os.fdopen(number, "wb") as file:
             file.write(text.encode("utf-8"))
@@ -185,23 +221,24 @@ def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | No
 
 
 def write_numbers(path: Path, values: Mapping[str, float]) -> None:
-    """Write numbers into a deployment file; see ``set_values``.
+    """Write numbers into a deployment file; see ``change``.
 
     Raises:
         ConfigError: the file cannot be changed.
     """
-    for place, numbers in sections_of(values).items():
-        set_values(path, place, numbers)
+    change(path, [(place, numbers, "") for place, numbers in sections_of(values).items()])
 
 
 def _check(path: Path, temporary: Path, expected: Any) -> None:
     """The new file is a valid deployment and differs in nothing but what was asked."""
     try:
-        _, source = load_config(temporary)
+        source = load_deployment(temporary).source
     except ConfigError as error:
-        problems = [Problem(str(path), p.line, p.where, p.message) for p in error.problems]
+        problems = [
+            replace(p, file=str(path)) if p.file == str(temporary) else p for p in error.problems
+        ]
         raise ConfigError(problems) from None
-    if source.data != expected:
+    if expected is not None and source.data != expected:
         text = "cannot be changed without changing something else; change it by hand"
         raise ConfigError([Problem(str(path), None, "", text)])
 

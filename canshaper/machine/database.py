@@ -1,6 +1,7 @@
 """DBC files of a deployment: loading them, finding messages, problems with file and line."""
 
 import re
+import zlib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -25,7 +26,8 @@ class DbcFile:
     """A loaded DBC file.
 
     Attributes:
-        sha256: of its bytes, in hexadecimal digits.
+        packed: its bytes, by zlib.
+        sha256: of them, in hexadecimal digits.
         entries: every message that stands in it.
         messages: those of them that were asked for.
         warnings: first faults of the other messages.
@@ -35,6 +37,7 @@ class DbcFile:
     """
 
     path: Path
+    packed: bytes
     sha256: str
     entries: list[Entry]
     messages: list[Message]
@@ -84,7 +87,7 @@ def load_dbc(
         text = dbc_text(data)
     except ValueError as error:
         return None, [Problem(str(path), None, "", f"{UNUSABLE}: {error}")]
-    digest = sha256(data).hexdigest()
+    packed, digest = zlib.compress(data, 1), sha256(data).hexdigest()
     bounded = names is not None
     if text.entries is None:
         content = text.whole()
@@ -92,7 +95,7 @@ def load_dbc(
         if isinstance(parsed, Problem):
             return None, [parsed]
         count = letters(content)
-        file = DbcFile(path, digest, _entries(parsed, content), parsed, [], 0, 0, count)
+        file = DbcFile(path, packed, digest, _entries(parsed, content), parsed, [], 0, 0, count)
         return _checked(file, named=bounded)
     entries = text.entries
     used = {e.number for e in entries if names is None or e.name in names}
@@ -115,8 +118,10 @@ def load_dbc(
     for line, fault in text.leftover_faults(leftover[:MOST_PROBLEMS]):
         warnings.append(Problem(str(path), line, "", fault))
     del warnings[MOST_PROBLEMS:]
-    file = DbcFile(path, digest, entries, parsed, warnings, count, text.statements, letters(rest))
-    return _checked(file, named=bounded)
+    counts = count, text.statements, letters(rest)
+    return _checked(
+        DbcFile(path, packed, digest, entries, parsed, warnings, *counts), named=bounded
+    )
 
 
 def too_many(files: Sequence[DbcFile]) -> str | None:

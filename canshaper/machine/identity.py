@@ -41,9 +41,14 @@ class Identity:
 
         The order of the DBC files counts, their names do not: a copy with other paths is the same.
         """
-        parts = [program_sha256(), self.deployment, *self.dbc.values(), *self.packages]
+        parts = [program_sha256(), self.deployment, *self.content]
         together = "\n".join(parts)
         return int(sha256(together.encode()).hexdigest()[: DIGEST_BITS // 4], 16)
+
+    @property
+    def content(self) -> list[str]:
+        """Hashes of the DBC files and packages, whatever names the files have."""
+        return [*self.dbc.values(), *self.packages]
 
     def lines(self) -> list[str]:
         """Lines for people and logs: the digest, then every hash in full."""

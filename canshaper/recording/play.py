@@ -26,6 +26,13 @@ def of_same_files(box: Box, deployment: Deployment) -> bool:
     return bool(box.header["identity"][2:] == deployment.identity.lines()[2:])
 
 
+def of_its_copies(box: Box, deployment: Deployment) -> bool:
+    """Whether this deployment is made of the files that were put into the bundle of a black box."""
+    identity = deployment.identity
+    carried = box.header.get("carried") or [identity.deployment, *identity.content]
+    return bool(carried == [identity.deployment, *identity.content])
+
+
 def frames_of(box: Box) -> Iterator[TimedFrame]:
     """The frames that the daemon received, as a log has them."""
     buses = box.header["buses"]

@@ -14,7 +14,7 @@ from canshaper.errors import BoxError, CutOffError, LogError, StateError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key, Kind, Sorter, TimedFrame, bus_of_channel
 from canshaper.recording.log import LogFile
-from canshaper.recording.play import Player, frames_of, of_same_files
+from canshaper.recording.play import Player, frames_of, of_its_copies, of_same_files
 from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick, clocked
 
 # What is looked at before a replay, to know the channels.
@@ -79,6 +79,9 @@ def look(deployment: Deployment, path: Path, given: Mapping[str, str], *, own: b
             box = read_box(path)
         except BoxError as error:
             raise LogError(str(error)) from None
+        if own and not of_its_copies(box, deployment):
+            text = "expected the files that its daemon had loaded, got changed ones"
+            raise LogError(f"{path.name} and {deployment.path.name}: {text}")
         if own or of_same_files(box, deployment):
             return Drive(path, {bus: bus for bus in box.header["buses"]}, box, True)
         return Drive(path, bus_of_channel(deployment, box.header["buses"], given), box, False)

@@ -189,7 +189,7 @@ class LiveNumbers:
         return {key: one["now"] for key, one in self._table.items()}
 
     def _set(self, values: Mapping[str, float], who: str) -> None:
-        client.change(self._control, values)
+        client.change(self._control, values, who)
         self._look(who)
 
     def _look(self, who: str = OTHERS) -> None:

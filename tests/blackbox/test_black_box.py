@@ -1,9 +1,12 @@
 """The black box of a daemon: what a trip leaves behind, and what replay makes of it."""
 
+import errno
 import json
 import logging
+import os
 import pickle
 import re
+import stat
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -21,6 +24,7 @@ from canshaper.codec.frame import BusState
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.reporter import Reporter
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.shapers.gff import Gff
@@ -125,8 +129,126 @@ def test_a_folder_that_cannot_be_written_costs_one_line(
     bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
 ) -> None:
     folder = tmp_path / "none"
-    drive(bench, folder, TRIP + 20 * SECOND)
-    assert log() == [f"black-box=not-written folder={folder} No such file or directory"]
+    folder.touch()
+    drive(bench, folder / "boxes", TRIP + 20 * SECOND)
+    assert log() == [f"black-box=not-written folder={folder / 'boxes'} Not a directory"]
+
+
+def test_a_folder_is_made_where_it_is_not_there_or_goes(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "some" / "boxes"
+    monkeypatch.setattr(keeper.os, "WNOHANG", 0)
+    happened = keeper.BlackBox._happened
+
+    def goes(box: keeper.BlackBox, why: str, last_ns: int) -> None:
+        folder.rmdir()
+        happened(box, why, last_ns)
+
+    monkeypatch.setattr(keeper.BlackBox, "_happened", goes)
+    drive(bench, folder, TRIP + 6 * SECOND)
+    assert [path.name for path in folder.iterdir()] == ["machine-0001.zip"]
+
+
+def test_a_file_that_could_not_be_written_is_tried_again_and_said_until_then(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    """With what there was at first, however late it is."""
+    folder = tmp_path / "boxes"
+    folder.touch()
+    monkeypatch.setattr(keeper.os, "WNOHANG", 0)
+    summaries: list[str] = []
+    summary = Reporter._summary
+
+    def heard(reporter: Reporter, trouble: list[str]) -> str:
+        summaries.append(summary(reporter, trouble))
+        if len(summaries) == 90:
+            folder.unlink()
+        return summaries[-1]
+
+    monkeypatch.setattr(Reporter, "_summary", heard)
+    drive(bench, folder, 100 * SECOND)
+    said = [one.startswith("black box not written: File exists, slew") for one in summaries]
+    assert said == sorted(said, reverse=True)
+    assert 90 <= said.index(False) <= 96
+    assert log()[0].startswith("black-box=not-written")
+    assert log()[1:] == [log()[-1]]
+    assert "black-box=written" in log()[-1]
+    out = tmp_path / "out"
+    text = replayed(folder / "machine-0001.zip", "--verify", "--out", out)
+    assert "reason=ENABLE_LOST" in text
+
+
+def test_on_a_full_disk_the_oldest_go(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    for number in range(1, 6):
+        (folder / f"machine-{number:04d}.zip").touch()
+    (folder / "machine-0003.zip.part").touch()  # of a process that was killed
+    fsync = os.fsync
+
+    def full(descriptor: int) -> None:
+        if stat.S_ISREG(os.fstat(descriptor).st_mode) and len(list(folder.glob("*.zip"))) > 3:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        fsync(descriptor)
+
+    monkeypatch.setattr(write.os, "fsync", full)
+    drive(bench, folder, TRIP + 10)
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == [f"machine-{number:04d}.zip" for number in (4, 5, 6)]
+
+
+def test_it_is_written_at_once_whatever_the_other_axes_do(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the tick of the trip, and again when five seconds are over."""
+    forks: list[int] = []
+    fork = os.fork
+
+    def forked() -> int:
+        forks.append(bench.now_ns)
+        return fork()
+
+    monkeypatch.setattr(keeper.os, "fork", forked)
+    monkeypatch.setattr(keeper.os, "WNOHANG", 0)
+    monkeypatch.setattr(Controller, "neutral", False)
+    drive(bench, tmp_path / "boxes", TRIP + 6 * SECOND)
+    first, last = forks
+    assert last - first == keeper.AFTER_NS
+    assert first - bench.now_ns + 6 * 10**9 <= 20_000_000
+
+
+def test_the_copies_are_those_that_were_loaded(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not what is on the disk by then; a copy that was edited later is refused."""
+    before = bench.file.read_bytes()
+    happened = keeper.BlackBox._happened
+
+    def edited(box: keeper.BlackBox, why: str, last_ns: int) -> None:
+        bench.file.write_text(bench.text.replace("max_pct", "min_pct") + "\nnonsense: 1\n")
+        happened(box, why, last_ns)
+
+    monkeypatch.setattr(keeper.BlackBox, "_happened", edited)
+    folder = tmp_path / "boxes"
+    drive(bench, folder, TRIP + 10)
+    path = folder / "machine-0001.zip"
+    with zipfile.ZipFile(path) as bundle:
+        members = {name: bundle.read(name) for name in bundle.namelist()}
+    copy = next(name for name in members if name.endswith("machine.yaml"))
+    absolute = [line for line in before.splitlines() if b"/" in line and b".dbc" in line]
+    same = [line for line in members[copy].splitlines() if b".dbc" not in line]
+    assert absolute
+    assert same == [line for line in before.splitlines() if b".dbc" not in line]
+    assert "same to the last bit" in replayed(path, "--verify", "--out", tmp_path / "out")
+    for name in (copy, next(name for name in members if name.endswith(".dbc"))):
+        with zipfile.ZipFile(path, "w") as bundle:
+            for member, content in members.items():
+                bundle.writestr(member, content + b"\n" * (member == name))
+        text = replayed(path, "--out", tmp_path / "out", code=2)
+        assert "expected the files that its daemon had loaded" in text.replace("\n", " ")
 
 
 @pytest.mark.slow
@@ -140,7 +262,7 @@ def test_many_trips_make_a_file_a_minute_and_the_oldest_go(
     folder.mkdir()
     (folder / "another-0007.zip").touch()
     drive(bench, folder, 70 * SECOND, trips=tuple(range(TRIP, 69 * SECOND, 2 * SECOND)))
-    assert len(log()) == 4  # at 8, 28, 48 and 68 s
+    assert len(log()) == 4  # at 3, 23, 43 and 63 s
     names = sorted(path.name for path in folder.iterdir())
     assert names == ["another-0007.zip", "machine-0003.zip", "machine-0004.zip"]
     for name in names[1:]:

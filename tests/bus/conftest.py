@@ -47,6 +47,8 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Made]:
     monkeypatch.setattr(socket, "socket", make)
     monkeypatch.setattr(socketcan, "check_device", lambda *_: None)
     monkeypatch.setattr(socketcan, "check_present", lambda *_: None)
+    for module in (port, socketcan):
+        monkeypatch.setattr(module, "has_echo", lambda _name: True)
     return opened
 
 

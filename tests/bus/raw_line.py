@@ -63,6 +63,7 @@ class Line:
         matched: the deployment names the device of the bus.
         fd: the bus is one of CAN FD.
         brs: its data have a bit rate of their own.
+        echo: its interface hands our frames back once they are on the bus.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Line:
         matched: bool = False,
         fd: bool = False,
         brs: bool = False,
+        echo: bool = True,
     ) -> None:
         self.faults: list[FrameFault] = []
         self.opened_with: list[BusRoutes | None] = []
@@ -80,6 +82,8 @@ class Line:
         self.far: list[socket.socket] = []
         self.now_ns = 10**12
         options: dict[str, Any] = {"matched": True} if matched else {}
+        if not echo:
+            options |= {"echo": lambda: False, "channel": "can0"}
         if fd:
             options["fd"] = ids.fd if ids else {(0x200, False)}
             options |= {"brs": True} if brs else {}

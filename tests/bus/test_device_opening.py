@@ -150,6 +150,7 @@ def test_sockets_of_another_device_are_closed_at_once(
     monkeypatch.setattr(Opened, "made", made, raising=False)
     monkeypatch.setattr("canshaper.bus.socketcan.socket.socket", Opened)
     monkeypatch.setattr("canshaper.bus.socketcan.check_present", lambda _: None)
+    monkeypatch.setattr("canshaper.bus.socketcan.has_echo", lambda _: True)
     right = open_sockets(bus("can0", serial="0A17", port=0), ids)
     assert [one.closed for one in made] == [False] * len(right)
     made.clear()
@@ -166,4 +167,6 @@ def test_a_port_knows_whether_its_device_is_named(
     options: dict[str, Any] = {}
     monkeypatch.setattr("canshaper.bus.port.RawPort", lambda *_, **given: options.update(given))
     open_port("crane", configured, lambda _fault: None)
+    assert options.pop("channel") == configured.channel
+    assert options.pop("echo").args == (configured.channel,)
     assert options == {"confirms": False, "matched": matched, "fd": None, "brs": False}

@@ -10,7 +10,7 @@ from canshaper.machine.routing import BusRoutes
 class Below:
     """The port below it."""
 
-    name, state, arrived_ns = "crane", BusState.PASSIVE, 17
+    name, state, why, confirmed, arrived_ns = "crane", BusState.PASSIVE, "a cause", True, 17
 
     def __init__(self) -> None:
         self.sent: list[Frame] = []
@@ -26,6 +26,9 @@ class Below:
     def send(self, frame: Frame) -> bool:
         self.sent.append(frame)
         return frame.data != b"full"
+
+    def look(self) -> str:
+        return "news"
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         self.watched.append((name, ids))
@@ -49,6 +52,7 @@ def test_a_port_that_listens_is_the_port_below_it() -> None:
         17,
         5,
     )
+    assert (port.why, port.look(), port.confirmed) == ("a cause", "news", None)
     assert [f.can_id for f in port.frames()] == [1]
     assert [f.can_id for f in port.background()] == [2]
     port.close()

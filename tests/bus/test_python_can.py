@@ -188,3 +188,7 @@ def test_what_socketcand_repeats_at_each_attempt_is_logged_once(
         socketcand.log.warning(f"Failed to connect: {reason}")
     lines = [record.getMessage() for record in caplog.records]
     assert lines == [f"Failed to connect: {one}" for one in ("refused", "no route", "refused")]
+
+
+def test_python_can_knows_nothing_of_what_has_left(port: Port) -> None:
+    assert (port.look(), port.why, port.confirmed) == ("", "", None)

@@ -97,7 +97,7 @@ SWAY = (
             "{ interface: socketcan, channel: vcan0, bitrate: 250000 }",
             "vcan0",
             "buses.crane: expected a section with the keys interface, channel, bitrate, fd,"
-            " data_bitrate, options, match, network, j1939, canopen, got 'vcan0'",
+            " data_bitrate, options, match, unconfirmed, network, j1939, canopen, got 'vcan0'",
         ),
         (
             "{ kind: off }",

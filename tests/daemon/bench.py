@@ -31,6 +31,8 @@ class FakePort:
 
     state = BusState.UP
     waited = 0
+    why = ""
+    confirmed: bool | None = True
 
     def __init__(self, name: str, channel: str, bench: "Bench") -> None:
         self.name = name
@@ -62,6 +64,9 @@ class FakePort:
             if port is not self and port.channel == self.channel:
                 port.waiting.append((self._bench.now_ns + UNDER_WAY_NS, frame))
         return True
+
+    def look(self) -> str:
+        return ""
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         self.name = name

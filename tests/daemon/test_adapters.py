@@ -113,7 +113,7 @@ def test_an_adapter_that_takes_nothing_holds_neither_the_other_bus_nor_the_end(
             other.join()
     text = file.with_suffix(".log").read_text()
     assert "bus=crane" not in text
-    assert "stopped valves=neutral" in text
+    assert "stopped valves=not-sent" in text
     line.close()
 
 
@@ -140,4 +140,4 @@ def test_two_daemons_share_a_bus_of_datagrams(tmp_path: Path) -> None:
     for file in (first, second):
         text = file.with_suffix(".log").read_text()
         assert "SECOND_SENDER" not in text
-        assert "stopped valves=neutral" in text
+        assert "stopped valves=sent" in text

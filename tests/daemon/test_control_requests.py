@@ -1,6 +1,7 @@
 """What the control socket of a daemon is asked, and what of that its log has."""
 
 import logging
+import os
 import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -74,6 +75,19 @@ def test_the_log_says_who_set_what(
     assert "pid=" in line
     assert said in line
     assert line.startswith(("INFO set axes.", "WARNING set=refused uid="))
+
+
+def test_the_log_names_the_person_who_set_it(
+    bench: Bench, tmp_path: Path, log: Callable[[str], list[str]]
+) -> None:
+    """Whatever stands in the name, it makes no field of its own."""
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    request = {"set": {"axes.slew.filter.a1": 0.75}, "by": "anna/page 2 uid=0\n" + 99 * "x"}
+    answered(bench, path, request)
+    (line,) = log("axes.slew.filter.a1")
+    name = "anna/page_2_uid_0_"
+    assert f" by={name}{(60 - len(name)) * 'x'} uid={os.getuid()} pid=" in line
 
 
 @pytest.mark.parametrize(("value", "counts"), [(0.75, True), (2, False)])

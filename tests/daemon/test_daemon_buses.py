@@ -1,6 +1,6 @@
 """The daemon and its buses: one that fails, one of another device, and the last frames on it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +9,7 @@ import pytest
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.ports import seen_sent
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import BUS, Bench, FakePort, at
@@ -34,8 +35,9 @@ OFF = [
     BusState.DOWN,
     BusState.GONE,
     BusState.WRONG_DEVICE,
+    BusState.UNFIT,
 ]
-ON = [BusState.UP, BusState.PASSIVE, BusState.FAILED]
+ON = [BusState.UP, BusState.UNCONFIRMED, BusState.PASSIVE, BusState.FAILED]
 
 
 def test_we_are_on_a_bus_or_not_whatever_its_state() -> None:
@@ -100,11 +102,93 @@ def test_neutral_that_is_not_sent_is_tried_again_and_then_reported(
 
     at(bench, {20: lambda: monkeypatch.setattr(FakePort, "send", full)})
     assert [line for line in log() if "not-sent" in line] == [
-        "ERROR neutral=not-sent bus=crane id=0x201"
+        "ERROR neutral=not-sent bus=crane id=0x201",
+        "INFO stopped valves=not-sent",
     ]
     last = [frame.can_id for frame in tries[-10:]]
     assert last == [0x201] * 10  # the others only once
-    assert log()[-1] == "INFO stopped valves=neutral"
+
+
+@pytest.mark.parametrize(
+    ("confirmed", "said"), [(True, "neutral"), (False, "not-confirmed"), (None, "sent")]
+)
+def test_the_last_words_are_what_is_known_of_the_last_frames(
+    bench: Bench,
+    monkeypatch: pytest.MonkeyPatch,
+    log: Callable[[], list[str]],
+    confirmed: bool | None,
+    said: str,
+) -> None:
+    monkeypatch.setattr(FakePort, "confirmed", confirmed)
+    at(bench, {})
+    assert any(f"started file={bench.file}" in one and f"valves={said}" in one for one in log())
+    assert log()[-1] == f"INFO stopped valves={said}"
+
+
+def test_what_comes_while_the_last_frames_are_waited_for_is_received() -> None:
+    class Confirming(FakePort):
+        def __init__(self) -> None:
+            self.frames_left = [Frame("crane", 0x201, False, b""), None, None]
+
+        @property
+        def confirmed(self) -> bool:  # type: ignore[override]
+            return not self.frames_left
+
+        def background(self) -> Iterator[Frame]:
+            if (frame := self.frames_left.pop(0)) is not None:
+                yield frame
+
+    received: list[Frame] = []
+    assert seen_sent([Confirming()], received.append) == "neutral"
+    assert [frame.can_id for frame in received] == [0x201]
+
+
+def test_a_bus_that_changes_all_the_time_does_not_flood_the_log(
+    bench: Bench, log: Callable[[], list[str]]
+) -> None:
+    def becomes(state: BusState) -> Callable[[], None]:
+        return lambda: setattr(bench.ports[0], "state", state)
+
+    states = [BusState.FAILED, BusState.UP]
+    at(bench, {tick: becomes(states[tick % 2]) for tick in range(1, 101)}, last=200)
+    lines = [line for line in log() if "bus=" in line]
+    assert len(lines) <= 4 * 3
+    assert lines[-1] == "WARNING bus=crane state=failed"  # the one that it has
+
+
+def test_what_a_port_says_of_its_interface_and_why_is_logged(
+    bench: Bench, log: Callable[[], list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unfit() -> None:
+        bench.ports[0].state, bench.ports[0].why = BusState.UNFIT, "no MTU"
+
+    monkeypatch.setattr(FakePort, "look", lambda _: "interface=parked")
+    at(bench, {5: unfit})
+    assert "WARNING bus=crane interface=parked" in log()
+    assert "WARNING bus=crane state=unfit why=no MTU" in log()
+
+
+def test_a_service_waits_for_its_bus(
+    bench: Bench, log: Callable[[], list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a service manager it ends, with one it says so once and tries again."""
+    opened, tries, said = bench._open, [], []
+
+    def late(*arguments: Any) -> Any:
+        tries.append(arguments)
+        if len(tries) % 4:
+            raise BusError("bus crane: cannot open")
+        return opened(*arguments)
+
+    monkeypatch.setattr("canshaper.daemon.ports.open_port", late)
+    with pytest.raises(BusError, match="cannot open"):
+        Daemon(lambda: load_deployment(bench.file))
+    monkeypatch.setattr(module.ServiceManager, "present", True)
+    monkeypatch.setattr(module.ServiceManager, "waiting", lambda _, text: said.append(text))
+    monkeypatch.setattr(module.time, "sleep", lambda _: None)
+    Daemon(lambda: load_deployment(bench.file))
+    assert said == ["waiting: bus crane: cannot open"] * 2
+    assert log() == ["ERROR waiting for a bus: bus crane: cannot open"]
 
 
 def test_neutral_is_sent_as_soon_as_the_queue_has_room(

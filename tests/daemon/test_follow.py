@@ -15,6 +15,7 @@ from canshaper.config.load import load_config
 from canshaper.controller.controller import Controller
 from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.follow import AFTER_NS, CLUSTER_NS, TickFollower, tick_follower
+from canshaper.daemon.notify import ServiceManager
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -236,8 +237,13 @@ def test_a_black_box_of_such_ticks_is_played_the_same(
 
 @pytest.mark.parametrize("cycle_us", [20_000, 20_400])
 def test_the_daemon_says_that_it_does_not_follow(
-    bench: Bench, caplog: pytest.LogCaptureFixture, cycle_us: int
+    bench: Bench,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    cycle_us: int,
 ) -> None:
+    lines: list[str] = []
+    monkeypatch.setattr(ServiceManager, "status", lambda _, text: lines.append(text))
     caplog.set_level("WARNING", "canshaper")
     at_ns, ticks = bench.now_ns + 5 * MS, list[int]()
 
@@ -256,6 +262,7 @@ def test_the_daemon_says_that_it_does_not_follow(
     assert apart == {PERIOD_NS}
     off = ["tick=plain joystick=left cycle_ms=20.40 expected=20"]
     assert said == ([] if cycle_us == 20_000 else off)
+    assert lines[-1].startswith("slew " if cycle_us == 20_000 else "tick plain, slew ")
 
 
 def test_where_the_command_line_takes_another_interface_the_ticks_stay(

@@ -85,7 +85,7 @@ def test_set_shows_and_changes_and_a_reload_takes_it_back(daemon: Daemon) -> Non
     status, reported = canshaper("set", file, f"{PERIOD}=2.5")
     assert (status, reported.splitlines()[0]) == (0, f"{PERIOD}: 2.356 -> 2.5")
     assert "Not written: lost when the daemon ends" in reported
-    daemon.logged(rf"set {PERIOD}=2\.5 was=2\.356 uid={os.getuid()} pid={os.getpid()}\n")
+    daemon.logged(rf"set {PERIOD}=2\.5 was=2\.356 by=\S+ uid={os.getuid()} pid={os.getpid()}\n")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text
     table = json.loads(canshaper("set", file, "--json")[1])
     assert table == {PERIOD: {"now": 2.5, "file": 2.356, "low": 1.8, "high": 3.0}}
@@ -111,7 +111,7 @@ def test_set_writes_when_asked(daemon: Daemon) -> None:
 def test_set_reports_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
     status, reported = canshaper("set", str(daemon.file), f"{PERIOD}=4", "--write")
     assert (status, reported) == (1, f"{PERIOD}: expected 1.8 to 3, got 4\n")
-    daemon.logged(rf"set=refused uid=\d+ pid=\d+ {PERIOD}: expected 1.8 to 3, got 4")
+    daemon.logged(rf"set=refused by=\S+ uid=\d+ pid=\d+ {PERIOD}: expected 1.8 to 3, got 4")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text
     status, reported = canshaper("set", str(daemon.file), PERIOD)
     assert (status, reported.splitlines()[0][:23]) == (2, "expected KEY=NUMBER, as")

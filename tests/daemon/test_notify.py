@@ -98,6 +98,15 @@ def test_the_life_of_a_service(manager: Manager) -> None:
     ]
 
 
+def test_a_service_that_waits_is_watched_with_more_patience(manager: Manager) -> None:
+    service = ServiceManager({"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1000000"})
+    assert service.present and not ServiceManager({}).present
+    service.waiting("waiting: can0")
+    ServiceManager({"NOTIFY_SOCKET": manager.address}).waiting("waiting: can0")
+    said = "READY=1\nSTATUS=waiting: can0"
+    assert manager.received() == [f"{said}\nWATCHDOG=1\nWATCHDOG_USEC=30000000", said]
+
+
 def test_a_reload_begins_with_its_time(manager: Manager) -> None:
     """systemd takes a READY=1 for the end of the reload only with a time after its signal."""
     service = ServiceManager({"NOTIFY_SOCKET": manager.address})

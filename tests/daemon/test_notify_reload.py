@@ -158,4 +158,4 @@ def test_the_loop_never_waits_for_files(daemon: Daemon) -> None:
     third = daemon.reader_after_reload()
     assert daemon.end() == 0
     assert [pid for pid in (first, second, third) if Path("/proc", pid).exists()] == []
-    assert "stopped valves=neutral" in daemon.log()
+    assert "stopped valves=sent" in daemon.log()

@@ -8,9 +8,11 @@ import sys
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from canshaper.daemon import realtime
 from canshaper.daemon.realtime import Collector
 
 pytestmark = pytest.mark.processes
@@ -184,3 +186,56 @@ def test_a_refusal_of_the_kernel_is_reported() -> None:
     said, locked, _size = lock(drop)
     assert said == "Cannot allocate memory"
     assert locked == 0
+
+
+# -- priority and rights ---------------------------------------------------------------------------
+
+
+class Library:
+    """Keeps what the kernel would be asked for."""
+
+    def capset(self, header: Any, data: Any) -> None:
+        self.header, self.data = [*header], [*data]
+
+
+def test_what_the_loop_does_not_need_of_roots_rights_is_given_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    library = Library()
+    monkeypatch.setattr(realtime.ctypes, "CDLL", lambda _name: library)
+    realtime.drop_capabilities()
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    permitted = int(status.partition("CapPrm:")[2].split()[0], 16)
+    kept = permitted & sum(1 << one for one in realtime.NEEDED)
+    assert library.header == [0x20080522, 0]
+    assert library.data == [kept, kept, 0, 0, 0, 0]
+
+
+def test_the_kernel_takes_them() -> None:
+    code = "from canshaper.daemon.realtime import *; drop_capabilities()"
+    code += "; print(open('/proc/self/status').read())"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=ANSWER_S)
+    fields = dict(line.split(":", 1) for line in done.stdout.splitlines() if ":" in line)
+    assert fields["CapEff"] == fields["CapPrm"]
+    assert int(fields["CapEff"], 16) & ~sum(1 << one for one in realtime.NEEDED) == 0
+
+
+def test_the_priority_is_that_of_the_loop_alone_or_the_log_says_why(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    taken: list[tuple[int, int, int]] = []
+    monkeypatch.setattr(
+        realtime.os,
+        "sched_setscheduler",
+        lambda *one: taken.append((*one[:2], one[2].sched_priority)),
+    )
+    realtime.take_priority(40)
+    assert taken == [(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 40)]
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(realtime.os, "sched_setscheduler", refuse)
+    realtime.take_priority(40)
+    assert caplog.messages == ["priority=ordinary (Operation not permitted)"]

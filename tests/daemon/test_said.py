@@ -53,7 +53,7 @@ def test_every_tick_has_its_time_and_pings_the_watchdog(diary: Diary) -> None:
 
 def test_the_log_says_what_runs(bench: Bench, diary: Diary, log: Callable[[str], Any]) -> None:
     diary.run(3)
-    assert log("started") == [f"INFO started file={bench.file} axes={AXES}"]
+    assert log("started") == [f"INFO started file={bench.file} axes={AXES} valves=neutral"]
     assert log("memory=") == ["INFO memory=locked"]
 
 

@@ -17,7 +17,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 640,
+    "CHANGELOG.md": 685,
     "CONTRIBUTING.md": 500,
     "README.md": 590,
     "SECURITY.md": 430,
@@ -29,7 +29,7 @@ BUDGET = {
     "docs/checksums.md": 230,
     "docs/commission.md": 650,
     "docs/comparison.md": 650,
-    "docs/decisions.md": 880,
+    "docs/decisions.md": 895,
     "docs/deployment.md": 1840,
     "docs/devices.md": 540,
     "docs/doctor.md": 420,
@@ -40,7 +40,7 @@ BUDGET = {
     "docs/machine-manual.md": 890,
     "docs/monitor.md": 230,
     "docs/realtime.md": 400,
-    "docs/replay.md": 690,
+    "docs/replay.md": 700,
     "docs/safety.md": 2300,
     "docs/sensor.md": 1170,
     "docs/service.md": 790,

@@ -38,6 +38,8 @@ class BenchPort:
 
     state = BusState.UP
     waited = 0
+    why = ""
+    confirmed = True
 
     def __init__(self, name: str, channel: str, bench: "Bench") -> None:
         self.name, self.channel = name, channel
@@ -65,6 +67,9 @@ class BenchPort:
 
     def send(self, frame: Frame) -> bool:
         return self._bench.sends(frame)
+
+    def look(self) -> str:
+        return ""
 
     def watch(self, name: str, ids: object) -> None:
         self.name = name

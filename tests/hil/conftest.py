@@ -22,7 +22,13 @@ HERE = Path(__file__).parent
 
 
 # The others take minutes: make test-socketcan-all, test-machines, test-faults.
-IN_MAKE_TEST = ("test_socketcan.py", "test_joystick_moves_valve_and_everything_ends_neutral")
+IN_MAKE_TEST = (
+    "test_socketcan.py",
+    "test_joystick_moves_valve_and_everything_ends_neutral",
+    "test_an_interface_without_echo_drives_a_valve_by_consent_only",
+    "test_bus_off_without_echo_lasts_until_the_interface_is_set_up_again",
+    "test_a_service_waits_for_its_interface_without_priority",
+)
 
 
 @pytest.hookimpl(tryfirst=True)  # before marks select

@@ -139,9 +139,8 @@ class Service:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "canshaper", *arguments], stderr=file, stdout=file
             )
-        if (
-            arguments[0] == "run"
-        ):  # as the unit does; without the right to it, it runs like the rest
+        # As the unit does; without the right to it, it runs like the rest.
+        if arguments[0] == "run" and "--priority" not in arguments:
             with suppress(PermissionError):
                 os.sched_setscheduler(self.process.pid, os.SCHED_FIFO, os.sched_param(40))
 

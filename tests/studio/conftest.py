@@ -89,6 +89,9 @@ class Studio:
     def page(self, **options: Any) -> Iterator["Page"]:
         """A page that is connected."""
         options = {"origin": f"http://{self.host}", "open_timeout": WAIT_S, **options}
+        if token := self.url.partition("token=")[2]:
+            cookie = f"canshaper-studio-{self.port}={token}"
+            options.setdefault("additional_headers", {"Cookie": cookie})
         options["max_queue"] = None  # a page that is not looked at can still be closed
         with connect(f"ws://{self.host}/ws", **options) as connection:
             yield Page(connection)

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 from typer.testing import CliRunner
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
 from canshaper.cli.app import app
 from canshaper.commissioning import control_client as client
@@ -118,6 +120,27 @@ def test_what_is_not_allowed_changes_nothing(machine: Machine) -> None:
         hand.change(period=2.5)
         hand.until(hand.changes)
         assert hand.changes()[-1][0] == f"page {page.hello['page']}"  # who gives no name
+
+
+@pytest.mark.slow
+def test_only_who_has_the_address_changes_and_the_log_names_the_person(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other users of the PC reach the port too."""
+    monkeypatch.delenv("SUDO_USER", raising=False)
+    studio = machine.studio
+    assert len(studio.url.partition("?token=")[2]) > 20
+    with (
+        pytest.raises(InvalidStatus) as no,
+        connect(f"ws://{studio.host}/ws", origin=f"http://{studio.host}"),
+    ):
+        pass
+    assert no.value.response.status_code == 403
+    with studio.page() as page:
+        hand = Hand(page, "Aino")
+        hand.change(a1=0.7)
+        hand.until(lambda: hand.now(A1) == 0.7)
+    assert f"set {A1}=0.7 was=0.708 by={client.person()}/Aino uid=" in machine.log.read_text()
 
 
 @pytest.mark.slow

@@ -122,20 +122,23 @@ def test_interface_gone_and_back_without_a_restart(forwarder: Unit) -> None:
     assert forwarder.show("MainPID") == pid
 
 
-def test_interface_missing_at_start_is_tried_until_it_is_there(forwarder: Unit) -> None:
+def test_interface_missing_at_start_is_waited_for_without_priority(forwarder: Unit) -> None:
     forwarder.systemctl("stop")
     subprocess.run(["ip", "link", "del", "vcan0"], check=True)
     cursor = forwarder.cursor()
     try:
-        forwarder.systemctl("start", "--no-block")
-        forwarder.wait(NRestarts="[2-9]")
+        forwarder.systemctl("start")
         why = "bus crane: cannot open socketcan channel vcan0: No such device"
+        forwarder.wait(StatusText=f"waiting: {why}")
         assert forwarder.priority(why, cursor) == {"3"}
+        pid = forwarder.show("MainPID")
+        assert "SCHED_OTHER" in run("chrt", "--pid", pid).stdout
     finally:
         add_vcan("vcan0")
-    forwarder.wait(ActiveState="active")
     with open_bus("vcan0") as bus:
         wait_for(bus, "SlewCommand", lambda v: v["Velocity"] == 0)
+    assert forwarder.show("MainPID") == pid
+    assert "SCHED_FIFO" in run("chrt", "--pid", pid).stdout
 
 
 def test_wrong_file_at_start_fails_once_and_says_where(installed: None) -> None:

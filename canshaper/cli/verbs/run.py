@@ -31,6 +31,10 @@ def run(
     control: str | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
+    priority: int = typer.Option(
+        0, "--priority", min=0, max=49, help="SCHED_FIFO with this priority, once the buses are"
+        " open; 0: as it was started.",
+    ),
     black_box: Path | None = typer.Option(
         None, "--black-box", metavar="FOLDER", help="Where black boxes are written; by default the"
         " log directory that systemd gives the service, else nowhere."
@@ -54,7 +58,8 @@ def run(
     seconds after it: what was received and sent, tick by tick. The newest 20 are kept; canshaper
     replay plays them.
 
-    Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened.
+    Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened; as a service
+    of systemd it waits for the bus instead.
 
     Examples:
 
@@ -65,13 +70,17 @@ def run(
       canshaper run machine.yaml --listen-only
     """
     _import_can()
-    from canshaper.daemon import journal
+    from canshaper.daemon import journal, realtime
     from canshaper.daemon.daemon import Daemon
 
     journal.set_up()
+    realtime.drop_capabilities()
     load = loader(file, interface, channel, network=network)
     changed = _changed(load, listen_only=listen_only, simulated=simulated, control=control)
-    Daemon(changed, black_box or _log_folder()).run()
+    daemon = Daemon(changed, black_box or _log_folder())
+    if priority:
+        realtime.take_priority(priority)
+    daemon.run()
 
 
 def _import_can() -> None:

@@ -222,8 +222,10 @@ def _serve(
         text = f"cannot serve at {host} port {port}: {error.strerror or error}; try --port 0"
         raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
     port = one.getsockname()[1]
-    token = None if host in LOOPBACK else secrets.token_urlsafe(16)
-    names = (host, socket.gethostname()) if token else ()
+    away = host not in LOOPBACK
+    # On loopback every user of the PC could open it, with the rights of this one.
+    token = secrets.token_urlsafe(16) if away or (stage and stage.numbers) else None
+    names = (host, socket.gethostname()) if away else ()
     web = server(make(Access(port, names, token)))
 
     def end() -> None:
@@ -234,9 +236,9 @@ def _serve(
         stage.start(end)
     url = address(reachable(host), port, token)
     echo(f"open {url} in a browser; Ctrl-C ends")
-    if token:
+    if away:
         echo("anybody on the network path can read the token: plain HTTP")
-    if token and sys.stdout.isatty():
+    if away and sys.stdout.isatty():
         typer.echo(qr_code(url) or "with the package segno it stands here as a QR code, too")
     if stage:
         # The threads hold each other up: one that waits for the processor has Python's lock.

@@ -48,13 +48,14 @@ def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
         Level.WARNING,
         "none: a frame that no node acknowledges counts as sent, so a cut line to a valve trips no"
         " axis",
-        "an interface of SocketCAN (for slcan: slcand), or feedback of the valve",
+        "an adapter with a SocketCAN driver of its own, or feedback of the valve",
     )
 
 
 # Frames that may wait in the queue: less, and the frames of one tick do not fit; more, and commands
 # go out that are long out of date (20 of 8 bytes are 13 ms at 250 kbit/s).
 SHORTEST_QUEUE, LONGEST_QUEUE = 10, 20
+ADAPTER = "an adapter with a driver of its own; slcan serves joysticks"
 WRONG_RATE = "one of both is wrong: a wrong bit rate disturbs the whole bus"
 
 
@@ -104,9 +105,9 @@ def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
     if not link.data:
         text = "no tool that shows bit rate, state and restart: not checked"
         tool = Finding(name, Level.WARNING, text, "install iproute2")
-        return [up(link, bus), *fd(link, bus), queue(link), tool]
+        return [up(link, bus), *fd(link, bus), queue(link), *echo(link, bus), tool]
     checks: list[Callable[[Link], Finding | None]] = [queue, state, errors, restart, modes]
-    findings = [up(link, bus), bitrate(link, bus), *fd(link, bus)]
+    findings = [up(link, bus), bitrate(link, bus), *fd(link, bus), *echo(link, bus)]
     findings += [check(link) for check in checks]
     return [finding for finding in findings if finding]
 
@@ -116,9 +117,19 @@ def up(link: Link, bus: Bus) -> Finding:
     if link.up:
         return Finding(link.name, Level.OK, "up")
     rate = link.bitrate or bus.bitrate or 250_000
-    options = f"bitrate {rate} {fd_options(bus)}restart-ms 100"
+    options = f"bitrate {rate} {fd_options(bus)}{'restart-ms 100' * link.echo}".strip()
     remedy = f"sudo ip link set {link.name} up type can {options}"
     return Finding(link.name, Level.BAD, "is down", remedy)
+
+
+def echo(link: Link, bus: Bus) -> list[Finding]:
+    """Check that it says whether a frame of ours got onto the bus."""
+    if link.echo:
+        return []
+    text = "none (no echo, as slcan): a cut line to a valve trips no axis; "
+    text += "the file accepts that" if bus.unconfirmed else "run drives no valve by it"
+    level = Level.WARNING if bus.unconfirmed else Level.BAD
+    return [Finding(f"{link.name} send confirmation", level, text, ADAPTER)]
 
 
 def bitrate(link: Link, bus: Bus) -> Finding | None:
@@ -182,7 +193,8 @@ def state(link: Link) -> Finding | None:
     if state == "ERROR-WARNING":
         return Finding(subject, Level.WARNING, "error-warning: many errors", wires)
     if state == "BUS-OFF":
-        remedy = f"{wires}; then sudo ip link set {link.name} type can restart"
+        restarts = "type can restart" if link.echo else "down, then up"
+        remedy = f"{wires}; then sudo ip link set {link.name} {restarts}"
         return Finding(subject, Level.BAD, "bus-off: the controller has left the bus", remedy)
     return Finding(subject, Level.BAD, state.lower(), wires)
 
@@ -208,6 +220,9 @@ def restart(link: Link) -> Finding:
     restart_ms = link.data.get("restart_ms", 0)
     if restart_ms:
         return Finding(subject, Level.OK, f"{restart_ms} ms after bus-off")
+    if not link.echo:  # nor has such a driver a restart
+        remedy = f"after bus-off: sudo ip link set {link.name} down, then up"
+        return Finding(subject, Level.WARNING, "none by itself", remedy)
     return Finding(
         subject,
         Level.WARNING,

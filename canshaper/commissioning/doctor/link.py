@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from canshaper.bus.device import IFF_ECHO
+
 # Not in the path of an ordinary user everywhere.
 SBIN = ":/usr/sbin:/sbin"
 ARPHRD_CAN = 280  # linux/if_arp.h
@@ -24,6 +26,7 @@ class Link:
         can: whether it is a CAN interface.
         kind: of its driver: can (a controller), vcan, vxcan; None where it is not known.
         up: whether it is set up.
+        echo: whether its driver hands a frame back once it is on the bus.
         queue: length of its transmit queue, frames.
         mtu: bytes of the kernel's frames that it carries: 16 of classical CAN, 72 of CAN FD.
         data: details of a controller, in the words of ``ip``; empty where there are none.
@@ -34,6 +37,7 @@ class Link:
     can: bool
     kind: str | None
     up: bool
+    echo: bool
     queue: int
     mtu: int
     data: dict[str, Any]
@@ -81,6 +85,7 @@ def parse_ip(text: str) -> Link | None:
         can=entry.get("link_type") == "can",
         kind=info.get("info_kind"),
         up="UP" in entry["flags"],
+        echo="ECHO" in entry["flags"],
         queue=entry.get("txqlen", 0),
         mtu=entry.get("mtu", 0),
         data=info.get("info_data", {}),
@@ -100,6 +105,7 @@ def read_sys(name: str, root: Path) -> Link | None:
         can=int(texts["type"]) == ARPHRD_CAN,
         kind=None,
         up=bool(int(texts["flags"], 0) & IFF_UP),
+        echo=bool(int(texts["flags"], 0) & IFF_ECHO),
         queue=int(texts["tx_queue_len"]),
         mtu=int(texts["mtu"]),
         data={},

@@ -12,7 +12,7 @@ from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.config.limits import Sway
 from canshaper.config.origin import note
-from canshaper.edit.edit import FileValue, set_values
+from canshaper.edit.edit import Change, FileValue, change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
@@ -166,13 +166,17 @@ def write_sway(
                 f"axis {one.axis}: with sway: {flow(one.sway)}, limits.stop_distance_m: {fault};"
                 " change the limits first"
             )
+    changes: list[Change] = []
+    measured: list[str] = []
     for one in usable:
         sway = deployment.axes[one.axis].config.sway
         assert sway is not None
         gone = sway.model_dump(exclude_none=True).keys() - one.sway.keys()
         values: dict[str, FileValue] = {**dict.fromkeys(sorted(gone)), **one.sway}
         values["origin"] = origin
-        set_values(deployment.path, ("axes", one.axis, "sway"), values, note("identify"))
+        changes.append((("axes", one.axis, "sway"), values, note("identify")))
         same = {"full_speed_m_s"} if sway.full_speed_m_s == one.sway["full_speed_m_s"] else set()
-        confirm(deployment.path, (f"axes.{one.axis}.sway.{k}" for k in values.keys() - same))
+        measured += (f"axes.{one.axis}.sway.{key}" for key in values.keys() - same)
+    change(deployment.path, changes)
+    confirm(deployment.path, measured)
     return [one.axis for one in usable]

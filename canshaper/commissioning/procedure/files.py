@@ -13,7 +13,7 @@ from typing import Any
 from rich.console import Group
 from rich.table import Table
 
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import Change, change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import SafeConsole, new_table
@@ -95,21 +95,23 @@ def write_without_filters(deployment: Deployment, path: Path) -> None:
     Raises:
         ConfigError: it is no good deployment without them.
     """
-    shutil.copyfile(deployment.path, path)
+    changes: list[Change] = []
     if deployment.config.motion:
-        set_values(path, (), {"motion": None})
+        changes.append(((), {"motion": None}, ""))
     for name, joystick in deployment.config.joysticks.items():
         if joystick.next_profile:
-            set_values(path, ("joysticks", name), {"next_profile": None})
+            changes.append((("joysticks", name), {"next_profile": None}, ""))
     for name, axis in deployment.config.axes.items():
         if axis.sway_sensor and axis.sway_sensor.use != "watch":
-            set_values(path, ("axes", name, "sway_sensor"), {"use": "watch"})
+            changes.append((("axes", name, "sway_sensor"), {"use": "watch"}, ""))
         added = [key for key in ("profiles", "gain_schedule") if getattr(axis, key)]
         if added:
-            set_values(path, ("axes", name), dict.fromkeys(added))
+            changes.append((("axes", name), dict.fromkeys(added), ""))
         if axis.filter.kind != "off":
             gone: dict[str, Any] = dict.fromkeys(axis.filter.model_dump(exclude_none=True))
-            set_values(path, ("axes", name, "filter"), gone | {"kind": "off"})
+            changes.append((("axes", name, "filter"), gone | {"kind": "off"}, ""))
+    shutil.copyfile(deployment.path, path)
+    change(path, changes)
 
 
 Part = dict[str, Any]

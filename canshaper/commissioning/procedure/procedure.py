@@ -22,6 +22,7 @@ from canshaper.commissioning.procedure.state import (
     stamped,
     write_state,
 )
+from canshaper.edit.edit import replace_text
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment
 
@@ -173,7 +174,7 @@ class Procedure:
             text = "was changed by someone else meanwhile; nothing was written, do the step again"
             raise UsageError(f"{path}: {text}")
         if proposal.diff:
-            self._replace(proposal.text)
+            replace_text(path, proposal.text.decode())
             self.state.left = hash_of(path)
         self._keep(proposal, Status.DONE, why=proposal.note)
         if proposal.diff:
@@ -208,13 +209,6 @@ class Procedure:
             before.decode().splitlines(), proposal.text.decode().splitlines(), *names, lineterm=""
         )
         proposal.diff = "\n".join(lines)
-
-    def _replace(self, text: bytes) -> None:
-        """Put the accepted text in place of the file, in one step."""
-        path, copy = self.files.deployment.resolve(), self.files.proposal
-        copy.write_bytes(text)
-        copy.chmod(path.stat().st_mode)
-        copy.replace(path)
 
     def _keep(self, proposal: Proposal, status: Status, why: str = "") -> None:
         done = status is Status.DONE

@@ -6,12 +6,11 @@ from pathlib import Path
 
 from rich.table import Table
 
-from canshaper.commissioning.filter_file import write_section
 from canshaper.commissioning.identification.commands import is_simulated
 from canshaper.commissioning.identification.decay import Value
 from canshaper.commissioning.sensor.finding import Finding, changes
 from canshaper.config.origin import note, written_by
-from canshaper.edit.edit import FileValue
+from canshaper.edit.edit import Change, FileValue, change
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
 from canshaper.report.console import new_table
@@ -75,11 +74,11 @@ def write_sensors(
     else:
         simulated = not live or any(bus.is_virtual for bus in deployment.config.buses.values())
     origin = written_by("sensor", simulated=simulated, log=log.name if log else None)
-    lines = []
+    written: list[Change] = []
     for finding in findings:
         if not finding.poor:
             place = ("axes", finding.axis, "sway_sensor")
             values: dict[str, FileValue] = {**changes(deployment.axes[finding.axis], finding)}
             values["origin"] = origin
-            lines += write_section(deployment.path, place, values, note("sensor"))
-    return lines
+            written.append((place, values, note("sensor")))
+    return change(deployment.path, written) if written else []

@@ -70,25 +70,25 @@ def findings(file: str, channel: str, bitrate: int | None = None) -> dict[str, F
             "slcan-active",
             "can2",
             {"": OK, " bit rate": OK, " queue": OK, " state": OK, " errors": OK}
-            | {" restart": WARNING, " modes": OK},
+            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
         ),
         (
             "slcan-warning",
             "can2",
             {"": OK, " bit rate": OK, " queue": OK, " state": WARNING, " errors": OK}
-            | {" restart": WARNING, " modes": OK},
+            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
         ),
         (
             "slcan-passive",
             "can2",
             {"": OK, " bit rate": OK, " queue": OK, " state": BAD, " errors": WARNING}
-            | {" restart": WARNING, " modes": OK},
+            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
         ),
         (
             "slcan-bus-off",
             "can2",
             {"": OK, " bit rate": OK, " queue": OK, " state": BAD, " errors": WARNING}
-            | {" restart": WARNING, " modes": OK},
+            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
         ),
         ("vcan0", "vcan0", {"": NOTE}),
         ("lo", "lo", {"": BAD}),
@@ -109,6 +109,8 @@ def test_what_is_said() -> None:
     assert "one-shot" in findings("can1-one-shot-long-queue", "can1")["can1 modes"].found
     assert "listen-only off" in findings("can1-listen-only", "can1")["can1 modes"].remedy
     off = findings("slcan-bus-off", "can2")
+    assert "run drives no valve" in off["can2 send confirmation"].found
+    assert "restart-ms" not in off["can2 restart"].remedy
     assert "bus-off" in off["can2 state"].found
     assert off["can2 errors"].found == "counted: bus-off 1, passive 1"
     assert "bitrate 250000 restart-ms 100" in findings("can1-down", "can1")["can1"].remedy

@@ -27,7 +27,7 @@ from canshaper_sim.strokes import Script
 
 GROUP = f"239.81.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 BUS = ["--interface", "udp_multicast", "--channel", GROUP]
-NEUTRAL = b"stopped valves=neutral"
+NEUTRAL = b"stopped valves=sent"
 pytestmark = pytest.mark.processes
 
 

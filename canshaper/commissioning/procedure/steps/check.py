@@ -8,7 +8,7 @@ from canshaper.commissioning.file_warnings import warnings_of
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
 from canshaper.config.source import Source
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import Change, change
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import rehearsed_valves, unstated
 from canshaper.report.style import (
@@ -66,11 +66,13 @@ def run(context: Context) -> Outcome:
 
 
 def _slow_down(deployment: Deployment, axes: list[str]) -> list[str]:
+    changes: list[Change] = []
     for name in axes:
         if "limits" in deployment.config.axes[name].model_fields_set:
-            set_values(deployment.path, ("axes", name, "limits"), {"max_pct": FIRST_PCT})
+            changes.append((("axes", name, "limits"), {"max_pct": FIRST_PCT}, ""))
         else:
-            set_values(deployment.path, ("axes", name), {"limits": {"max_pct": FIRST_PCT}})
+            changes.append((("axes", name), {"limits": {"max_pct": FIRST_PCT}}, ""))
+    change(deployment.path, changes)
     return []
 
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.procedure.bench import STILL_MOVES, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import change
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 from canshaper.report.style import (
@@ -136,9 +136,8 @@ def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str
 
 
 def _write(deployment: Deployment, wrong: dict[str, tuple[str, str]]) -> list[str]:
-    for name, (joystick, signal) in wrong.items():
-        values = {"joystick": joystick, "signal": signal}
-        set_values(deployment.path, ("axes", name, "command"), values)
+    values = {n: {"joystick": j, "signal": signal} for n, (j, signal) in wrong.items()}
+    change(deployment.path, [(("axes", n, "command"), one, "") for n, one in values.items()])
     return []
 
 
