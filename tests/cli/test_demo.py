@@ -41,7 +41,7 @@ def test_without_a_file_it_is_the_recommended_deployment_with_its_price(tmp_path
     raw, shaped = report["crane"]["raw"], report["crane"]["shaped"]
     assert raw["residual_deg"] > 20.0
     assert shaped["residual_deg"] < 1.5
-    assert shaped["peak_deg"] < 0.5 * raw["peak_deg"]
+    assert shaped["peak_deg"] < 0.65 * raw["peak_deg"]  # that of a full reversal
     assert 1.5 < shaped["run_on_s"] < 2.2
     assert 1.2 < shaped["run_on_m"] < 2.2
     for unit, digits in (("s", 2), ("m", 2)):
