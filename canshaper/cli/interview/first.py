@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.limits import Sway
 from canshaper.config.load import limits
-from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.stopping import allowed_s
 
 # Proposals where nothing is known: ten swings in s, speeds of the tip (m/s) and of slewing (rad/s),
 # largest radius in m, timeout of a valve in ms. What stays as it is, the file says as assumed.
@@ -19,6 +17,8 @@ RADIUS_TIMEOUT_MS = 200
 FIRST_MAX_PCT = 40
 # Tail and longest stop: what the run-on of a filter for a swing of two to three seconds takes.
 FIRST_TAIL_S = 2.2
+# Run-on of the first day: 0.36 periods are those of robust 1.8 s at 2.36 s, and a quarter more.
+RUN_ON_PERIODS = 0.45
 # Poles next to the frequency of the swing: the first step of the filter is what was asked, no more.
 POLES_TO_OMEGA = (0.9, 1.1)
 # Room for a wrong stopwatch in what may be changed while it works.
@@ -222,22 +222,18 @@ def ten_swings_s() -> tuple[float, float]:
 
 
 def stop_distance_m(
-    full_speed_m_s: float, joystick_timeout_ms: int, valve_timeout_ms: int
+    full_speed_m_s: float, period_s: float, joystick_timeout_ms: int, valve_timeout_ms: int
 ) -> float:
-    """How far the first limits let the tip travel at full speed, rounded up to a tenth of a metre.
+    """Room for the run-on of a filter and for a lost joystick, rounded up to a tenth of a metre.
 
     Args:
         full_speed_m_s: speed of the tip.
+        period_s: of the swing; a filter that we recommend runs on for a third of it.
         joystick_timeout_ms: age at which the joystick counts as lost.
         valve_timeout_ms: that of the valve, of which its cycle is a third at most.
     """
-    way_s = allowed_s(
-        OutputLimits(tail_s=FIRST_TAIL_S),
-        stop_s=FIRST_TAIL_S,
-        timeout_s=joystick_timeout_ms / 1000.0,
-        period_s=valve_timeout_ms / 3000.0,
-    )
-    return math.ceil(10.0 * full_speed_m_s * way_s) / 10.0
+    waits_s = joystick_timeout_ms / 1000.0 + 2.0 * valve_timeout_ms / 3000.0
+    return math.ceil(10.0 * full_speed_m_s * (waits_s + RUN_ON_PERIODS * period_s)) / 10.0
 
 
 def rounded(number: float) -> str:
