@@ -17,7 +17,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 685,
+    "CHANGELOG.md": 675,
     "CONTRIBUTING.md": 500,
     "README.md": 590,
     "SECURITY.md": 430,
