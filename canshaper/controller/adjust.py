@@ -97,6 +97,9 @@ class Adjuster:
         if runner.limits(config) != before and not runner.axis.neutral:
             state = runner.axis.state.name
             raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
+        if runner.axis.commanded and not runner.axis.command:
+            # Another filter may ask for a motion that no one asks for any more.
+            raise ValueError(f"axes.{name}: it runs on with its joystick released; wait for rest")
         rate = config.limits.slowest_per_s
         if fault := filter_fault(config.filter, config.sway, runner.period_s, rate):
             raise ValueError(f"axes.{name}.filter: {fault}")
