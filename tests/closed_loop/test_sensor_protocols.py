@@ -107,7 +107,7 @@ def test_it_is_trusted_and_damps_with_a_length_that_is_30_percent_wrong(
     print(f"{damped.swing_deg:.2f} degrees left, only watched {watched.swing_deg:.2f}")
     assert damped.trust == ["UNPROVED", "TRUSTED"]
     assert damped.swing_deg < 0.3 * watched.swing_deg
-    assert damped.swing_deg < 1.6
+    assert damped.swing_deg < 2.2  # of a reversal that is cut short
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_the_shortest_fusion_that_check_takes_damps_and_a_short_one_would_not(
     plain = drive(watched, length_pct).swing_deg
     least, short = (drive(deployment, length_pct, fusion_s=s).swing_deg for s in (3.3, 0.5))
     print(f"{least:.2f} degrees left, {short:.2f} with 0.5 s, {plain:.2f} without a sensor")
-    assert least < max(0.3 * plain, 1.0)
+    assert least < max(0.5 * plain, 1.0)  # of a reversal that is cut short
     assert short > max(plain, 3.0)
 
 

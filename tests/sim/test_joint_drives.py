@@ -74,7 +74,7 @@ def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
     slew, loading = ((left_deg(shipped, s), left_deg(file, s)) for s in ("pulse-slew", "loading"))
     print(f"slew {slew[0]:.1f} and {slew[1]:.1f}, loading {loading[0]:.1f} and {loading[1]:.1f}")
     assert slew[1] < 0.5 * slew[0]
-    assert loading[1] > loading[0]
+    assert loading[1] > 0.9 * loading[0]  # it takes nothing of the swing away
 
 
 def test_drive_joint_by_joint_is_recorded() -> None:

@@ -69,7 +69,7 @@ def test_write_lengthens_a_tail_that_is_too_short(file: Path) -> None:
     assert load_deployment(file).axes["near_far"].config.limits.tail_s == 2.5
     checked = CliRunner().invoke(app, ["check", str(file)]).output
     assert "designed_for" not in checked
-    warning = "WARNING: near_far: its filter needs 1.21 m; stop_distance_m ends it at 1 m"
+    warning = "WARNING: near_far: its filter needs 1.25 m; stop_distance_m ends it at 1 m"
     assert warning in " ".join(checked.split())
 
 
