@@ -107,22 +107,23 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
 def needed_s(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> float:
     """Travel to which an axis can be bounded without cutting the run-on of its filter short.
 
-    That of the worst release: after full speed for any time, and after a lost joystick.
+    Of all strokes at full speed the worst one counts, and the wait for a lost joystick.
 
     Args:
         new_axis: makes the axis, with ``OutputLimits.run_on`` that bounds nothing.
         timeout_s, period_s: as of ``travel``.
     """
     most = 0.0
+    ticks = max(round(RELEASES_S / period_s), 1)
     for sign in (1.0, -1.0):
-        axis = new_axis()
+        axis, way = new_axis(), 0.0
         axis.tick(CommandInput())
         for _ in range(round(LONGEST_PULSE_S / RELEASES_S)):
-            for _ in range(round(RELEASES_S / period_s)):
+            for _ in range(ticks):
                 axis.tick(CommandInput(sign))
-            most = max(most, _way(axis, CommandInput(), sign, period_s)[0])
-        waits = sign * axis.sent * (timeout_s + 2.0 * period_s)
-    return waits + most
+            way = max(way, _way(axis, CommandInput(), sign, period_s)[0])
+        most = max(most, sign * axis.sent * (timeout_s + 2.0 * period_s) + way)
+    return most
 
 
 def _way(

@@ -12,6 +12,7 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.stopping import allowed_s, needed_s, travel
+from canshaper.shaping.valve_curve import ValveCurve
 from tests.shaping.test_stopping import axis_with
 
 DriveWith = Callable[..., Any]
@@ -207,3 +208,16 @@ def test_what_a_filter_needs_cuts_nothing_of_it(kind: str) -> None:
     short = replace(free, run_on=0.8 * (needed - waits))
     assert travel(lambda: axis(short), **times).lost < whole.lost - 0.01
     assert allowed_s(short, stop_s=5.0, **times) == pytest.approx(short.run_on + waits)
+
+
+def test_a_slow_valve_needs_the_wait_for_its_command() -> None:
+    times = {"timeout_s": 0.6, "period_s": 0.2}
+    needed = needed_s(lambda: axis_with(OutputLimits(), "off", period_s=0.2), **times)
+    assert needed == pytest.approx(1.0, abs=0.01)  # timeout and two periods; it falls in one
+
+
+@pytest.mark.parametrize("speeds", [[-1.0, 0.0, 0.0, 0.5], [-0.5, 0.0, 0.0, 1.0]])
+def test_the_quicker_side_of_a_valve_counts(speeds: list[float]) -> None:
+    limits = OutputLimits(curve=ValveCurve([-1.0, -0.05, 0.05, 1.0], speeds))
+    needed = needed_s(lambda: axis_with(limits), timeout_s=0.1, period_s=TICK_S)
+    assert needed == pytest.approx(0.14 + 0.09, abs=1e-3)
