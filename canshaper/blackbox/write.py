@@ -62,8 +62,8 @@ def write_box(
     path = folder / f"{stem}-{number:04d}.zip"
     for part in folder.glob(f"{stem}-*.zip.part"):  # of a process that was killed
         part.unlink(missing_ok=True)
-    old = sorted(_numbered(folder, stem).keys() - {number})
     there = _numbered(folder, stem)
+    old = sorted(there.keys() - {number})
     while True:
         try:
             _write(path, deployment, [*segments], why)

@@ -125,7 +125,7 @@ def carrier(one: socket.socket) -> bool | None:
 
 
 def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
-    """What to say where the interface of a socket has lost its name; empty where it has it."""
+    """Say that the interface of a socket has lost its name, and to which; empty where it has it."""
     name = one.getsockname()[0]
     if name in ("", channel):
         return ""

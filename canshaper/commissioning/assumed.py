@@ -1,6 +1,6 @@
 """Origins of the numbers that decide about movement: assumed, default, typed or measured."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ from canshaper.config.origin import Origin
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section, sections
 from canshaper.config.source import Place
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import Change, change, sections_of
 from canshaper.machine.used_message import key_path
 
 # Sections of an axis whose numbers decide how it moves, and the keys that say where they are from.
@@ -33,16 +33,25 @@ def assumptions(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
             yield ("assumed", where), f"{name} moves by {', '.join(numbers)}: a guess; {MEASURE}"
 
 
-def confirm(path: Path, keys: Iterable[str]) -> None:
-    """Note that someone has measured or typed numbers: they are assumed no more.
+def confirmed(path: Path, keys: Iterable[str]) -> list[Change]:
+    """Change of the file, where one is due: someone has measured or typed these numbers.
+
+    Raises:
+        ConfigError: the file cannot be read.
+    """
+    assumed, known = load_config(path)[0].assumed, {*keys}
+    left = [key for key in assumed if key not in known]
+    return [((), {"assumed": left or None}, "")] if left != assumed else []
+
+
+def write_numbers(path: Path, values: Mapping[str, float]) -> None:
+    """Write numbers that a person has set into a deployment file; see ``change``.
 
     Raises:
         ConfigError: the file cannot be changed.
     """
-    assumed, known = load_config(path)[0].assumed, {*keys}
-    left = [key for key in assumed if key not in known]
-    if left != assumed:
-        set_values(path, (), {"assumed": left or None})
+    numbers = [(place, of_section, "") for place, of_section in sections_of(values).items()]
+    change(path, [*numbers, *confirmed(path, values)])
 
 
 def origins(config: DeploymentConfig) -> Iterator[tuple[str, str, str]]:

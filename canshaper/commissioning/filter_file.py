@@ -5,7 +5,7 @@ from pathlib import Path
 
 from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisSection
-from canshaper.edit.edit import Change, FileValue, change
+from canshaper.edit.edit import Change, FileValue, change, of_limits
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
 
@@ -42,10 +42,8 @@ def write_filter(
     if tail_s is not None and tail_s > config.limits.tail_s:
         limits = config.limits.model_copy(update={"tail_s": tail_s})
         kept = stop_fault(deployment, axis, config.model_copy(update={"limits": limits}))
-        if not kept and "limits" in config.model_fields_set:
-            changes.append((("axes", axis, "limits"), {"tail_s": tail_s}, ""))
-        elif not kept:
-            changes.append((("axes", axis), {"limits": {"tail_s": tail_s}}, ""))
+        if not kept:
+            changes.append(of_limits(axis, config, {"tail_s": tail_s}))
     lines = change(path, changes)
     was, kind = config.filter.kind, filter_values["kind"]
     if was != kind:

@@ -1,4 +1,4 @@
-"""What a machine may have, and what is more often a mistake of its files."""
+"""Warnings of settings that a machine may have, and that are more often a mistake."""
 
 from collections.abc import Iterator
 

@@ -1,6 +1,6 @@
 """Reads a deployment in a process of its own, so that the control loop never waits for it.
 
-The process may take only so much memory and time: docs/decisions/0008-the-loop-waits-for-no-one.md.
+The process may take only so much memory and time: docs/decisions.md#the-loop-waits-for-no-one.
 """
 
 import os

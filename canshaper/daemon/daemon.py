@@ -173,15 +173,18 @@ class Daemon:
             self._line.check(now_ns, neutral=controller.neutral)
         if self._control:
             self._control.serve(self._answer, now_ns)
-        trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
-        trouble += ["tick plain"] if self._follower and not self._follower.follows else []
-        if self._reporter.status(now_ns, trouble):
+        if self._reporter.status(now_ns, self._trouble):
             for name, port in self._ports.items():
                 if news := port.look():
                     log.warning("bus=%s %s", name, news)
             self._send_identity()
             flush()  # a reader that was slow may be back
         self._collector.pause(now_ns)
+
+    def _trouble(self) -> list[str]:
+        """Entries that the status line of the service begins with."""
+        trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
+        return trouble + ["tick plain"] * bool(self._follower and not self._follower.follows)
 
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
         """Answer one request from the control socket."""

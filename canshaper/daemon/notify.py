@@ -88,7 +88,3 @@ class ServiceManager:
         except OSError:  # the manager is gone; it will find us when it is back
             return True
         return True
-
-
-# sys/mman.h and linux/prctl.h
-MCL_CURRENT, MCL_FUTURE = 1, 2

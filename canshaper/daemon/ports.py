@@ -100,7 +100,7 @@ def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> bool:
 
 
 def seen_sent(ports: Iterable[Port], receive: Callable[[Frame], object]) -> str:
-    """What is known, within a moment, of valve frames that were all sent.
+    """Wait a moment for valve frames that were all sent to be confirmed.
 
     Args:
         ports: the buses.

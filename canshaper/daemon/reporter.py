@@ -1,7 +1,7 @@
 """Reports of the daemon: the journal, and the service manager's line."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port
@@ -76,12 +76,12 @@ class Reporter:
         """Take the lateness of a tick."""
         self._latest_ns = max(self._latest_ns, late_ns)
 
-    def status(self, now_ns: int, trouble: list[str]) -> bool:
+    def status(self, now_ns: int, trouble: Callable[[], list[str]]) -> bool:
         """Renew the service manager's line once a second; whether it was time.
 
         Args:
             now_ns: time of the tick.
-            trouble: what stands first in it.
+            trouble: makes the entries that stand first in it, when it is time.
         """
         if now_ns < self._status_ns:
             return False
@@ -90,7 +90,7 @@ class Reporter:
             if port.waited != self._waited[name]:
                 self._waited[name] = port.waited
                 log.warning("bus=%s waited=%d: valve frames, in a queue", name, port.waited)
-        self._manager.status(self._summary(trouble))
+        self._manager.status(self._summary(trouble()))
         self._latest_ns = 0
         return True
 

@@ -20,6 +20,7 @@ from typing import Any
 import yaml
 
 from canshaper.config.adjust import Key
+from canshaper.config.schema import AxisSection
 from canshaper.config.section import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source, read_bounded
 from canshaper.edit.spans import Edit
@@ -71,6 +72,13 @@ def read_back(value: Any) -> Any:
 
 Change = tuple[Place, Mapping[str, FileValue], str]
 """Keys down to a section, values by key, and one line in place of comments on them or none."""
+
+
+def of_limits(name: str, axis: AxisSection, values: Mapping[str, Any]) -> Change:
+    """Return the change of values in the section limits of an axis, which may not be there yet."""
+    if "limits" in axis.model_fields_set:
+        return ("axes", name, "limits"), values, ""
+    return ("axes", name), {"limits": values}, ""
 
 
 def set_values(
@@ -218,15 +226,6 @@ def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | No
         if key.section == "sway":
             numbers["origin"] = None
     return sections
-
-
-def write_numbers(path: Path, values: Mapping[str, float]) -> None:
-    """Write numbers into a deployment file; see ``change``.
-
-    Raises:
-        ConfigError: the file cannot be changed.
-    """
-    change(path, [(place, numbers, "") for place, numbers in sections_of(values).items()])
 
 
 def _check(path: Path, temporary: Path, expected: Any) -> None:

@@ -12,10 +12,10 @@ _OTHER = "name another signal, or correct VAL_ where the DBC is wrong"
 
 
 class Contrary(NamedTuple):
-    """What a switch would do.
+    """Effect of a switch that is taken for its contrary, and the cure.
 
     Attributes:
-        effect: before where it would be then.
+        effect: in words that end before the position of the switch.
         cure: what to write instead.
         stop: whether it is an emergency stop.
     """

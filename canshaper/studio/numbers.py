@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from canshaper.commissioning import control_client as client
-from canshaper.commissioning.assumed import confirm
+from canshaper.commissioning.assumed import write_numbers
 from canshaper.config.adjust import Key, value
 from canshaper.config.load import load_config
-from canshaper.edit.edit import edited, sections_of, write_numbers
+from canshaper.edit.edit import edited, sections_of
 from canshaper.errors import CanshaperError, ControlError
 from canshaper.studio.words import said
 
@@ -169,7 +169,6 @@ class LiveNumbers:
                 raise ControlError(said("filechanged", file=self._file))
             values = self._unwritten()
             write_numbers(self._file, values)
-            confirm(self._file, values)
             keys = ", ".join(values) or "-"
             self._report(said("wrote", who=who, keys=keys, file=self._file.name))
             self.version += 1

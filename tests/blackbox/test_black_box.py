@@ -160,13 +160,13 @@ def test_a_file_that_could_not_be_written_is_tried_again_and_said_until_then(
     summaries: list[str] = []
     summary = Reporter._summary
 
-    def heard(reporter: Reporter, trouble: list[str]) -> str:
+    def noted(reporter: Reporter, trouble: list[str]) -> str:
         summaries.append(summary(reporter, trouble))
         if len(summaries) == 90:
             folder.unlink()
         return summaries[-1]
 
-    monkeypatch.setattr(Reporter, "_summary", heard)
+    monkeypatch.setattr(Reporter, "_summary", noted)
     drive(bench, folder, 100 * SECOND)
     said = [one.startswith("black box not written: File exists, slew") for one in summaries]
     assert said == sorted(said, reverse=True)

@@ -252,26 +252,26 @@ def test_a_classical_bus_that_takes_no_frame_has_failed(line: Line) -> None:
 def test_a_flood_of_error_frames_is_left_to_the_kernel_for_a_while(
     make_line: Callable[..., Line], monkeypatch: pytest.MonkeyPatch, ids: object
 ) -> None:
-    heard: list[tuple[int, int]] = []
+    asked: list[tuple[int, int]] = []
     line = make_line(ids)
     monkeypatch.setattr(
-        raw, "receive_errors", lambda one, classes: heard.append((one.fileno(), classes))
+        raw, "receive_errors", lambda one, classes: asked.append((one.fileno(), classes))
     )
     number = line.near[len(line.near) // 2].fileno()
     for _ in range(MOST_ERRORS - 1):
         line.error(BERR)
     line.received()
-    assert heard == []  # each tick for itself
+    assert asked == []  # each tick for itself
     for _ in range(MOST_ERRORS + 5):
         line.error(BERR)
     line.received()
-    assert heard == [(number, STATE_CLASSES)]
+    assert asked == [(number, STATE_CLASSES)]
     line.now_ns += QUIET_NS - 1
     line.received()
     line.now_ns += 1
     line.received()
     line.received()
-    assert heard == [(number, STATE_CLASSES), (number, ERROR_CLASSES)]
+    assert asked == [(number, STATE_CLASSES), (number, ERROR_CLASSES)]
     assert len(line.faults) == 2 * MOST_ERRORS + 4
 
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.assumed import confirm, origins
+from canshaper.commissioning.assumed import confirmed, origins, write_numbers
 from canshaper.commissioning.file_warnings import warnings_of
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.state import Context, Record, State, Status
 from canshaper.commissioning.procedure.steps import report
-from canshaper.edit.edit import write_numbers
+from canshaper.edit.edit import change
 from canshaper.machine.binding import load_deployment
 from tests.controller.adjustable import CONTROL
 from tests.rigs.files import Machine
@@ -34,13 +34,10 @@ def test_a_check_shows_them_by_axis_and_what_is_no_number(guessed: Machine) -> N
 def test_what_is_written_is_assumed_no_more(guessed: Machine) -> None:
     path = guessed.load().path
     write_numbers(path, {PERIOD: 2.4})
-    confirm(path, [PERIOD])
     assert "assumed: [axes.slew.valve.timeout_ms, axes.lift.speed]" in path.read_text()
-    confirm(path, [TIMEOUT, "axes.lift.speed"])
+    change(path, confirmed(path, [TIMEOUT, "axes.lift.speed"]))
     assert "assumed" not in path.read_text()
-    before = path.stat()
-    confirm(path, [PERIOD])
-    assert path.stat() == before, "nothing to take out, nothing is written"
+    assert confirmed(path, [PERIOD]) == [], "nothing to take out, nothing is written"
 
 
 def test_each_number_has_an_origin(guessed: Machine) -> None:
@@ -60,7 +57,7 @@ def test_a_report_is_fit_to_sign_without_any(
     guessed: Machine, tmp_path: Path, taken: tuple[str, ...], fit: bool
 ) -> None:
     path = guessed.load().path
-    confirm(path, ("axes.lift.speed", *taken))
+    change(path, confirmed(path, ("axes.lift.speed", *taken)))
     state = State(steps={"drive": Record(Status.DONE)})
     context = Context(load_deployment(path), Simulated(None, []), tmp_path, state)  # type: ignore[arg-type]
     said = " ".join(str(part["text"]) for part in report.run(context).sheet.parts)

@@ -46,7 +46,7 @@ def is_there(file: str, part: str) -> bool:
 
 
 def faults(text: str) -> list[str]:
-    """What is wrong with the claims of a page."""
+    """Yield the faults of the claims of a page."""
     wrong, ids = [], Counter[str]()
     for entry in entries(text):
         claim = CLAIM.match(entry)

@@ -147,7 +147,7 @@ MACHINES = [
     ),
     *(
         Trap(
-            f"the tip is {new} beside the slewing",
+            f"the tip is {new} next to the slewing",
             "measure both",
             {SWAY: f"full_speed_m_s: {new}"},
             warns=True,

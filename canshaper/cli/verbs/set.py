@@ -46,8 +46,7 @@ def set(
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
     from canshaper.commissioning import control_client as client
-    from canshaper.commissioning.assumed import confirm
-    from canshaper.edit.edit import write_numbers
+    from canshaper.commissioning.assumed import write_numbers
     from canshaper.report.console import SafeConsole
 
     deployment = loader(file)()
@@ -61,7 +60,6 @@ def set(
     table = client.table(path)
     if values and write:
         write_numbers(deployment.path, values)
-        confirm(deployment.path, values)
     if as_json:
         echo(json.dumps(table, indent=2))
         return

@@ -1,9 +1,9 @@
 """A measured valve curve in the file."""
 
-from canshaper.commissioning.assumed import confirm
+from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.config.origin import note, written_by
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import Change, change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 
@@ -74,5 +74,6 @@ def write_curve(deployment: Deployment, axis: str, result: Calibration, *, simul
         "curve_speed_pct": speeds,
         "curve_origin": written_by("calibrate", simulated=simulated),
     }
-    set_values(deployment.path, ("axes", axis, "limits"), values, note("calibrate"))
-    confirm(deployment.path, (f"axes.{axis}.limits.{key}" for key in values))
+    written: Change = (("axes", axis, "limits"), values, note("calibrate"))
+    measured = (f"axes.{axis}.limits.{key}" for key in values)
+    change(deployment.path, [written, *confirmed(deployment.path, measured)])

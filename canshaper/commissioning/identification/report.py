@@ -5,7 +5,7 @@ import statistics
 from collections.abc import Sequence
 from typing import Any
 
-from canshaper.commissioning.assumed import confirm
+from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.identification.decay import Value
 from canshaper.commissioning.identification.recommend import Advice, advise, flow
 from canshaper.commissioning.identification.series import Kind
@@ -177,6 +177,5 @@ def write_sway(
         changes.append((("axes", one.axis, "sway"), values, note("identify")))
         same = {"full_speed_m_s"} if sway.full_speed_m_s == one.sway["full_speed_m_s"] else set()
         measured += (f"axes.{one.axis}.sway.{key}" for key in values.keys() - same)
-    change(deployment.path, changes)
-    confirm(deployment.path, measured)
+    change(deployment.path, [*changes, *confirmed(deployment.path, measured)])
     return [one.axis for one in usable]

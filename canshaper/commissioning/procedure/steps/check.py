@@ -8,7 +8,7 @@ from canshaper.commissioning.file_warnings import warnings_of
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
 from canshaper.config.source import Source
-from canshaper.edit.edit import Change, change
+from canshaper.edit.edit import change, of_limits
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import rehearsed_valves, unstated
 from canshaper.report.style import (
@@ -66,13 +66,8 @@ def run(context: Context) -> Outcome:
 
 
 def _slow_down(deployment: Deployment, axes: list[str]) -> list[str]:
-    changes: list[Change] = []
-    for name in axes:
-        if "limits" in deployment.config.axes[name].model_fields_set:
-            changes.append((("axes", name, "limits"), {"max_pct": FIRST_PCT}, ""))
-        else:
-            changes.append((("axes", name), {"limits": {"max_pct": FIRST_PCT}}, ""))
-    change(deployment.path, changes)
+    sections, slow = deployment.config.axes, {"max_pct": FIRST_PCT}
+    change(deployment.path, [of_limits(name, sections[name], slow) for name in axes])
     return []
 
 

@@ -13,7 +13,7 @@ from canshaper.commissioning.procedure.steps.check import FIRST_PCT, MOTION
 from canshaper.commissioning.procedure.steps.dry import PAUSE_S, ends, figure, show_states
 from canshaper.commissioning.procedure.traffic import AxisTraffic, read_traffic
 from canshaper.config.source import Source
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.strokes import Script, Stroke
@@ -83,8 +83,7 @@ def run(context: Context) -> Outcome:
 
 
 def _begin(deployment: Deployment, names: list[str]) -> list[str]:
-    for name in names:
-        set_values(deployment.path, ("motion", name), {"waits": None})
+    change(deployment.path, [(("motion", name), {"waits": None}, "") for name in names])
     return []
 
 
