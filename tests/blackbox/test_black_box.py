@@ -150,6 +150,7 @@ def test_a_folder_is_made_where_it_is_not_there_or_goes(
     assert [path.name for path in folder.iterdir()] == ["machine-0001.zip"]
 
 
+@pytest.mark.slow
 def test_a_file_that_could_not_be_written_is_tried_again_and_said_until_then(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
 ) -> None:
