@@ -18,7 +18,7 @@ from canshaper.machine.dbc_text import MOST_MESSAGES, MOST_STATEMENTS, WIDE_ID, 
 
 # Of all DBC files of a deployment: five times those of a machine.
 MOST_BYTES = 16 << 20
-_DEFINITION = re.compile(r"\s*BO_\s+(\d{1,10})\s+(\w+)")
+_DEFINITION = re.compile(r"\s*BO_\s+(-?\d{1,10})\s+(\w+)")
 
 
 @dataclass(frozen=True)

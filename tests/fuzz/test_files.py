@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, event, given, settings
+from hypothesis import HealthCheck, event, example, given, settings
 from hypothesis import strategies as st
 
 from canshaper.machine.deployment import Deployment
@@ -99,6 +99,7 @@ def test_any_change_of_a_deployment_file(
 @pytest.mark.slow
 @many
 @given(name=names, change=changes(DBC_WORDS))
+@example(name="forwarder", change=[(485, 0, "-0")])  # an id that only the parser reads
 def test_any_change_of_a_dbc_file(
     load: Load, name: str, change: list[tuple[int, int, str]]
 ) -> None:
