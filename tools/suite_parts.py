@@ -115,7 +115,7 @@ def rows_of_test() -> list[list[Part]]:
     repeatable = "--hypothesis-profile=repeatable"
     fast = pytest(*SPREAD, "--budget", repeatable, "-m", "not slow and not study")
     few = browser("--budget", "-m", "not slow")
-    kernel = hil("socketcan daemon lying_buses", "-m", "not slow")
+    kernel = hil("socketcan daemon", "-m", "not slow")
     return [
         [Part("lint", "style and format", style)],
         [Part("fast", "all tests of less than a second of a processor", [fast])],
