@@ -30,6 +30,7 @@ LISTED_S = 60.0
 # Slow tests that every run of `make test` has, by the beginning of their names.
 STUDIO = "tests/studio/test_server.py::test_every_shipped_machine_is_driven_with_all_its_axes"
 PAGE = "tests/studio/test_browser.py"
+KILLED = "tests/commissioning/test_killed_writers.py::test_killed_at_any_call_into_the_kernel"
 FAMILIES = ("forwarder-robust", "j1939-forwarder", "canopen-forwarder", "two-cranes")
 LISTED: Mapping[str, str] = {
     "tests/blackbox/test_sequences.py::test_what_is_played_is_the_same[forwarder-robust": "replay",
@@ -38,7 +39,7 @@ LISTED: Mapping[str, str] = {
     "tests/closed_loop/test_sway_sensor_slewing.py::test_a_slew_is_damped": "with a sensor",
     "tests/closed_loop/test_twin.py::test_both_axes_at_fourteen": "a crane that shares no code",
     "tests/commissioning/identification/test_identify_command.py::test_empty_and_loaded": "swings",
-    "tests/commissioning/test_killed_writers.py::test_killed_at_any_call": "never half a file",
+    f"{KILLED}[calibrated": "never half a file",
     "tests/commissioning/procedure/test_commission.py::test_answers_come_from_a_file": "the whole",
     "tests/controller/test_any_frames.py": "whatever frames come, nothing moves unasked",
     "tests/docs/test_commands.py::test_a_page_shows_what_the_command_prints[README": "read first",

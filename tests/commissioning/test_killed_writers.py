@@ -146,6 +146,7 @@ def written(writer: Writer, deployment: Deployment) -> tuple[bytes, bytes]:
     return old, new
 
 
+@pytest.mark.slow
 def test_killed_at_any_call_into_the_kernel(writer: Writer, before: Deployment) -> None:
     old, new = written(writer, before)
     seen, number = set(), 1

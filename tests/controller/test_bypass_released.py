@@ -1,6 +1,7 @@
 """Anti-sway is switched on in motion: what ran without the filter is not run again by it."""
 
 import random
+from functools import cache
 
 import pytest
 
@@ -14,8 +15,11 @@ from tests.faults.shipped import CONFIG, NAMES
 EDGE = 1e-9
 
 
+deployment_of = cache(load_deployment)
+
+
 def runners(name: str) -> list[AxisControl]:
-    return list(Controller(load_deployment(CONFIG / f"{name}.yaml")).axes.values())
+    return list(Controller(deployment_of(CONFIG / f"{name}.yaml")).axes.values())
 
 
 def unshaped(runner: AxisControl, rng: random.Random) -> tuple[OutputLimits, float]:

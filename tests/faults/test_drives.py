@@ -20,7 +20,7 @@ from tests.faults.variants import NAMES, machine
 DRIVES = 10_000
 CHUNK = 250
 # So many in ``make test``, in chunks of 15, and with the tests marked slow; the others are a study.
-QUICK, OFTEN = 240, 2_500
+QUICK, OFTEN = 150, 2_500
 # Seen after many drives.
 RARE = {SecondSenderUnseen, SendFailureUnseen, StopUnseen}
 

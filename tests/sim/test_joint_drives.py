@@ -111,7 +111,8 @@ def test_drives_are_bit_identical() -> None:
 @pytest.mark.parametrize(
     "name",
     ["pulse-lift_cylinder", "pulse-knuckle", "pulse-extension", "demo-joints", "loading-joints"]
-    + [f"random-{seed}" for seed in range(12)],
+    + [f"random-{seed}" for seed in range(4)]
+    + [pytest.param(f"random-{seed}", marks=pytest.mark.slow) for seed in range(4, 12)],
 )
 def test_joint_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
     script = script_named(name, JOINT_AXES)
@@ -124,7 +125,9 @@ def test_joint_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["demo", "one-by-one", "loading", *(f"random-{seed}" for seed in range(6))]
+    "name",
+    ["demo", "one-by-one", "loading", *(f"random-{seed}" for seed in range(3))]
+    + [pytest.param(f"random-{seed}", marks=pytest.mark.slow) for seed in range(3, 6)],
 )
 def test_tip_scripts_keep_the_joints_off_their_stops(name: str) -> None:
     script = script_named(name)

@@ -64,7 +64,13 @@ def test_pushes_by_hand_while_it_is_driven(degrees: float) -> None:
     refused(replace(one, value=swing), "commands of near_far to explain 80 %", DRIVE_IT)
 
 
-@pytest.mark.parametrize("at_s", np.arange(FIRST_S, 20.0, 0.7))
+@pytest.mark.parametrize(
+    "at_s",
+    [
+        pytest.param(at_s, marks=[pytest.mark.slow] if number % 4 else [])
+        for number, at_s in enumerate(np.arange(FIRST_S, 20.0, 0.7))
+    ],
+)
 def test_one_push_is_seen_or_does_no_harm(at_s: float) -> None:
     one = good()
     finding = examine(AXIS, replace(one, value=one.value + pushed(one.time_s, at_s, 2.0)))
