@@ -27,7 +27,7 @@ from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.io_cycle import Standstill, io_cycle
+from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
 

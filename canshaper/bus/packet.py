@@ -1,10 +1,9 @@
-"""Received packet: its frame, its arrival, the clock that stamps it, errors that it reports."""
+"""Received packet: its frame, its arrival, errors that it reports."""
 
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self
 
 from canshaper.codec.frame import (
@@ -18,16 +17,7 @@ from canshaper.codec.frame import (
     id_of,
     new_frame,
 )
-
-# Time since the machine was booted, ns. No one can set it, and unlike CLOCK_MONOTONIC it goes on
-# while the machine is suspended: an age, and a standstill of the loop, includes that time. Other
-# systems than Linux only simulate a machine, and there any clock that runs forward serves.
-boottime_ns: Callable[[], int] = (
-    partial(time.clock_gettime_ns, time.CLOCK_BOOTTIME)
-    if hasattr(time, "CLOCK_BOOTTIME")
-    else time.monotonic_ns
-)
-
+from canshaper.gate.loop import boottime_ns
 
 CAN_FRAME = struct.Struct("=IB3x8s")
 SIZE = CAN_FRAME.size

@@ -11,7 +11,6 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
-from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
@@ -20,8 +19,6 @@ from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import tick_follower
-from canshaper.daemon.io_cycle import Standstill, io_cycle
-from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
     close_ports,
@@ -36,6 +33,8 @@ from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.reloads import Reloads
 from canshaper.daemon.reporter import Reporter, flush
 from canshaper.errors import BusError, InternalError, raised
+from canshaper.gate.cycle import Standstill, io_cycle
+from canshaper.gate.loop import boottime_ns, run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 

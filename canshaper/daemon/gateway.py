@@ -15,8 +15,8 @@ from canshaper.bus.raw import GONE, REOPEN_NS
 from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
-from canshaper.daemon.io_cycle import FrameProcessor, Standstill, receive_waiting
 from canshaper.errors import BusError, GatewayError, WrongDeviceError
+from canshaper.gate.cycle import FrameProcessor, Standstill, receive_waiting
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import Rule, between, difference, rules
 from canshaper.protocols.gateway.forwarding import Pattern

@@ -3,12 +3,12 @@
 import logging
 from collections.abc import Callable, Mapping
 
-from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.daemon.notify import ServiceManager
+from canshaper.gate.loop import boottime_ns
 from canshaper.machine.filters import unfit
 from canshaper.shaping.states import State
 

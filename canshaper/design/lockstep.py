@@ -9,8 +9,8 @@ from typing import Protocol, TypedDict, Unpack
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.io_cycle import FrameProcessor, Standstill, io_cycle
 from canshaper.errors import DriveError
+from canshaper.gate.cycle import FrameProcessor, Standstill, io_cycle
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import Key
 from canshaper_sim.crane import CraneParameters

@@ -1,9 +1,10 @@
 """The gate: the one ring through which alone a valve frame leaves.
 
-If this is right, no other line of the program can break promises 1 to 5 of docs/safety.md: no
-motion without an operator; neutral stops; never faster than asked, nor against the joystick; every
-frame is one of its tick; one wrong command reaches no valve. Promise 6, that each fault has a name
-and a way back, is the controller's.
+If this is right, no line of the program that computes a frame can break promises 1 to 5 of
+docs/safety.md: no motion without an operator; neutral stops; never faster than asked, nor against
+the joystick; every frame is one of its tick; one wrong command reaches no valve. Promise 6, that
+each fault has a name and a way back, is the controller's. What is passed leaves by a port of
+``bus``, which changes no byte; tests/gate/test_senders.py names every line that calls one.
 
 It knows nothing of how a frame was made. It reads the frames of joysticks, switches and emergency
 stop for itself, remembers what it needs of them, and looks at every byte of every frame that wants
@@ -19,6 +20,8 @@ log, or nothing where that is refused too.
     axis.py      an axis: is it armed, what was asked of it, what left for its valve
     rules.py     the ten rules, each a function of what was received, what left before, and now
     gate.py      frames come in, a tick begins, a frame wants to leave; a reload
+    cycle.py     one tick between buses and controller; after a standstill nothing leaves
+    loop.py      the clock, and a loop at its deadlines
 
 An axis is *armed* when its joystick was seen in neutral, valid and enabled, since the last reason
 to stop. A soft reason (rule 2) leaves it ``stop_s`` in which it may fall; a hard one (rule 1)

@@ -9,7 +9,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.controller.runner import AxisControl
-from canshaper.daemon.io_cycle import Standstill, io_cycle
+from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.recording.channels import Key, Kind
 from canshaper.shaping.states import Reason
 

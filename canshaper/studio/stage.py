@@ -10,10 +10,10 @@ from typing import Any
 
 from canshaper.codec.frame import Frame
 from canshaper.commissioning import control_client as client
-from canshaper.daemon.loop import run_at_deadlines
 from canshaper.design.lockstep import driven_part
 from canshaper.design.processes import Transport, on_transport
 from canshaper.errors import ControlError
+from canshaper.gate.loop import run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.bus import packet, raw
-from canshaper.bus.packet import SO_TIMESTAMPNS, Arrivals, boottime_ns, stamp_ns
+from canshaper.bus.packet import SO_TIMESTAMPNS, Arrivals, stamp_ns
 from canshaper.bus.port import ListeningPort
 from canshaper.bus.raw import REOPEN_NS
+from canshaper.gate.loop import boottime_ns
 from tests.bus.clocks import START_NS, WALL_NS, Clocks, arrivals_of
 from tests.bus.raw_line import IDS, RECEIVED, TICK_NS, Line, message
 

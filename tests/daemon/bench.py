@@ -11,9 +11,10 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.daemon import daemon as module
-from canshaper.daemon import io_cycle, loop, reloads, reporter
 from canshaper.daemon import ports as service_ports
+from canshaper.daemon import reloads, reporter
 from canshaper.daemon.daemon import Daemon
+from canshaper.gate import cycle, loop
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import BusRoutes
@@ -101,7 +102,7 @@ class Bench:
         self._handlers: dict[int, Any] = {}
         for one in (loop, service_ports):
             monkeypatch.setattr(one, "time", self)
-        for one in (module, reporter, loop, io_cycle):
+        for one in (module, reporter, loop, cycle):
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
         leave = lambda code: pytest.fail(f"left with {code}")  # noqa: E731

@@ -7,8 +7,8 @@ import pytest
 
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import gateway
-from canshaper.daemon.io_cycle import FramePort, FrameProcessor, Standstill, receive_waiting
 from canshaper.errors import BusError
+from canshaper.gate.cycle import FramePort, FrameProcessor, Standstill, receive_waiting
 from canshaper.machine.deployment import Deployment
 from tests.daemon.bench import Bench, at
 from tests.rigs.forwarder import ROOT

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.daemon.io_cycle import Standstill, io_cycle, receive_waiting
+from canshaper.gate.cycle import Standstill, io_cycle, receive_waiting
 from tests.rigs.forwarder import Rig
 from tests.rigs.waiting import Waiting
 

@@ -14,8 +14,8 @@ from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import gateway
 from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InlineGateway
-from canshaper.daemon.io_cycle import Standstill
 from canshaper.errors import GatewayError
+from canshaper.gate.cycle import Standstill
 from canshaper.protocols.gateway.cangw import Rule
 from tests.rigs.gateway import GatewayRig
 

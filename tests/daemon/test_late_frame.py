@@ -9,7 +9,7 @@ from canshaper.codec.layout import Layout
 from canshaper.codec.protection import Protection, Protector
 from canshaper.controller.controller import Controller
 from canshaper.daemon.gateway import InlineGateway
-from canshaper.daemon.io_cycle import LEAST_LEAVE_NS, Standstill, io_cycle, receive_waiting
+from canshaper.gate.cycle import LEAST_LEAVE_NS, Standstill, io_cycle, receive_waiting
 from tests.rigs.forwarder import ROOT
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.standing import MS, Machine, Make, valves

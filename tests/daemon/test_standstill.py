@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from canshaper.daemon import loop
-from canshaper.daemon.io_cycle import Standstill, longest_gap_ns
-from canshaper.daemon.loop import run_at_deadlines
+from canshaper.gate import loop
+from canshaper.gate.cycle import Standstill, longest_gap_ns
+from canshaper.gate.loop import run_at_deadlines
 from canshaper.shaping.states import State
 from tests.rigs.emergency import DBC, LAST, STOP
 from tests.rigs.forwarder import PATIENT, ROOT

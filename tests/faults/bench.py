@@ -17,11 +17,11 @@ from canshaper.codec.frame import BusState, Frame
 from canshaper.config.bus import Bus
 from canshaper.daemon import daemon as module
 from canshaper.daemon import gateway as gateway_module
-from canshaper.daemon import io_cycle as io_cycle_module
-from canshaper.daemon import loop as loop_module
 from canshaper.daemon import ports as ports_module
 from canshaper.daemon import reloads, reporter
 from canshaper.errors import ConfigError, GatewayError
+from canshaper.gate import cycle as io_cycle_module
+from canshaper.gate import loop as loop_module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.faults.guarded import Unrefused

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from canshaper.codec.frame import Frame
-from canshaper.daemon.io_cycle import Standstill, io_cycle
+from canshaper.gate.cycle import Standstill, io_cycle
 from tests.rigs.forwarder import Rig
 from tests.rigs.waiting import Waiting, both
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from canshaper.codec.frame import BusState, Frame
-from canshaper.daemon.io_cycle import Standstill, io_cycle
+from canshaper.gate.cycle import Standstill, io_cycle
 from tests.rigs.forwarder import TICK_NS, Rig
 
 # Younger than the clock of any rig: such a frame is as old as the tick that reads it.

@@ -7,15 +7,14 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Any
 
-from canshaper.bus.packet import boottime_ns
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.io_cycle import Standstill, io_cycle
-from canshaper.daemon.loop import run_at_deadlines
 from canshaper.design.lockstep import LockStep
+from canshaper.gate.cycle import Standstill, io_cycle
+from canshaper.gate.loop import boottime_ns, run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import JoystickNode

@@ -8,16 +8,15 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from canshaper.bus.packet import boottime_ns
 from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.io_cycle import Standstill, io_cycle
-from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.gate.cycle import Standstill, io_cycle
+from canshaper.gate.loop import boottime_ns, run_at_deadlines
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 

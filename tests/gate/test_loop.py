@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.daemon import loop
+from canshaper.gate import loop
 
 PERIOD_NS = 20_000_000
 START_NS = 1_000_000_000_000

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.daemon.io_cycle import Standstill, io_cycle
+from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.shaping.states import State
 from tests.rigs.emergency import PRESSED, READY, Machine
 from tests.rigs.forwarder import PATIENT, ROOT, SLOW_VALVE, TICK_NS, Rig

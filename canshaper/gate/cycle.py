@@ -1,11 +1,12 @@
 """One tick between the buses and a frame processor, and what a standstill takes back."""
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
-from canshaper.bus.packet import boottime_ns
-from canshaper.codec.frame import Frame
-from canshaper.machine.deployment import Deployment
+from canshaper.gate.loop import boottime_ns
+
+Frame = Any
+"""A frame: of it only its bus is used here, ``frame.bus``."""
 
 # A frame may leave so late after it was computed, where a tick is shorter than that: a program
 # that is held up now and then for some milliseconds goes on.
@@ -13,7 +14,7 @@ LEAST_LEAVE_NS = 10_000_000
 NEVER_NS = 1 << 63  # later than any time of a clock
 
 
-def longest_gap_ns(deployment: Deployment) -> int:
+def longest_gap_ns(deployment: Any) -> int:
     """Longest time between two ticks, in ns, after which an axis in motion may go on.
 
     After the shortest age limit of an input, what waits in the sockets must not look fresh; after
@@ -26,7 +27,8 @@ def longest_gap_ns(deployment: Deployment) -> int:
         axis.config.valve.timeout_ms - (axis.period_ticks - 1) * tick_ms
         for axis in deployment.axes.values()
     ]
-    return min(limits) * 1_000_000
+    gap_ms: int = min(limits)
+    return gap_ms * 1_000_000
 
 
 class Standstill:
@@ -43,7 +45,7 @@ class Standstill:
         until_ns: what is computed in this tick may leave until then.
     """
 
-    def __init__(self, deployment: Deployment, before: "Standstill | None" = None) -> None:
+    def __init__(self, deployment: Any, before: "Standstill | None" = None) -> None:
         self.clock: Callable[[], int] = boottime_ns
         self.limit_ns = longest_gap_ns(deployment)
         self.last_ns: int = before.last_ns if before else NEVER_NS
