@@ -24,8 +24,7 @@ from canshaper.controller.valve_messages import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions
-from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
-from canshaper.shaping.trust import Trust
+from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools.architecture import ring_rows
 from tools.frame_faults import FAULT_TEXTS
 from tools.marks import marked, with_sections

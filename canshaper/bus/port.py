@@ -12,7 +12,6 @@ from functools import partial
 from typing import Protocol
 
 from canshaper.bus.device import has_echo, whereabouts
-from canshaper.bus.python_can import PythonCanPort
 from canshaper.bus.raw import RawPort
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import BusState, Frame, FrameFault
@@ -91,6 +90,8 @@ def open_port(
     try:
         fd = ids.fd if ids else fd
         if config.interface != "socketcan":
+            from canshaper.bus.python_can import PythonCanPort
+
             return PythonCanPort(name, config, on_fault, fd)
         return RawPort(
             name,

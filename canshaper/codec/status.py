@@ -17,8 +17,7 @@ from canshaper.codec.frame import FrameFault
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.states import Reason, State
-from canshaper.shaping.trust import Trust
+from canshaper.shaping.states import Reason, State, Trust
 
 DIGEST_BITS = 16
 

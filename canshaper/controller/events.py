@@ -2,14 +2,16 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.limits import Sway
 from canshaper.inputs.feedback import Following
-from canshaper.shaping.states import Transition
+from canshaper.shaping.states import Transition, Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
-from canshaper.shaping.swing_length import SwingLength
-from canshaper.shaping.trust import Trust
+
+if TYPE_CHECKING:
+    from canshaper.shaping.swing_length import SwingLength
 
 FAULT_OF = {
     Following.NO: FrameFault.NOT_FOLLOWING,
@@ -96,7 +98,7 @@ class SwingLengthEvent:
     """
 
     axis: str
-    seen: SwingLength
+    seen: "SwingLength"
     file: Sway
 
     @property

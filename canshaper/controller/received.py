@@ -1,12 +1,12 @@
 """The inputs of a deployment by their messages, and what a reload carries over."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from canshaper.codec.sent import Sender
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
-from canshaper.inputs.sway_sensor import SwaySensorInput
 from canshaper.inputs.value import (
     ProfileButtons,
     ProfileChoice,
@@ -18,6 +18,9 @@ from canshaper.inputs.value import (
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundValue, Choosing
 from canshaper.protocols.interface import BusProtocol, MessageKey
+
+if TYPE_CHECKING:
+    from canshaper.inputs.sway_sensor import SwaySensorInput
 
 BoundHandler = tuple[BoundInput, MessageInput]
 
@@ -54,15 +57,19 @@ class MachineInputs:
                 self.radii[name] = radius_input(motion.radius)
                 self.bound.append((motion.radius, self.radii[name]))
 
-        self.sway_sensors: dict[str, SwaySensorInput] = {}
-        messages: dict[MessageKey, SwaySensorInput] = {}
-        for name, axis in deployment.axes.items():
-            if sensor := axis.sway_sensor:
-                key = sensor.message.key
-                if key not in messages:
-                    messages[key] = SwaySensorInput(sensor.message)
-                    self.bound.append((sensor.message, messages[key]))
-                self.sway_sensors[name] = messages[key]
+        self.sway_sensors = self._sway_sensors(deployment)
+
+    def _sway_sensors(self, deployment: Deployment) -> dict[str, "SwaySensorInput"]:
+        """Return the measurements of sway, by the name of each axis that reads them."""
+        sensors = {n: axis.sway_sensor for n, axis in deployment.axes.items() if axis.sway_sensor}
+        if not sensors:
+            return {}
+        from canshaper.inputs.sway_sensor import SwaySensorInput
+
+        messages = {one.message.key: one.message for one in sensors.values()}
+        inputs = {key: SwaySensorInput(message) for key, message in messages.items()}
+        self.bound += [(messages[key], one) for key, one in inputs.items()]
+        return {name: inputs[sensor.message.key] for name, sensor in sensors.items()}
 
     def _enable(self, deployment: Deployment) -> dict[str, list[Switch]]:
         """Return the switches by the joystick that they enable; set the one to press there."""

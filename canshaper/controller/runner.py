@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
@@ -12,7 +12,6 @@ from canshaper.controller.parameter_sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
-from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ProfileChoice, ValueInput
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
@@ -20,11 +19,20 @@ from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.states import REACTION_OF, CommandInput, Reaction, Reason, State, Transition
+from canshaper.shaping.states import (
+    REACTION_OF,
+    CommandInput,
+    Reaction,
+    Reason,
+    State,
+    Transition,
+    Trust,
+)
 from canshaper.shaping.sway import SwayModel
-from canshaper.shaping.trust import Trust
+
+if TYPE_CHECKING:
+    from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
@@ -135,8 +143,11 @@ class AxisControl:
         """Let load state and operator choose sway data and filter."""
         self.chooser = SetChooser(self.bound, self.axis, load_state, profile)
 
-    def add_sway_sensor(self, message: SwaySensorInput) -> None:
+    def add_sway_sensor(self, message: "SwaySensorInput") -> None:
         """Add a sway sensor."""
+        from canshaper.inputs.sway_sensor import SwaySignal
+        from canshaper.shaping.sensed import SensedSway
+
         bound, sway = self.bound.sway_sensor, self.axis.sway
         assert bound is not None
         assert sway is not None  # checked with the deployment
@@ -148,7 +159,7 @@ class AxisControl:
         """Take the measured radius of a slewing axis, by which the speed of its tip is computed."""
         self._radius = radius
 
-    def measured_by(self, node: SensorNode) -> None:
+    def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of the sway sensor only while this node works."""
         assert self._sway_signal is not None  # of an axis with a sensor
         self._sway_signal.node = node

@@ -1,6 +1,7 @@
 """Status messages: of every axis, and of the service."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
@@ -10,9 +11,11 @@ from canshaper.controller.runner import AxisControl
 from canshaper.controller.valve_messages import Counters
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import MessageKey
+from canshaper.shaping.states import Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
-from canshaper.shaping.swing_length import SwingLength
-from canshaper.shaping.trust import Trust
+
+if TYPE_CHECKING:
+    from canshaper.shaping.swing_length import SwingLength
 
 
 class StatusMessages:
@@ -96,7 +99,7 @@ class SensorReport:
             if self._is_news(length, sway.mode()):
                 yield SwingLengthEvent(self._name, length, sway)
 
-    def _is_news(self, length: SwingLength, mode: SwayMode) -> bool:
+    def _is_news(self, length: "SwingLength", mode: SwayMode) -> bool:
         """Whether the grapple swings by another length than was reported last, or is in the file.
 
         At the load of a breakpoint nothing is news: the key to report is not the one in force.

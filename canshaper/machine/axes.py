@@ -12,7 +12,6 @@ from canshaper.machine.identity import bind_status
 from canshaper.machine.inputs import bind_feedback, bind_status_word
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.stopping import stated_fault
-from canshaper.machine.sway_sensor import bind_sway_sensors
 from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 
@@ -29,8 +28,13 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
                 shared.used.check_start_values(shared.codec.start)
     tick_s = lookup.config.tick_ms / 1000.0
     periods = {n: tick_s * axis.period_ticks for n, axis in axes.items() if axis}
+    bound = {n: axis for n, axis in axes.items() if axis}
+    if not any(axis.sway_sensor for axis in lookup.config.axes.values()):
+        return bound
+    from canshaper.machine.sway_sensor import bind_sway_sensors
+
     sensors = bind_sway_sensors(lookup, periods)
-    return {n: replace(axis, sway_sensor=sensors.get(n)) for n, axis in axes.items() if axis}
+    return {n: replace(axis, sway_sensor=sensors.get(n)) for n, axis in bound.items()}
 
 
 def _bind_axis(

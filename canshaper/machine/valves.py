@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from cantools.database.can import Message, Signal
 
@@ -34,8 +35,10 @@ from canshaper.config.source import Place
 from canshaper.machine.inputs import Bound, BoundValue
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
-from canshaper.machine.sway_sensor import BoundSwaySensor
 from canshaper.machine.used_message import UsedMessage, key_path
+
+if TYPE_CHECKING:
+    from canshaper.machine.sway_sensor import BoundSwaySensor
 
 # A valve learns of a stop no sooner than with its next frame.
 SLOWEST_VALVE_MS = 200
@@ -284,7 +287,7 @@ class BoundAxis:
     status_ticks: int
     feedback: BoundValue[FeedbackSection] | None = None
     status_word: Bound[StatusWord] | None = None
-    sway_sensor: BoundSwaySensor | None = None
+    sway_sensor: "BoundSwaySensor | None" = None
 
     @property
     def rewrites(self) -> bool:

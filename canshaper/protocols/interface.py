@@ -1,16 +1,18 @@
 """Interface between controller and protocols, and between protocols and axes."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.sent import Sender
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import Key, MessageInput, Part
-from canshaper.inputs.sway_sensor import SensorNode
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.states import Reason
+
+if TYPE_CHECKING:
+    from canshaper.inputs.sway_sensor import SensorNode
 
 MessageKey = tuple[str, int, bool]
 """Bus, identifier, and whether that has 29 bits."""
@@ -61,7 +63,7 @@ class DrivenAxis(Protocol):
     def add_interlock(self, interlock: Interlock) -> None:
         """Add an interlock, which has to agree before it may move; called after those before."""
 
-    def measured_by(self, node: SensorNode) -> None:
+    def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of its sway sensor only while this node works."""
 
 

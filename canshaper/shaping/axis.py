@@ -16,17 +16,20 @@ gets neutral in the same tick, and the transition keeps the error.
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from canshaper.errors import raised
 from canshaper.shaping.limits import OutputLimits, within
 from canshaper.shaping.motion import AddedTime
 from canshaper.shaping.output import OutputStage
-from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper, spreads
 from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, STOPPING, TRIPPED, StateMachine
 from canshaper.shaping.states import MOVING, CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import BumplessTransfer
+
+if TYPE_CHECKING:
+    from canshaper.shaping.sensed import SensedSway
 
 # Missed ticks that the filter and the model go through at most: after so many of them nothing moves
 # any more, and the first neutral frame must not wait.

@@ -2,6 +2,7 @@
 
 from canshaper.shaping.free_swing import FreeSwing, SensorGains
 from canshaper.shaping.observer import SwayObserver
+from canshaper.shaping.states import Trust
 from canshaper.shaping.sway import SwayModel
 from canshaper.shaping.sway_sensor import SensorLimits, SensorTiming
 from canshaper.shaping.swing_length import SwingLengthEstimate
@@ -13,7 +14,6 @@ from canshaper.shaping.trust import (
     Evidence,
     Restlessness,
     Standstill,
-    Trust,
     largest_jump,
 )
 

@@ -136,3 +136,30 @@ class Transition:
     new: State
     reason: Reason
     error: str = field(default="", compare=False)
+
+
+class Trust(IntEnum):
+    """Trust state of a sway sensor; codes of the status message.
+
+    After a fault its name stays until the sensor is trusted again.
+    """
+
+    NO_DATA = 0
+    """Nothing was received yet."""
+    UNPROVED = 1
+    """No driven motion has shown yet that it measures this axis with this sign."""
+    TRUSTED = 2
+    LOST = 3
+    """Measurements do not come any more."""
+    STUCK = 4
+    """The value repeats while the model swings."""
+    JUMP = 5
+    """The value has jumped further than a grapple can; until the axis is at rest."""
+    WRONG_SIGN = 6
+    """The sensor shows the opposite of what motion makes."""
+    OFFSET = 7
+    """Its offset is larger than configured."""
+    CONTACT = 8
+    """The sensor shows nothing of what motion makes: the grapple leans on something."""
+    RESTLESS = 9
+    """The command moves far more than the operator asks for; until the axis is at rest."""

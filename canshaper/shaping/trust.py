@@ -6,38 +6,10 @@ and no longer when it contradicts motion, stands still, jumps, or the load does 
 
 import math
 from collections import deque
-from enum import IntEnum
 
 from canshaper.shaping.observer import Errors
+from canshaper.shaping.states import Trust
 from canshaper.shaping.sway_sensor import TICK_OF_NOISE_S, Measured
-
-
-class Trust(IntEnum):
-    """Trust state of a sway sensor; codes of the status message.
-
-    After a fault its name stays until the sensor is trusted again.
-    """
-
-    NO_DATA = 0
-    """Nothing was received yet."""
-    UNPROVED = 1
-    """No driven motion has shown yet that it measures this axis with this sign."""
-    TRUSTED = 2
-    LOST = 3
-    """Measurements do not come any more."""
-    STUCK = 4
-    """The value repeats while the model swings."""
-    JUMP = 5
-    """The value has jumped further than a grapple can; until the axis is at rest."""
-    WRONG_SIGN = 6
-    """The sensor shows the opposite of what motion makes."""
-    OFFSET = 7
-    """Its offset is larger than configured."""
-    CONTACT = 8
-    """The sensor shows nothing of what motion makes: the grapple leans on something."""
-    RESTLESS = 9
-    """The command moves far more than the operator asks for; until the axis is at rest."""
-
 
 LATCHED = (Trust.JUMP, Trust.RESTLESS)
 """States that stay until the axis is at rest."""

@@ -6,7 +6,7 @@ from itertools import accumulate
 import pytest
 
 from canshaper.design.tuning.robust import least_residual
-from canshaper.shaping.trust import Trust
+from canshaper.shaping.states import Trust
 from canshaper_sim.sway_sensor import SwaySensorParameters
 from tests.closed_loop.sensor_drives import ENCODER, GYRO, KINDS, PLAIN, residuals
 from tests.rigs.sensed import LENGTH_M, MODE, SCRIPTS, TICK_S, Setup

@@ -17,8 +17,7 @@ from canshaper.codec.status import (
     required_names,
     status_faults,
 )
-from canshaper.shaping.states import Reason, State
-from canshaper.shaping.trust import Trust
+from canshaper.shaping.states import Reason, State, Trust
 from tests.rigs.reports import report
 from tests.rigs.sent import status_frame
 

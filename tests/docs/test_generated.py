@@ -11,8 +11,7 @@ import pytest
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.state_machine import transitions
-from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State
-from canshaper.shaping.trust import Trust
+from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools import architecture
 from tools.frame_faults import FAULT_TEXTS
 

@@ -5,10 +5,9 @@ import math
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.states import CommandInput
+from canshaper.shaping.states import CommandInput, Trust
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
-from canshaper.shaping.trust import Trust
 from tests.shaping.observed import sensed_sway
 
 TICK_S = 0.02

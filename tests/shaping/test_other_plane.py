@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from canshaper.shaping.states import CommandInput, State
-from canshaper.shaping.trust import Trust
+from canshaper.shaping.states import CommandInput, State, Trust
 from tests.shaping.sensed_rig import SCALE, TICK_S, Rig
 
 LARGEST, TIME_S = 0.25, 4.0

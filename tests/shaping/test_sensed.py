@@ -6,9 +6,8 @@ import pytest
 
 from canshaper.shaping.sensed import FADE_S
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.states import CommandInput, State
+from canshaper.shaping.states import CommandInput, State, Trust
 from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.trust import Trust
 from tests.shaping.sensed_rig import MODE, SCALE, TICK_S, Rig
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from canshaper.shaping.states import Trust
 from canshaper.shaping.sway import SwayMode, SwayModel, swing_over
-from canshaper.shaping.trust import Trust
 from tests.shaping.sensed_parts import (
     FULL_SPEED_M_S,
     LOST_S,

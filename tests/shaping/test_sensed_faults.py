@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from canshaper.shaping.trust import LATCHED, PROVED, PROVED_AGAIN, Trust
+from canshaper.shaping.states import Trust
+from canshaper.shaping.trust import LATCHED, PROVED, PROVED_AGAIN
 from tests.shaping.sensed_parts import NOISE, OFFSET, SCALE, Parts, named
 
 # Farthest jump that is none: 1.5 deg, and five times the noise.
