@@ -108,6 +108,7 @@ def test_guesses_are_assumed_until_someone_says_otherwise(tmp_path: Path) -> Non
     result = of_dbc(tmp_path, [dbc], answers)
     assert result.exit_code == 0, result.output
     keys = [f"axes.slew.sway.{key}" for key in ("period_s", "decay_per_swing", "full_speed_m_s")]
+    keys.append("axes.slew.limits.stop_distance_m")
     assert f"Assumed until someone measures or types them: {', '.join(keys)}." in result.output
     assert load_deployment(tmp_path / "machine.yaml").config.assumed == keys
 

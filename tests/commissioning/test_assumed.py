@@ -8,7 +8,7 @@ from canshaper.commissioning.assumed import confirmed, origins, write_numbers
 from canshaper.commissioning.file_warnings import warnings_of
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.state import Context, Record, State, Status
-from canshaper.commissioning.procedure.steps import report
+from canshaper.commissioning.procedure.steps import check, report
 from canshaper.edit.edit import change
 from canshaper.machine.binding import load_deployment
 from tests.controller.adjustable import CONTROL
@@ -69,3 +69,16 @@ def test_a_report_is_fit_to_sign_without_any(
     skipped = State(steps={"drive": Record(Status.SKIPPED)})
     again = Context(context.deployment, context.bench, tmp_path, skipped)
     assert "fit to sign" not in str(report.run(again).sheet.parts)
+
+
+def test_to_go_on_after_the_check_is_to_allow_the_stop_distance(
+    guessed: Machine, tmp_path: Path
+) -> None:
+    guessed.in_yaml(f"  - {PERIOD}\n", f"  - {PERIOD}\n  - axes.slew.limits.stop_distance_m\n")
+    deployment = guessed.load()
+    context = Context(deployment, Simulated(None, []), tmp_path, State())  # type: ignore[arg-type]
+    outcome = check.run(context)
+    assert "axes.slew.limits.stop_distance_m" in str(outcome.sheet.parts)
+    assert outcome.edit
+    outcome.edit(deployment)
+    assert f"assumed: [{PERIOD}, {TIMEOUT}, axes.lift.speed]" in deployment.path.read_text()

@@ -191,6 +191,8 @@ class FirstAxis:
             keys.append("slewing.full_speed_rad_s")
         if self.slewing and self.slewing.largest_radius_m == RADIUS_M:
             keys.append("slewing.largest_radius_m")
+        if self.swing:
+            keys.append("limits.stop_distance_m")
         return [f"axes.{self.name}.{key}" for key in keys]
 
 

@@ -189,7 +189,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     speed = axis.slewing.full_speed_m_s if axis.slewing else swing.full_speed_m_s
     distance = stop_distance_m(speed, sway.mode().period_s, joystick_timeout_ms, axis.timeout_ms)
     yield "    # stop_distance_m: write how far the tip may travel when it stops from full speed."
-    yield "    # It is a limit; `canshaper check` shows what the filter needs."
+    yield "    # It is a limit, here a guess; `canshaper check` shows what the filter needs."
     tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
     yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
 

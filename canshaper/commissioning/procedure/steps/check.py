@@ -1,9 +1,11 @@
 """Is the file fit to start, and slow enough for the first motion?"""
 
+from collections.abc import Collection
 from functools import partial
 
 from matplotlib.figure import Figure
 
+from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.file_warnings import warnings_of
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
@@ -59,15 +61,28 @@ def run(context: Context) -> Outcome:
     axes = stopping(deployment)
     outcome.figures[""] = lambda: figure(axes)
     fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > FIRST_PCT]
-    if fast and MOTION not in context.numbers:
+    fast = [] if MOTION in context.numbers else fast
+    if fast:
         outcome.sheet.print(f"The first motion is at reduced speed: {', '.join(fast)}")
-        outcome.edit = partial(_slow_down, axes=fast)
+    proposed = {
+        f"axes.{name}.limits.stop_distance_m": axis.limits.stop_distance_m
+        for name, axis in deployment.config.axes.items()
+    }
+    proposed = {key: proposed[key] for key in deployment.config.assumed if key in proposed}
+    for key, metres in proposed.items():
+        outcome.sheet.print(
+            f"{key} {metres} is a proposal: to go on is to allow the tip so much;"
+            " type less into the file where there is less room"
+        )
+    if fast or proposed:
+        outcome.edit = partial(_write, fast=fast, allowed=proposed)
     return outcome
 
 
-def _slow_down(deployment: Deployment, axes: list[str]) -> list[str]:
+def _write(deployment: Deployment, fast: list[str], allowed: Collection[str]) -> list[str]:
     sections, slow = deployment.config.axes, {"max_pct": FIRST_PCT}
-    change(deployment.path, [of_limits(name, sections[name], slow) for name in axes])
+    slower = [of_limits(name, sections[name], slow) for name in fast]
+    change(deployment.path, [*slower, *confirmed(deployment.path, allowed)])
     return []
 
 
@@ -98,6 +113,6 @@ CHECK = Step(
     "Check",
     "as `canshaper check`: stopping distances, bus load, what does not fit",
     run,
-    writes="`max_pct: 40`, for the first motion",
+    writes="`max_pct: 40`, for the first motion; `stop_distance_m` as allowed by you",
     needs=(FILE,),
 )
