@@ -30,8 +30,8 @@ PATIENCE = (
     ("timeout_ms: 100 #", "timeout_ms: 600 #"),
     ("timeout_ms: 300", "timeout_ms: 900"),
     ("heartbeat_ms: 500", "heartbeat_ms: 1500"),
-    ("stop_distance_m: 10.5", "stop_distance_m: 13"),
-    ("stop_distance_m: 2.2", "stop_distance_m: 3"),
+    ("stop_distance_m: 4.7", "stop_distance_m: 13"),
+    ("stop_distance_m: 0.95", "stop_distance_m: 3"),
 )
 DBC = cantools.database.load_file(ROOT / "dbc" / "canopen-cia401-cia408.dbc")
 SLEW_STATUS, LIFT_STATUS, SLEW_COMMAND, PROBE = 0x6A0, 0x6A2, 0x220, 0x7FE

@@ -37,8 +37,7 @@ PATIENCE = (
     (r"timeout_ms: (80|100)\b", r"timeout_ms: 600"),
     (r"timeout_ms: 300\b", r"timeout_ms: 900"),
     (r"heartbeat_ms: 500\b", r"heartbeat_ms: 1500"),
-    (r"stop_distance_m: 1(\d)", r"stop_distance_m: 2\1"),
-    (r"stop_distance_m: 2\.", r"stop_distance_m: 4."),
+    (r"stop_distance_m: [\d.]+", r"stop_distance_m: 13"),
 )
 
 
