@@ -8,6 +8,8 @@ import pytest
 
 from tests.cli.invocation import ROOT, SHIPPED
 
+# The recommended file loads so many of our modules and lines at most, the gate's 2 300 included.
+MOST_MODULES, MOST_LINES = 140, 21_000
 # Nothing of these belongs on a small machine PC.
 HEAVY = ("casadi", "scipy", "numpy", "matplotlib", "pandas")
 
@@ -17,6 +19,23 @@ def python(code: str) -> str:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )
     return done.stdout.strip()
+
+
+@pytest.mark.slow
+def test_the_daemon_loads_what_its_file_needs() -> None:
+    code = f"""
+import sys
+from pathlib import Path
+import canshaper.daemon.daemon
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
+Controller(load_deployment(Path({str(ROOT / "config/forwarder-robust.yaml")!r})))
+files = [m.__file__ for n, m in sys.modules.items() if n.partition(".")[0] == "canshaper"]
+print(len(files), sum(Path(file).read_text(encoding="utf-8").count("\\n") for file in files))
+"""
+    modules, lines = map(int, python(code).split())
+    assert modules <= MOST_MODULES, "import where the file has it, see protocols/registry.py"
+    assert lines <= MOST_LINES
 
 
 @pytest.mark.slow
