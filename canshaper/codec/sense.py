@@ -15,11 +15,11 @@ _ON = re.compile(
 )
 _NOT_FREE = re.compile(r"\b(not|no|nicht) (ok|okay|ready|normal|safe|free|healthy)\b")
 _FREE = re.compile(
-    r"\b(not|no|free|released|ok|okay|normal|ready|safe|healthy|inactive|deactivated|off|unpressed"
+    r"\b(not|no|free|closed|released|ok|okay|normal|ready|safe|healthy|inactive|deactivated|off|unpressed"
     r"|run|running|nicht|frei|entriegelt)\b"
 )
 _STOP = re.compile(
-    r"\b(e?stop|stopped|emergency|pressed|active|activated|actuated|operated|engaged|trigger(ed)?"
+    r"\b(e?stop|stopped|opened|open|emergency|pressed|active|activated|actuated|operated|engaged|trigger(ed)?"
     r"|trip(ped)?|halt|on|locked|latched|gedrückt|betätigt|aktiv|notaus|nothalt)\b"
 )
 _REST = re.compile(
@@ -86,7 +86,7 @@ def turned(positive: str, negative: str) -> bool:
 
 
 def contrary(names: Mapping[int, str], signal: str, *, stop: bool = False) -> str | None:
-    """Where a switch is, by its names, when it does what it should not; None where they agree.
+    """Where a switch is, by its names, when it does what it may not mean; None where they agree.
 
     Args:
         names: of its raw values 0 and 1, where the DBC has some.
@@ -95,8 +95,10 @@ def contrary(names: Mapping[int, str], signal: str, *, stop: bool = False) -> st
     """
     sense = free if stop else on
     acts, rests = (names.get(raw, "") for raw in ((0, 1) if stop else (1, 0)))
-    if sense(acts) is False or (sense(rests) is True and sense(acts) is None):
-        return f'"{acts}"' if acts else f'not "{rests}"'
+    if acts and sense(acts) is not True:  # the contrary, or a word that no one knows: a fault?
+        return f'"{acts}"'
+    if sense(rests) is True and not acts:
+        return f'not "{rests}"'
     if sense(acts) is None and sense(rests) is None and of_signal(signal, stop=stop) is stop:
         return f"not {signal}" if stop else signal
     return None

@@ -39,7 +39,6 @@ def test_a_trap_is_named_in_one_line(machine: Machine, trap: Trap) -> None:
                 ("Disabled", "Enabled"),
                 ("Open", "Closed"),
                 ("losgelassen", "gedrückt"),
-                ("x", "y"),
             )
         ),
         *(
