@@ -1,25 +1,21 @@
 """Anti-sway is switched on in motion: what ran without the filter is not run again by it."""
 
 import random
-from functools import cache
 
 import pytest
 
 from canshaper.controller.controller import Controller
 from canshaper.controller.runner import AxisControl
-from canshaper.machine.binding import load_deployment
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.states import CommandInput, State
 from tests.faults.shipped import CONFIG, NAMES
+from tests.rigs.files import read
 
 EDGE = 1e-9
 
 
-deployment_of = cache(load_deployment)
-
-
 def runners(name: str) -> list[AxisControl]:
-    return list(Controller(deployment_of(CONFIG / f"{name}.yaml")).axes.values())
+    return list(Controller(read(CONFIG / f"{name}.yaml")).axes.values())
 
 
 def unshaped(runner: AxisControl, rng: random.Random) -> tuple[OutputLimits, float]:

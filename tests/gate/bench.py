@@ -8,10 +8,10 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.gate.build import record_of
 from canshaper.gate.gate import Gate
-from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
+from tests.rigs.files import read
 
 signs = pytest.mark.parametrize("sign", [1, -1])
 
@@ -112,4 +112,4 @@ def bench(**limits: Any) -> Bench:
 
 def load(name: str) -> Deployment:
     """A deployment of config/."""
-    return load_deployment(shipped.CONFIG / f"{name}.yaml")
+    return read(shipped.CONFIG / f"{name}.yaml")

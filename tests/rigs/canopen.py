@@ -8,7 +8,7 @@ import cantools
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.machine.binding import load_deployment
+from tests.rigs.files import read
 
 ROOT = Path(__file__).parents[2]
 FILE, DBC_FILE = "canopen-forwarder.yaml", "canopen-cia401-cia408.dbc"
@@ -63,7 +63,7 @@ class CanopenRig:
     """A controller with its clock, two joysticks and three valves."""
 
     def __init__(self, path: Path = ROOT / "config" / FILE) -> None:
-        self.deployment = load_deployment(path)
+        self.deployment = read(path)
         self.controller = Controller(self.deployment)
         self.dbc: Any = cantools.database.load_file(ROOT / "dbc" / DBC_FILE)
         self.bus = "crane"

@@ -1,6 +1,7 @@
 """A machine on disk, made from the shipped one by changing deployment and DBC file."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,13 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
 ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "config"
+_shipped = cache(load_deployment)
+
+
+def read(path: Path) -> Deployment:
+    """A deployment; one of config/ is read once by each process, since no test changes it."""
+    return _shipped(path) if path.parent == CONFIG else load_deployment(path)
 
 
 class Machine:

@@ -9,8 +9,8 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State
+from tests.rigs.files import read
 
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
@@ -31,7 +31,7 @@ class Rig:
     """A controller with its clock and the two joysticks of the shipped machine."""
 
     def __init__(self, path: Path) -> None:
-        self.deployment = load_deployment(path)
+        self.deployment = read(path)
         self.controller = Controller(self.deployment)
         self.now_ns = 0
         self.messages = {name: self.message(name) for name in NAMES}

@@ -1,6 +1,5 @@
 """The J1939 machine of the repository in lock-step; joysticks are encoded by plain cantools."""
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +8,8 @@ import cantools
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import GLOBAL, name_bytes
 from canshaper.controller.controller import Controller
-from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State
+from tests.rigs.files import read
 
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
@@ -51,7 +50,7 @@ def request(pgn: int, source: int = OTHER, to: int = GLOBAL) -> Frame:
     return Frame("crane", 0x18EA0000 | to << 8 | source, True, pgn.to_bytes(3, "little"))
 
 
-load = cache(load_deployment)
+load = read
 
 
 class Rig:

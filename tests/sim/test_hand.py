@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
+from tests.rigs.files import read
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = [
@@ -24,7 +24,7 @@ FILES = [
 
 @pytest.fixture(params=FILES)
 def deployment(request: pytest.FixtureRequest) -> Deployment:
-    return load_deployment(CONFIG / f"{request.param}.yaml")
+    return read(CONFIG / f"{request.param}.yaml")
 
 
 @pytest.mark.parametrize("position", [-1.0, -0.4, 0.0, 0.7, 1.0])
@@ -79,7 +79,7 @@ def _frame_of(frames: dict[Any, Frame], key: tuple[str, int, bool]) -> Frame:
 
 
 def test_the_button_for_the_next_profile_is_pressed_on_one_joystick() -> None:
-    deployment = load_deployment(CONFIG / "j1939-profiles.yaml")
+    deployment = read(CONFIG / "j1939-profiles.yaml")
     frames = {f[1] & 0xFFFF00: f for f in Hand(deployment).frames(0, Held(next_profile=True))}
     pressed = {
         name: joystick.decode(frames[joystick.message.frame_id & 0xFFFF00].data)[0]["Button4"]
