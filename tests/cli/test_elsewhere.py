@@ -128,15 +128,7 @@ def studio(file: str) -> Iterator[Page]:
 def test_the_studio_drives_its_simulated_cranes_on_any_system(file: str) -> None:
     """Both cranes move and stop, the shaped one swings less, and a slider changes a filter."""
     with studio(file) as page:
-        page.drive()
-        assert page.joysticks is not None
-        page.joysticks["slew"] = 0.5
-        both = ("shaped", "raw")
-        page.until(lambda s: all(s["cranes"][n]["axes"]["slew"]["valve"] > 0.2 for n in both))
-        page.for_s(0.5)
-        page.joysticks["slew"] = 0.0
-        page.until(lambda _: page.states() == {"ready"}, "at rest")
-        swings = {name: crane["swing"] for name, crane in page.for_s(3.0)[-1]["cranes"].items()}
+        swings = page.stroke(0.5, 0.5)
         assert swings["raw"] > 5.0
         assert swings["shaped"] < swings["raw"] / 3
         name = next(iter(page.hello["sliders"]))

@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
 from tests.lane.outcome import NoLane
 from tests.lane.packages import install, missing
+from tests.studio.conftest import DISTURBED, TRIES
 
 PROGRAMS = {"chromium": "chromium"}
 FLAGS = [
@@ -26,11 +27,7 @@ WAIT_MS = 60_000
 expect.set_options(timeout=WAIT_MS)
 CONNECTED = re.compile("^(connected|opened|daemon silent: machine)$")
 NO_GAMEPAD = "() => { navigator.getGamepads = () => []; }"
-TRIES = 8
 SOON_MS = 10_000
-DISTURBED = re.compile(
-    "is silent|no joystick message|joystick messages are not|too late|stood still"
-)
 
 
 class NoBrowserError(Exception):

@@ -44,13 +44,8 @@ def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
 ) -> None:
     """Half a second of slewing; then the same, with anti-sway switched off on the way."""
     with own().page() as page:
-        page.drive()
+        swings = page.stroke(0.5, 0.7)
         assert page.joysticks is not None
-        page.joysticks["slew"] = 0.5
-        page.for_s(0.8)
-        page.joysticks["slew"] = 0.0
-        page.until(lambda _: page.states() == {"ready"}, "at rest")
-        swings = {name: crane["swing"] for name, crane in page.for_s(3.0)[-1]["cranes"].items()}
         assert swings["raw"] > 10.0
         assert swings["shaped"] < swings["raw"] / 4
         page.joysticks["slew"] = 0.5
