@@ -6,6 +6,7 @@ come from the schema of the deployment file, other tables from what declares the
 """
 
 import re
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import IntEnum
 from pathlib import Path
@@ -78,6 +79,8 @@ def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iter
     yield "| no. | reason | meaning | what helps | FMI |"
     yield "|---|---|---|---|---|"
     for reason in reasons:
+        if reason not in texts:
+            sys.exit(f"{reason.name}: expected a row in canshaper/shaping/reasons.py")
         text = texts[reason]
         fmi = "" if text.fmi is None else text.fmi
         yield f"| {int(reason)} | {reason.name} | {text.cause} | {text.remedy} | {fmi} |"

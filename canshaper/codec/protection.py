@@ -48,7 +48,7 @@ class Protector:
         self._count = 0
 
     def copy_state(self, before: Self) -> None:
-        """Continue the counter of the same message, where it is the same counter."""
+        """Go on with the counter where ``before`` stands; from 0 where it is another counter."""
         if (self._counter, self._counts) == (before._counter, before._counts):
             self._count = before._count
 

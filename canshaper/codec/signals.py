@@ -272,7 +272,10 @@ class VelocitySignal:
 
     @classmethod
     def of(cls, signal: Signal) -> "VelocitySignal":
-        """Bind a DBC signal with a ``symmetrical_range``, or a ``magnitude_range``."""
+        """Return the reader of a DBC signal as a part of full scale.
+
+        Its range has to be one of ``symmetrical_range`` or ``magnitude_range``.
+        """
         full = full_scale(signal)
         low, high = (signal.minimum or 0.0) / full, (signal.maximum or 0.0) / full
         ends = min(low, -1.0) - ROUNDING, high + ROUNDING

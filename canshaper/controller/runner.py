@@ -311,7 +311,7 @@ class AxisControl:
 
     @property
     def sway_deg(self) -> float:
-        """Predicted swing of the load."""
+        """Predicted swing of the load, degrees; 0 without sway data."""
         sway = self.axis.sway
         return math.degrees(sway.sway_rad(self._full_speed_m_s)) if sway else 0.0
 

@@ -24,7 +24,7 @@ class Gate:
     def __init__(self, record: Record) -> None:
         self.record = record
         self.number = -1  # of this deadline
-        self.others: dict[Key, int] = {}  # frames since it, of messages that are no valve's
+        self.others: dict[Key, int] = {}  # frames of it, by messages that are no valve's
         self.made = 0  # ticks; deadlines that were missed are none
         self.stood = False  # the loop stood still, and no tick was made since
         self.messages = {name: Received(one) for name, one in record.messages.items()}
@@ -214,6 +214,7 @@ class Gate:
         if why := rules.bytes_refused(valve, data, word, of, held=not joystick.pressed.released):
             return why
         count = valve.count(data, word)
+        # Axes of one message have one period, and so their turn together.
         due = axes[-1].due if of is None else joystick.received.waiting
         if why := rules.turn_refused(valve, count, self.counts.get(key), due=due):
             return why

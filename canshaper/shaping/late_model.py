@@ -12,15 +12,17 @@ LEAD_S, NO_LEAD = 1.0, 1e-5
 
 
 class Late:
-    """A velocity as it was at the time of the measurement: delayed, and behind the valve's lag.
+    """Velocity of an axis at the time when the sensor's newest value was measured.
+
+    It is the commanded velocity, delayed by the sensor and behind the valve's lag.
 
     Args:
-        timing: delay and lag.
-        tick_s: time between two ticks.
+        timing: delay of the sensor and lag of the valve, s.
+        tick_s: time between two ticks, s.
 
     Attributes:
-        now: at the end of the tick.
-        middle: in the middle of it.
+        now: part of full speed at the end of the tick.
+        middle: part of full speed in its middle.
     """
 
     __slots__ = ("_half", "_sent", "_share", "_whole", "middle", "now")

@@ -182,6 +182,9 @@ class SwayModel:
         Args:
             mode: the new sway mode.
             velocity: the velocity being sent now, [-1, 1] (part of the normalised rate).
+
+        Raises:
+            ValueError: the mode does not suit the tick.
         """
         model = SwayModel(mode, self.tick_s)
         scale = self.mode.angle_per_speed_rad / mode.angle_per_speed_rad

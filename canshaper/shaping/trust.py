@@ -95,7 +95,7 @@ class Evidence:
         return ratio if ratio > -BOUND else -BOUND
 
     def proved(self, least: float) -> bool:
-        """Whether the ratios of sign and own motion prove the sensor, by more than ``least``."""
+        """Whether the ratios against a wrong sign and another axis' motion exceed ``least``."""
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:

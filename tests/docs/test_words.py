@@ -18,7 +18,7 @@ TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
     "CHANGELOG.md": 675,
-    "CONTRIBUTING.md": 500,
+    "CONTRIBUTING.md": 560,
     "README.md": 590,
     "SECURITY.md": 430,
     "docs/api.md": 150,

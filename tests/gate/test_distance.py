@@ -5,7 +5,8 @@ import math
 import pytest
 
 from canshaper.gate.axis import BLEND_S, Asked
-from canshaper.gate.build import SLACK, SWING_SLACK, slack_of
+from canshaper.gate.build import SLACK, SPREADING, SWING_SLACK, slack_of
+from canshaper.shaping.registry import BUILT_IN
 from tests.gate.bench import Bench, bench, limited, load, signs
 from tests.promises.world import World
 
@@ -95,6 +96,11 @@ class TestDistance:
         left = [one.sends(sign * FULL) for _ in range(120)]
         first = [bool(why) for why in left].index(True)
         assert first * 0.02 == pytest.approx(SWING_SLACK + BLEND_S, abs=0.021)
+
+    def test_each_filter_of_ours_is_of_one_kind_or_the_other(self) -> None:
+        """A new one that only spreads the demand belongs to SPREADING."""
+        damping = {"gff", "robust"}
+        assert {kind.name for kind in BUILT_IN} == {*SPREADING} | damping
 
     def test_what_spreads_the_demand_has_less(self) -> None:
         """A filter that knows of no swing damps none."""

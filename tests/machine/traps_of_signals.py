@@ -68,6 +68,7 @@ TABLES = [
     table("x/Released", ENABLES),
     table("Operator present/y", ENABLES),
     table("Held/Not held", ENABLES),
+    Trap("only its 0 has a name", ENABLES, dbc={ENABLE: 'VAL_ 272 Enable 0 "Pressed" ;'}),
     table("x/y", ENABLES),
     table("Released/Loose contact", ENABLES),
     table("Pressed/Released", ENABLES, message=273),
