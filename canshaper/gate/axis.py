@@ -59,8 +59,8 @@ class Asked:
 class AxisState(Pending):
     """One axis. It may move while it is armed, and for ``stop_left`` periods of a shaped stop.
 
-    ``made`` counts ticks that were made, ``number`` deadlines with those that were missed; ``passed``
-    and ``ticks`` count periods of the valve.
+    ``made`` counts ticks that were made, ``number`` deadlines, also those that were missed;
+    ``passed`` and ``ticks`` count periods of the valve.
 
     Attributes:
         demand: of the last joystick frame that counts, and ``changed_ns`` since when.
