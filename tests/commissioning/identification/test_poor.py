@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from canshaper.commissioning.identification.decay import Value
-from canshaper.commissioning.identification.recommend import stopwatch
+from canshaper.commissioning.identification.data import stopwatch
 from canshaper.commissioning.identification.series import (
     Array,
     Kind,
     Series,
     Unit,
+    Value,
     ordered,
     unit_of,
 )
