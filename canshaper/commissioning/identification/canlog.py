@@ -137,23 +137,17 @@ def read_can(
     commands = Commands(deployment)
     log = LogFile(path, on_progress)
     seen, notes = _read(log, path, channel, [*readers.values(), *load], commands)
-    loads = [float(np.median(one.samples.value)) for one in load if one.samples.value]
+    loads = [value for one in load for value in one.samples.value]
+    load_value = float(np.median(loads)) if loads else None
     idle = commands.idle()
     result = {}
     for axis, reader in readers.items():
         left_out = _left_out(path, reader, seen, messages)
         time, value = ordered(f"{path}: {reader.name}", *reader.samples.arrays())
+        source, texts = f"{path.name}: {reader.name}", [*notes, *left_out]
+        own, others = commands.of(axis), commands.others(axis)
         result[axis] = Series(
-            f"{path.name}: {reader.name}",
-            label,
-            reader.unit,
-            time,
-            value,
-            commands.of(axis),
-            idle,
-            commands.others(axis),
-            loads[0] if loads else None,
-            [*notes, *left_out],
+            source, label, reader.unit, time, value, own, idle, others, load_value, texts
         )
     return result
 
@@ -232,9 +226,7 @@ _FRAMES = 5000
 def is_simulated(log: Path, messages: Messages) -> bool:
     """Whether a log was recorded on a virtual bus, or has what only the simulated crane sends.
 
-    Args:
-        log: a CAN log, or a table: that is of a machine.
-        messages: of the DBC files.
+    A table is of a machine.
 
     Raises:
         LogError: the log cannot be read.

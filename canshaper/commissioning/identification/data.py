@@ -20,11 +20,10 @@ from canshaper.report.console import OnProgress
 from canshaper.shipped import data_directory
 
 # Swing of each axis as `canshaper sim` sends it.
+_PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
 SIMULATED = {
     "slew": "GrappleSway.SwayPerpendicular",
-    **dict.fromkeys(
-        ("near_far", "lift_cylinder", "knuckle", "extension"), "GrappleSway.SwayParallel"
-    ),
+    **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
 }
 # Name of the axis where neither a deployment nor an option names one.
 UNNAMED = "swing"
@@ -39,11 +38,8 @@ def stopwatch(
 ) -> tuple[Value, Value]:
     """Period of small swings in s, and damping ratio.
 
-    Args:
-        swings: full swings (there and back) that were counted.
-        seconds: that they took.
-        first_deg: amplitude at the start, from rest to one side, degrees.
-        last_deg: amplitude at the end.
+    Of full swings (there and back) that were counted, and the seconds that they took; amplitudes at
+    the start and at the end are from rest to one side, in degrees.
 
     Raises:
         IdentificationError: a number makes no swing, or too few swings were counted.
@@ -131,9 +127,8 @@ def logged(
 ) -> list[Finding]:
     """Return the findings of logs, by axis and label."""
     if not logs:
-        raise UsageError(
-            "expected a log or a stopwatch, got neither; see canshaper identify --help"
-        )
+        text = "expected a log or a stopwatch, got neither"
+        raise UsageError(f"{text}; see canshaper identify --help")
     series: dict[tuple[str, str], list[Series]] = {}
     for label, path in map(_labelled, logs):
         report = partial(on_progress, what=path.name)
@@ -143,15 +138,9 @@ def logged(
             columns = columns or {axis_named(axis, deployment): None}
             shown = {a: series_of(table, label, c, about_s) for a, c in columns.items()}
         else:
-            shown = read_can(
-                path,
-                label,
-                signals or _simulated(deployment, messages, axis),
-                messages,
-                deployment=deployment,
-                channel=channel,
-                on_progress=report,
-            )
+            names = signals or _simulated(deployment, messages, axis)
+            known: dict[str, Any] = {"deployment": deployment, "channel": channel}
+            shown = read_can(path, label, names, messages, **known, on_progress=report)
         for name, one in shown.items():
             series.setdefault((name, label), []).append(one)
     findings = []
@@ -189,7 +178,6 @@ def _simulated(
     axes = list(deployment.axes) if deployment else list(SIMULATED)
     there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
     if not there or isinstance(messages.find("GrappleSway"), str):
-        raise UsageError(
-            "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
-        )
+        text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
+        raise UsageError(text)
     return there

@@ -39,11 +39,8 @@ class DecayProblem:
     """Least squares of several segments over common parameters.
 
     Parameters: frequency w in rad/s, decay s in 1/s, and on request a dry friction, by which the
-    amplitude falls in a second besides, in the unit of the data.
-
-    Args:
-        segments: the free swings.
-        amplitudes: about, at the start of each, in its unit.
+    amplitude falls in a second besides. It and the amplitudes at the start of each segment, which
+    are known about, are in the unit of the data.
     """
 
     def __init__(self, segments: Sequence[Segment], amplitudes: Sequence[float]) -> None:
@@ -191,38 +188,39 @@ class DecayFit:
 
 
 def fit_decay(segments: Sequence[Segment], period_s: float, damping_ratio: float) -> DecayFit:
-    """Fit one period and one damping to free swings.
+    """Fit one period and one damping to free swings, each of a swing and a half or more.
 
-    Args:
-        segments: at least one, each at least a swing and a half long.
-        period_s: start of the search, within some 10 %.
-        damping_ratio: start of the search.
+    The search starts at the period, which has to be known to some 10 %, and the damping ratio.
     """
     omega = 2.0 * math.pi / period_s
     amplitudes = [float(np.ptp(s.value[: max(8, len(s.value) // 4)])) / 2.0 for s in segments]
     problem = DecayProblem(segments, amplitudes)
     x = problem.solve([omega, damping_ratio * omega])
     covariance, freedom = problem.covariance(x)
-    common, sure = swing_values(x), deviations(x, covariance)
+    common, sure = swing_values(*map(float, x)), deviations(x, covariance)
     alone = []  # period and damping ratio of each segment by itself, and their deviations
     for segment, amplitude in zip(segments, problem.amplitudes, strict=True):
         one = DecayProblem([segment], [amplitude])
         best = one.solve(list(x)) if len(segments) > 1 else x
-        alone.append((swing_values(best), deviations(best, one.covariance(best)[0])))
+        alone.append((swing_values(*map(float, best)), deviations(best, one.covariance(best)[0])))
     factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, freedom))
     model = MODEL_PERIOD * common[0], math.hypot(MODEL_RATIO * common[1], MODEL_RATIO_ABS)
     values = []
     for k in (0, 1):
         between = _between([(a[k], d[k]) for a, d in alone], common[k])
         values.append(Value(common[k], math.hypot(factor * max(sure[k], between), model[k])))
-    fits = [_segment_fit(problem, i, x, own[0]) for i, (own, _) in enumerate(alone)]
+    fits = []
+    for i, segment in enumerate(segments):
+        basis, best, residual = problem.linear(i, x)
+        envelope = problem.basis(i, x)[1] * math.hypot(best[0], best[1])
+        base, noise = basis[:, 2:] @ best[2:], float(np.std(residual))
+        fits.append(SegmentFit(segment, basis @ best, base, envelope, noise, alone[i][0][0]))
     swings = sum(float(s.time_s[-1]) for s in segments) / common[0]
     return DecayFit(values[0], values[1], fits, swings, _friction(problem, x))
 
 
-def swing_values(x: Array) -> tuple[float, float]:
+def swing_values(omega: float, sigma: float) -> tuple[float, float]:
     """Period and damping ratio."""
-    omega, sigma = float(x[0]), float(x[1])
     return 2.0 * math.pi / omega, sigma / math.hypot(omega, sigma)
 
 
@@ -241,13 +239,6 @@ def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
     terms = [(w * (value - common)) ** 2 for w, (value, _) in zip(weights, alone, strict=True)]
     count = len(alone)
     return math.sqrt(sum(terms) * count / (count - 1)) / sum(weights) if count > 1 else 0.0
-
-
-def _segment_fit(problem: DecayProblem, i: int, x: Array, period_s: float) -> SegmentFit:
-    basis, best, residual = problem.linear(i, x)
-    envelope = problem.basis(i, x)[1] * math.hypot(best[0], best[1])
-    base, noise = basis[:, 2:] @ best[2:], float(np.std(residual))
-    return SegmentFit(problem.segments[i], basis @ best, base, envelope, noise, period_s)
 
 
 def _friction(problem: DecayProblem, x: Array) -> tuple[Damping, Damping] | None:

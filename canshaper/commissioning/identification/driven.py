@@ -90,12 +90,9 @@ def fit_driven(
 
 
 class _Problem:
-    """Least squares over delay and lag of the valve and, unless known, frequency and decay.
+    """Least squares over delay and lag of the valve and, without a free swing, frequency and decay.
 
-    Args:
-        data: the stretches.
-        omega: frequency, about.
-        free: the free swing, where it is known.
+    ``omega``: the frequency, about.
     """
 
     def __init__(self, data: Sequence[Driven], omega: float, free: DecayFit | None) -> None:
@@ -125,15 +122,14 @@ class _Problem:
             bases.append((q, one.value - q @ (q.T @ one.value)))
         return bases
 
-    def _responses(self, x: Array) -> list[tuple[Array, Array]]:
-        return responses(self.data, *self._pole(x), float(x[0]), float(x[1]))
-
     def _projected(self, x: Array) -> list[tuple[Array, Array]]:
         """Return for each stretch: unit swing and data, both without what free swings explain."""
-        bases = self._known_bases if self._free else self._bases(*self._pole(x))
+        pole = self._pole(x)
+        swings = responses(self.data, *pole, float(x[0]), float(x[1]))
+        bases = self._known_bases if self._free else self._bases(*pole)
         return [
             (swing - q @ (q.T @ swing), rest)
-            for (swing, _), (q, rest) in zip(self._responses(x), bases, strict=True)
+            for (swing, _), (q, rest) in zip(swings, bases, strict=True)
         ]
 
     def _residual(self, x: Array) -> Array:
@@ -168,14 +164,15 @@ class _Problem:
             half = factor * self._gain_deviation(projected, gain, pole[0])
             speed = Value(abs(gain), math.hypot(half, MODEL_PART * gain))
         if not self._free:
-            values = swing_values(np.array(pole))
+            values = swing_values(*pole)
             parts = MODEL_PERIOD * values[0], MODEL_RATIO_ABS
             period, ratio = (
                 Value(v, math.hypot(factor * d, part))
                 for v, d, part in zip(values, self._swing_deviations(x), parts, strict=True)
             )
         fitted = []
-        for one, (swing, command) in zip(self.data, self._responses(x), strict=True):
+        swings = responses(self.data, *pole, float(x[0]), float(x[1]))
+        for one, (swing, command) in zip(self.data, swings, strict=True):
             free = free_columns(one, *pole)
             rest, *_ = np.linalg.lstsq(free, one.value - gain * swing, rcond=None)
             fitted.append(Stretch(one, gain * swing + free @ rest, command))

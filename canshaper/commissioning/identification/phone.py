@@ -19,11 +19,7 @@ SWINGS = 6
 def series_of(table: Table, label: str, column: str | None, about_s: float | None = None) -> Series:
     """The swing in a table: a column, or without one what the gyroscope turns about most.
 
-    Args:
-        table: the table.
-        label: state of the grapple in it.
-        column: name of the column; None for the gyroscope.
-        about_s: the period as far as it is known, s.
+    ``about_s``: the period as far as it is known, s.
 
     Raises:
         IdentificationError: no such column, no gyroscope, or a clock that goes back.

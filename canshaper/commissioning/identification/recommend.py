@@ -30,7 +30,7 @@ class Advice:
 
 
 def advice_on(findings: Sequence[Finding], deployment: Deployment | None) -> list[Advice]:
-    """Return the advice on each axis; the full speed of the file stays where none was measured."""
+    """Return the advice on each axis."""
     advice = []
     for axis in dict.fromkeys(f.axis for f in findings):
         sway = deployment.axes[axis].config.sway if deployment else None
@@ -44,11 +44,11 @@ def advice_on(findings: Sequence[Finding], deployment: Deployment | None) -> lis
 def advise(
     axis: str, findings: Sequence[Finding], speed_m_s: float | None, *, has_grapple: bool = False
 ) -> Advice:
-    """Put the findings of one axis together.
+    """Put the findings of one axis together, one for each state of the grapple.
 
     Args:
         axis: its name.
-        findings: one for each state of the grapple.
+        findings: the findings.
         speed_m_s: full speed in the deployment, kept where none was measured.
         has_grapple: whether the deployment has a signal of the grapple.
     """

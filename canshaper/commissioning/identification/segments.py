@@ -63,9 +63,7 @@ class FreeSwings(NamedTuple):
 def find_free(series: Series, about_s: float | None = None) -> FreeSwings | None:
     """The free swings of a series, each of a period and a half or more; None without any.
 
-    Args:
-        series: the signal.
-        about_s: the period as far as it is known, s; then 30 % around it is searched.
+    Where the period is known about, in s, some 30 % around it are searched.
     """
     time, value = binned(series.time_s, series.value)
     if about_s:
@@ -148,9 +146,10 @@ def _with_period(
     for whole, run in found[:MOST_RUNS]:
         if run.worth < max(LEAST_WORTH * found[0][1].worth, least):
             break
-        if any(_overlap(run, k.segment) > 0.5 for k in kept):
+        middle, half = 0.5 * (run.start_s + run.end_s), 0.5 * (run.end_s - run.start_s)
+        parts = (k.segment for k in kept)
+        if any(min(run.end_s, p.end_s) - max(run.start_s, p.start_s) > half for p in parts):
             continue
-        middle = 0.5 * (run.start_s + run.end_s)
         low = max((e for k in kept if (e := k.segment.end_s) <= middle), default=-math.inf)
         high = min((b for k in kept if (b := k.segment.start_s) >= middle), default=math.inf)
         if swing := refined(whole, run, low, high):
@@ -193,12 +192,6 @@ def _joined(swings: Sequence[Swing], period: float) -> list[Swing]:
                 continue
         result.append(swing)
     return result
-
-
-def _overlap(one: Run, other: Segment) -> float:
-    """Part of the first that is within the second."""
-    both = min(one.end_s, other.end_s) - max(one.start_s, other.start_s)
-    return both / (one.end_s - one.start_s)
 
 
 def _runs(time: Array, value: Array, period: float) -> list[Run]:

@@ -15,6 +15,8 @@ Span = tuple[float, float]  # start and end, s
 
 # Bins that a fast signal is averaged into; the shortest period that is looked for has 15 of them.
 BIN_S = 0.02
+# Step back that is still taken for reordering by the logger, s.
+_REORDERED_S = 0.1
 
 
 class Kind(Enum):
@@ -127,14 +129,8 @@ class Segment:
         return self.start_s + float(self.time_s[-1])
 
 
-def ordered(source: str, time_s: Array, value: Array, back: float = 0.1) -> tuple[Array, Array]:
-    """Times and values with numbers only, in order.
-
-    Args:
-        source: file and signal, for the error.
-        time_s: times, s.
-        value: values.
-        back: step back that is still taken for reordering by the logger, s.
+def ordered(source: str, time_s: Array, value: Array) -> tuple[Array, Array]:
+    """Times in s and values with numbers only, in order; ``source``: file and signal.
 
     Raises:
         IdentificationError: the time goes back: two clocks or two recordings in one file.
@@ -146,7 +142,7 @@ def ordered(source: str, time_s: Array, value: Array, back: float = 0.1) -> tupl
     latest = np.maximum.accumulate(time_s)
     drop = latest - time_s
     worst = int(np.argmax(drop))
-    if drop[worst] > back:
+    if drop[worst] > _REORDERED_S:
         raise IdentificationError(
             f"{source}: the time goes back by {drop[worst]:.3g} s after {latest[worst]:.3f} s:"
             " two clocks, or two recordings in one file; record on one clock, or split the file"

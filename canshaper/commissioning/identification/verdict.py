@@ -60,11 +60,7 @@ def identify(
 ) -> Finding:
     """Period, damping and full speed of an axis from its signals in one state of the grapple.
 
-    Args:
-        axis: its name.
-        label: the state.
-        series: at least one signal.
-        about_s: the period as far as it is known, s.
+    ``about_s``: the period as far as it is known, s.
     """
     values = [s.at for s in series if s.at is not None]
     finding = Finding(axis, label, float(np.median(values)) if values else None, list(series))
