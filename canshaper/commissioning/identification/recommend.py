@@ -31,27 +31,18 @@ class Advice:
 
 def advice_on(findings: Sequence[Finding], deployment: Deployment | None) -> list[Advice]:
     """Return the advice on each axis."""
-    advice = []
-    for axis in dict.fromkeys(f.axis for f in findings):
-        sway = deployment.axes[axis].config.sway if deployment else None
-        has_grapple = bool(deployment and deployment.load_state)
-        mine = [f for f in findings if f.axis == axis]
-        speed_m_s = sway.full_speed_m_s if sway else None
-        advice.append(advise(axis, mine, speed_m_s, has_grapple=has_grapple))
-    return advice
+    axes = dict.fromkeys(f.axis for f in findings)
+    return [_advise(axis, [f for f in findings if f.axis == axis], deployment) for axis in axes]
 
 
-def advise(
-    axis: str, findings: Sequence[Finding], speed_m_s: float | None, *, has_grapple: bool = False
-) -> Advice:
+def _advise(axis: str, findings: Sequence[Finding], deployment: Deployment | None) -> Advice:
     """Put the findings of one axis together, one for each state of the grapple.
 
-    Args:
-        axis: its name.
-        findings: the findings.
-        speed_m_s: full speed in the deployment, kept where none was measured.
-        has_grapple: whether the deployment has a signal of the grapple.
+    The full speed of the deployment is kept where none was measured.
     """
+    section = deployment.axes[axis].config.sway if deployment else None
+    speed_m_s = section.full_speed_m_s if section else None
+    has_grapple = bool(deployment and deployment.load_state)
     states = [(f, _values(f, speed_m_s)) for f in findings if f.usable]
     if not states:
         reasons = " ".join(dict.fromkeys(text for f in findings for text in f.poor[:1]))
