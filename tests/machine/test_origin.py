@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
-from canshaper.commissioning.identification.commands import is_simulated
+from canshaper.commissioning.identification.canlog import is_simulated
 from canshaper.config.bus import Bus
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment

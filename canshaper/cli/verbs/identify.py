@@ -113,7 +113,8 @@ def identify(
         signals_named,
         timed_by_hand,
     )
-    from canshaper.commissioning.identification.report import advice_on, as_dict, write_sway
+    from canshaper.commissioning.identification.recommend import advice_on
+    from canshaper.commissioning.identification.report import as_dict, write_sway
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)() if file else None

@@ -1,8 +1,10 @@
 """Signals of a CAN log, named by DBC, with the commands in the same log."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from ipaddress import ip_address
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +15,12 @@ from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import find_signal, special_codes
 from canshaper.commissioning.identification.commands import Commands, Samples
 from canshaper.commissioning.identification.series import Kind, Series, Unit, ordered, unit_of
+from canshaper.commissioning.identification.table import is_table
 from canshaper.errors import CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import TimedFrame
-from canshaper.recording.log import LogFile
+from canshaper.recording.log import LogFile, read_log
 
 
 @dataclass
@@ -33,7 +35,7 @@ class _Reader:
     merit: str | None = None
     samples: Samples = field(default_factory=Samples)
     senders: set[tuple[str, int]] = field(default_factory=set)
-    wrong_length: int = 0
+    too_short: int = 0
     no_value: int = 0
 
     def __post_init__(self) -> None:
@@ -41,14 +43,13 @@ class _Reader:
         self._special = special_codes(self.signal)
         low, high = self.signal.minimum, self.signal.maximum
         bounded = low is not None and high is not None and low < high
-        self._low = float(low) if bounded and low is not None else -math.inf
-        self._high = float(high) if bounded and high is not None else math.inf
+        self._low, self._high = (low, high) if bounded else (-math.inf, math.inf)
 
     def wants(self, can_id: int, extended: bool) -> bool:
         """Whether an identifier is that of its message, of J1939 whatever its priority."""
+        own = self.message.frame_id
         if extended != self.message.is_extended_frame:
             return False
-        own = self.message.frame_id
         if not is_j1939(self.message):
             return can_id == own
         sender = own & 0xFF if self.source is None else self.source
@@ -58,7 +59,7 @@ class _Reader:
         """Take a frame that was received."""
         self.senders.add(sender)
         if len(data) < self.message.length:
-            self.wrong_length += 1
+            self.too_short += 1
             return
         values = self._layout.decode(data[: self.message.length])
         raw = values[self.signal.name]
@@ -76,8 +77,8 @@ def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
     Raises:
         IdentificationError: it is not in the DBC files, or cannot be used.
     """
-    message_name, dot, signal_name = name.partition(".")
-    if not (message_name and dot and signal_name):
+    message_name, _, signal_name = name.partition(".")
+    if not (message_name and signal_name):
         raise IdentificationError(f"--signal: expected AXIS=MESSAGE.SIGNAL, got {name!r}")
     entry = messages.find(message_name)
     if isinstance(entry, str):
@@ -123,109 +124,132 @@ def read_can(
         IdentificationError: a signal is not in the log, or from two senders.
         LogError: the log cannot be read.
     """
-    merits = _merits(deployment)
+    sensors = [s for a in deployment.axes.values() if (s := a.sway_sensor)] if deployment else []
+    merits = {one.name: one.config.merit for one in sensors}
     readers = {
         axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis), merits.get(name))
         for axis, name in names.items()
     }
-    grapple = deployment.load_state if deployment else None
-    weight = None
-    if grapple and (signal := find_signal(grapple.message, grapple.config.signal)):
-        weight = _Reader("load state", grapple.message, signal, Unit(Kind.OTHER, 1.0, ""))
+    load: list[_Reader] = []
+    state = deployment.load_state if deployment else None
+    if state and (signal := find_signal(state.message, state.config.signal)):
+        load = [_Reader("load state", state.message, signal, Unit(Kind.OTHER, 1.0, ""))]
     commands = Commands(deployment)
-    all_readers = [*readers.values(), *([weight] if weight else [])]
-    frames, ids, notes = _read(LogFile(path, on_progress), path, channel, all_readers, commands)
+    log = LogFile(path, on_progress)
+    seen, notes = _read(log, path, channel, [*readers.values(), *load], commands)
+    loads = [value for one in load for value in one.samples.value]
+    load_value = float(np.median(loads)) if loads else None
     idle = commands.idle()
-    at = float(np.median(weight.samples.arrays()[1])) if weight and weight.samples.value else None
     result = {}
     for axis, reader in readers.items():
-        faults = _checked(path, reader, frames, ids, messages)
+        left_out = _left_out(path, reader, seen, messages)
         time, value = ordered(f"{path}: {reader.name}", *reader.samples.arrays())
-        source = f"{path.name}: {reader.name}"
-        command = commands.of(axis)
+        source, texts = f"{path.name}: {reader.name}", [*notes, *left_out]
+        own, others = commands.of(axis), commands.others(axis)
         result[axis] = Series(
-            source,
-            label,
-            reader.unit,
-            time,
-            value,
-            command,
-            idle,
-            commands.others(axis),
-            at,
-            [*notes, *faults],
+            source, label, reader.unit, time, value, own, idle, others, load_value, texts
         )
     return result
 
 
-def _merits(deployment: Deployment | None) -> dict[str, str]:
-    """Figure of merit of each "Message.Signal" that a sway sensor of the deployment measures."""
-    sensors = [s for a in deployment.axes.values() if (s := a.sway_sensor)] if deployment else []
-    return {one.name: one.config.merit for one in sensors if one.config.merit}
+Seen = dict[tuple[int, bool], int]  # frames of each identifier
 
 
 def _read(
-    log: Iterable[TimedFrame],
-    path: Path,
-    channel: str | None,
-    readers: Sequence[_Reader],
-    commands: Commands,
-) -> tuple[int, set[tuple[int, bool]], list[str]]:
-    """Hand every frame to who reads it: how many there were, of which ids, and what to note."""
+    log: LogFile, path: Path, channel: str | None, readers: Sequence[_Reader], commands: Commands
+) -> tuple[Seen, list[str]]:
+    """Hand every frame to who reads it: which there were, and what to note."""
     readers_of: dict[tuple[int, bool], list[_Reader]] = {}
+    seen: Seen = {}
     notes: list[str] = []
-    frames, first_ns = 0, None
+    first_ns = None
     channels: set[str] = set()
     try:
         for frame in log:
             channels.add(frame.channel)
             if channel is not None and frame.channel != channel:
                 continue
-            frames += 1
             first_ns = frame.time_ns if first_ns is None else first_ns
             time_s = (frame.time_ns - first_ns) / 1e9
             key = frame.can_id, frame.extended
-            if key not in readers_of:
+            if key not in seen:
+                seen[key] = 0
                 readers_of[key] = [r for r in readers if r.wants(*key)]
+            seen[key] += 1
             for reader in readers_of[key]:
                 reader.receive(time_s, (frame.channel, frame.can_id), frame.data)
             commands.receive(time_s, key, frame.data)
     except CutOffError as error:
         notes.append(f"{error}; what stands before it was used")
-    if channel is not None and not frames:
-        raise LogError(f"{path}: expected the bus {channel!r}, got frames of {_listed(channels)}")
-    return frames, set(readers_of), notes
+    if channel is not None and not seen:
+        there = ", ".join(map(repr, sorted(channels))) or "none"
+        raise LogError(f"{path}: expected the bus {channel!r}, got frames of {there}")
+    return seen, notes
 
 
-def _listed(names: set[str]) -> str:
-    return ", ".join(sorted(repr(n) for n in names)) or "none"
+def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> list[str]:
+    """Notes on what was left out of a signal.
 
-
-def _checked(
-    path: Path, reader: _Reader, frames: int, seen: set[tuple[int, bool]], messages: Messages
-) -> list[str]:
-    """Notes on what was left out of a signal."""
+    Raises:
+        IdentificationError: nothing is left, or it is from two senders.
+    """
+    name, can_id = reader.message.name, reader.message.frame_id
     if not reader.senders:
-        there = ", ".join(messages.named(seen)) or "none of the DBC files"
+        there = ", ".join(messages.named(set(seen))) or "none of the DBC files"
         raise IdentificationError(
-            f"{path}: expected frames of {reader.message.name} (id {reader.message.frame_id:#x}),"
-            f" got {frames} of {there}. Is it the right log, and the right DBC file?"
+            f"{path}: expected frames of {name} (id {can_id:#x}),"
+            f" got {sum(seen.values())} of {there}. Is it the right log, and the right DBC file?"
         )
     if len(reader.senders) > 1:
-        senders = ", ".join(
-            f"{i:#x}" + (f" on {c}" if c else "") for c, i in sorted(reader.senders)
-        )
+        pairs = sorted(reader.senders)
+        senders = ", ".join(f"{i:#x}" + (f" on {c}" if c else "") for c, i in pairs)
         raise IdentificationError(
-            f"{path}: {reader.message.name} comes from more than one sender: {senders};"
+            f"{path}: {name} comes from more than one sender: {senders};"
             " choose a bus with --channel, or give the DBC message the address of one"
         )
-    notes = []
-    for count, what in (
-        (reader.wrong_length, "frames were too short"),
-        (reader.no_value, "values were not available, errors or out of range"),
-    ):
-        if count:
-            notes.append(f"{path}: {reader.name}: {count} {what} and left out")
+    counts = {
+        "frames were too short": reader.too_short,
+        "values were not available, errors or out of range": reader.no_value,
+    }
+    notes = [f"{path}: {reader.name}: {n} {why} and left out" for why, n in counts.items() if n]
     if not reader.samples.value:
         raise IdentificationError(f"{notes[0]}; no value is left")
     return notes
+
+
+# Of the simulated crane alone: no sensor of a machine reports the swing in both directions.
+_OWN = "GrappleSway"
+# So many frames hold every message of a bus; the simulated crane sends its own every 20 ms.
+_FRAMES = 5000
+
+
+def is_simulated(log: Path, messages: Messages) -> bool:
+    """Whether a log was recorded on a virtual bus, or has what only the simulated crane sends.
+
+    A table is of a machine.
+
+    Raises:
+        LogError: the log cannot be read.
+    """
+    if is_table(log):
+        return False
+    message = messages.find(_OWN)
+    own = None if isinstance(message, str) else (message[1].frame_id, message[1].is_extended_frame)
+    try:
+        return any(
+            (frame.can_id, frame.extended) == own or _is_virtual(frame.channel)
+            for frame in islice(read_log(log), _FRAMES)
+        )
+    except CutOffError:
+        return False
+
+
+def _is_virtual(channel: str) -> bool:
+    """Whether a channel of a log is one of vcan, or the address of a bus over UDP."""
+    if channel.startswith(("vcan", "vxcan")):
+        return True
+    try:
+        ip_address(channel)
+    except ValueError:
+        return False
+    return True

@@ -1,37 +1,72 @@
 """Input of ``canshaper identify``, logs and tables or a stopwatch, to findings."""
 
+import math
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from canshaper.commissioning.identification.canlog import read_can
-from canshaper.commissioning.identification.commands import is_simulated
+from canshaper.commissioning.identification.canlog import is_simulated, read_can
 from canshaper.commissioning.identification.phone import series_of
-from canshaper.commissioning.identification.recommend import stopwatch
-from canshaper.commissioning.identification.series import Series
+from canshaper.commissioning.identification.series import Series, Value
 from canshaper.commissioning.identification.table import is_table, read_table
-from canshaper.commissioning.identification.verdict import Finding
-from canshaper.commissioning.identification.verdict import identify as identified
+from canshaper.commissioning.identification.verdict import Finding, identify
 from canshaper.config.origin import written_by
-from canshaper.errors import ConfigError, UsageError
+from canshaper.errors import ConfigError, IdentificationError, UsageError
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import OnProgress
 from canshaper.shipped import data_directory
 
 # Swing of each axis as `canshaper sim` sends it.
+_PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
 SIMULATED = {
     "slew": "GrappleSway.SwayPerpendicular",
-    **dict.fromkeys(
-        ("near_far", "lift_cylinder", "knuckle", "extension"), "GrappleSway.SwayParallel"
-    ),
+    **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
 }
 # Name of the axis where neither a deployment nor an option names one.
 UNNAMED = "swing"
+# What a hand adds at either end, and an eye to an angle, as standard deviations.
+_HAND_S = 0.15
+_EYE_PART = 0.1
+_FACTOR = 1.96
 
 
-def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) -> Finding:
+def stopwatch(
+    swings: float, seconds: float, first_deg: float, last_deg: float
+) -> tuple[Value, Value]:
+    """Period of small swings in s, and damping ratio.
+
+    Of full swings (there and back) that were counted, and the seconds that they took; amplitudes at
+    the start and at the end are from rest to one side, in degrees.
+
+    Raises:
+        IdentificationError: a number makes no swing, or too few swings were counted.
+    """
+    if not swings >= 3:
+        raise IdentificationError(f"--swings: expected 3 or more, better 10, got {swings:g}")
+    if not 0.15 <= seconds / swings <= 12.0:
+        text = f"{seconds / swings:g} s, of {seconds:g} s for {swings:g} swings"
+        raise IdentificationError(f"--seconds: expected 0.15 to 12 s a swing, got {text}")
+    if not 0.0 < last_deg <= first_deg <= 60.0:
+        raise IdentificationError(
+            "--first, --last: expected up to 60 degrees, the last one above 0 and not larger than"
+            f" the first, got {first_deg:g} and {last_deg:g}"
+        )
+    decrement = (math.log(first_deg) - math.log(last_deg)) / swings
+    ratio = decrement / math.hypot(2.0 * math.pi, decrement)
+    # Mean of (1 + A^2/16) over the counted swings: the amplitude falls exponentially.
+    square = math.radians(first_deg) ** 2
+    if decrement > 0.0:
+        square *= -math.expm1(-2.0 * decrement * swings) / (2.0 * decrement * swings)
+    period = seconds / swings / (1.0 + square / 16.0)
+    period_half = _FACTOR * math.sqrt(2.0) * _HAND_S / swings
+    ratio_half = _FACTOR * math.sqrt(2.0) * _EYE_PART / (2.0 * math.pi * swings)
+    return Value(period, period_half), Value(ratio, ratio_half)
+
+
+def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> Finding:
     """Return the finding of a stopwatch."""
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
@@ -56,8 +91,8 @@ def signals_named(pairs: Sequence[str], deployment: Deployment | None) -> dict[s
     """Name of the signal of each axis."""
     signals: dict[str, str] = {}
     for pair in pairs:
-        axis, equals, name = pair.partition("=")
-        if not (axis and equals and name):
+        axis, _, name = pair.partition("=")
+        if not (axis and name):
             raise UsageError(f"--signal: expected AXIS=NAME, got {pair!r}")
         if axis in signals:
             raise UsageError(f"--signal: expected one signal of {axis}, got two")
@@ -92,12 +127,10 @@ def logged(
 ) -> list[Finding]:
     """Return the findings of logs, by axis and label."""
     if not logs:
-        raise UsageError(
-            "expected a log or a stopwatch, got neither; see canshaper identify --help"
-        )
+        text = "expected a log or a stopwatch, got neither"
+        raise UsageError(f"{text}; see canshaper identify --help")
     series: dict[tuple[str, str], list[Series]] = {}
-    for text in logs:
-        label, path = _labelled(text)
+    for label, path in map(_labelled, logs):
         report = partial(on_progress, what=path.name)
         if is_table(path):
             table = read_table(path, report)
@@ -105,23 +138,18 @@ def logged(
             columns = columns or {axis_named(axis, deployment): None}
             shown = {a: series_of(table, label, c, about_s) for a, c in columns.items()}
         else:
-            shown = read_can(
-                path,
-                label,
-                signals or _simulated(deployment, messages, axis),
-                messages,
-                deployment=deployment,
-                channel=channel,
-                on_progress=report,
-            )
+            names = signals or _simulated(deployment, messages, axis)
+            known: dict[str, Any] = {"deployment": deployment, "channel": channel}
+            shown = read_can(path, label, names, messages, **known, on_progress=report)
         for name, one in shown.items():
             series.setdefault((name, label), []).append(one)
     findings = []
     for (name, label), parts in series.items():
         on_progress(0.5, f"{name} {label}")
-        finding = identified(name, label, parts, about_s)
+        finding = identify(name, label, parts, about_s)
         if finding.at is None:
-            finding.at = _number(label)
+            with suppress(ValueError):
+                finding.at = float(label)
         findings.append(finding)
     return findings
 
@@ -130,10 +158,9 @@ def measured_in(logs: Sequence[str], messages: Messages) -> dict[str, Any]:
     """Origin of values from logs or a stopwatch; whether those are simulated may be unknown."""
     if not logs:
         return written_by("identify", simulated=None, log="stopwatch")
-    paths = [_labelled(text)[1] for text in logs]
+    paths = [path for _, path in map(_labelled, logs)]
     simulated = any(is_simulated(path, messages) for path in paths)
-    names = ", ".join(path.name for path in paths)
-    return written_by("identify", simulated=simulated, log=names)
+    return written_by("identify", simulated=simulated, log=", ".join(path.name for path in paths))
 
 
 def _labelled(text: str) -> tuple[str, Path]:
@@ -144,13 +171,6 @@ def _labelled(text: str) -> tuple[str, Path]:
     return label, Path(rest)
 
 
-def _number(label: str) -> float | None:
-    try:
-        return float(label)
-    except ValueError:
-        return None
-
-
 def _simulated(
     deployment: Deployment | None, messages: Messages, axis: str | None
 ) -> dict[str, str]:
@@ -158,7 +178,6 @@ def _simulated(
     axes = list(deployment.axes) if deployment else list(SIMULATED)
     there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
     if not there or isinstance(messages.find("GrappleSway"), str):
-        raise UsageError(
-            "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
-        )
+        text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
+        raise UsageError(text)
     return there

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from canshaper.commissioning.identification.decay import DecayFit
-from canshaper.commissioning.identification.series import Array, Series
+from canshaper.commissioning.identification.series import Array, Series, runs
 from canshaper.commissioning.identification.swing import moving_amplitude
 
 # Starts of the frequencies of two swings, as parts of that of the one that was found.
@@ -23,11 +23,8 @@ def clipped(series: Series, fit: DecayFit | None) -> str | None:
     if finest > 0.05 * span:
         return f"{series.source}: it has {span / finest:.0f} steps only; use a finer signal"
     for extreme in (float(value.max()), float(value.min())):
-        flat = np.abs(value - extreme) < 1e-9 * span
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], flat.astype(int), [0]])))
-        pairs = zip(edges[::2], edges[1::2], strict=True)
-        lasting = [time[b - 1] - time[a] for a, b in pairs if time[b - 1] - time[a] > period / 8.0]
-        if len(lasting) >= 3:
+        flat = runs(np.abs(value - extreme) < 1e-9 * span)
+        if sum(time[b - 1] - time[a] > period / 8.0 for a, b in flat) >= 3:
             shown = extreme / series.unit.factor
             return (
                 f"{series.source}: it stands at {shown:.4g} {series.unit.text} again and again:"

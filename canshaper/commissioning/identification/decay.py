@@ -1,4 +1,13 @@
-"""Period and damping of free swings, several at once, with an honest interval."""
+"""Period and damping of free swings, several at once, with an honest interval.
+
+In a free swing of a pendulum with small damping
+
+    y = exp(-s t) (a cos p + b sin p) + c + d t,    p = w (t - A^2/16 * integral exp(-2 s t) dt)
+
+with the amplitude A in rad: a large swing takes longer (T = T0 (1 + A^2/16)). Frequency w and decay
+s are common to all segments; a, b, c and d belong to each and are eliminated (variable projection,
+Golub and Pereyra 1973), so two unknowns remain.
+"""
 
 import math
 from collections.abc import Sequence
@@ -6,10 +15,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from canshaper.commissioning.identification.decay_problem import DecayProblem, Segment
-from canshaper.commissioning.identification.series import Array
+from canshaper.commissioning.identification.series import Array, Kind, Segment, Value
 
 CONFIDENCE: Final = 0.95
 # What the noise does not show: a tool on two joints is not quite the pendulum of the model, and a
@@ -19,106 +29,198 @@ CONFIDENCE: Final = 0.95
 MODEL_PERIOD: Final = 0.002
 MODEL_RATIO: Final = 0.02
 MODEL_RATIO_ABS: Final = 0.001
+# Beyond this no tool swings, and its unit is wrong.
+LARGEST_RAD: Final = math.radians(100.0)
+# Frequencies at which the noise is looked at; more show no more.
+MOST_FREQUENCIES: Final = 80
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
-    """A number with its confidence interval: ``value`` +- ``half``."""
+class DecayProblem:
+    """Least squares of several segments over common parameters.
 
-    value: float
-    half: float
+    Parameters: frequency w in rad/s, decay s in 1/s, and on request a dry friction, by which the
+    amplitude falls in a second besides. It and the amplitudes at the start of each segment, which
+    are known about, are in the unit of the data.
+    """
 
-    @property
-    def relative(self) -> float:
-        """Half width as a part of the value."""
-        return self.half / abs(self.value) if self.value else math.inf
+    def __init__(self, segments: Sequence[Segment], amplitudes: Sequence[float]) -> None:
+        self.segments = segments
+        self.amplitudes = list(amplitudes)
+        self.weights = [1.0] * len(segments)
+
+    def basis(self, i: int, x: Array, at: Array | None = None) -> tuple[Array, Array]:
+        """Columns of the linear parameters of a segment, and the envelope that starts at 1.
+
+        ``at``: times from the start of the segment, by default its own.
+        """
+        time = self.segments[i].time_s if at is None else at
+        omega, sigma = float(x[0]), float(x[1])
+        envelope = np.exp(-sigma * time)
+        if len(x) > 2:
+            lost = -np.expm1(-sigma * time) / sigma if sigma else time
+            envelope = np.maximum(envelope - float(x[2]) / self.amplitudes[i] * lost, 0.0)
+        stretched = time
+        if angle := self._angle(i, omega, sigma):
+            if len(x) > 2:
+                slower = cumulative_trapezoid(envelope**2, time, initial=0.0)
+            else:
+                slower = -np.expm1(-2.0 * sigma * time) / (2.0 * sigma) if sigma else time
+            stretched = time - angle**2 / 16.0 * slower
+        phase = omega * stretched
+        drift = time - 0.5 * self.segments[i].time_s[-1]
+        columns = [envelope * np.cos(phase), envelope * np.sin(phase), np.ones_like(time), drift]
+        return np.stack(columns, axis=1), envelope
+
+    def _angle(self, i: int, omega: float, sigma: float) -> float:
+        """Amplitude at the start of a segment in rad, 0 where it is not known or cannot be."""
+        kind, amplitude = self.segments[i].kind, self.amplitudes[i]
+        if kind is Kind.OTHER:
+            return 0.0
+        angle = amplitude if kind is Kind.ANGLE else amplitude / math.hypot(omega, sigma)
+        return angle if angle < LARGEST_RAD else 0.0
+
+    def linear(self, i: int, x: Array) -> tuple[Array, Array, Array]:
+        """Basis, best linear parameters and residual of a segment."""
+        basis, _ = self.basis(i, x)
+        best, *_ = np.linalg.lstsq(basis, self.segments[i].value, rcond=None)
+        return basis, np.asarray(best), self.segments[i].value - basis @ best
+
+    def _residual(self, x: Array) -> Array:
+        parts = [self.linear(i, x)[2] * weight for i, weight in enumerate(self.weights)]
+        return np.concatenate(parts)
+
+    def solve(self, x: Sequence[float], *, roughly: bool = False) -> Array:
+        """Parameters of least squares, from a start; roughly, to some parts in a thousand."""
+        omega = float(x[0])
+        low = np.array([0.6 * omega, -0.2 * omega, -np.inf])[: len(x)]
+        high = np.array([1.6 * omega, omega, np.inf])[: len(x)]
+        now = np.clip(np.asarray(x, dtype=np.float64), low, high)
+        scale = np.array([0.01 * now[0], 0.01 * now[0], 0.01 * max(self.amplitudes)])[: len(x)]
+        ftol, most = (1e-4, 30) if roughly else (1e-8, 100)
+        for _ in range(1 if roughly else 3):  # amplitudes and weights follow, and settle at once
+            now = least_squares(
+                self._residual, now, x_scale=scale, bounds=(low, high), ftol=ftol, max_nfev=most
+            ).x
+            for i, segment in enumerate(self.segments):
+                _, best, residual = self.linear(i, now)
+                size = math.hypot(best[0], best[1])
+                self.amplitudes[i] = max(size, 1e-12)
+                if len(self.segments) > 1:
+                    noise = math.sqrt(density(segment.time_s, residual, float(now[0]))[0])
+                    self.weights[i] = 1.0 / max(noise, 1e-4 * size, 1e-12)
+        return now
+
+    def covariance(self, x: Array) -> tuple[Array, float]:
+        """Covariance of the parameters, and the degrees of freedom it rests on.
+
+        What matters of the noise is its density at the frequency of the swing; that is taken from
+        the residual's spectrum around it, so noise that is not white gives no wrong interval.
+        """
+        n = len(x)
+        curvature, meat, freedom = np.zeros((n, n)), np.zeros((n, n)), 0.0
+        for i, segment in enumerate(self.segments):
+            basis, best, residual = self.linear(i, x)
+            columns = []
+            for step in np.eye(n) * (1e-5 * x[0]):
+                up, down = self.basis(i, x + step)[0], self.basis(i, x - step)[0]
+                columns.append((up - down) @ best / (2.0 * step.max()))
+            slope = np.stack(columns, axis=1)
+            q, _ = np.linalg.qr(basis)
+            slope -= q @ (q.T @ slope)
+            information = slope.T @ slope * self.weights[i] ** 2
+            power, count = density(segment.time_s, residual, float(x[0]))
+            curvature += information
+            meat += information * power * self.weights[i] ** 2
+            freedom += count
+        inverse = np.linalg.pinv(curvature)
+        return inverse @ meat @ inverse, max(freedom, 3.0)
+
+
+def density(time: Array, residual: Array, omega: float) -> tuple[float, float]:
+    """Power of the residual around a frequency, white noise has its variance; and its freedom."""
+    length = float(time[-1] - time[0])
+    resolution = 2.0 * math.pi / length
+    near = np.arange(0.5 * omega, 1.8 * omega, 0.5 * resolution)
+    near = near[np.abs(near - omega) > 0.75 * resolution]
+    if len(near) < 4:
+        near = np.arange(omega + 0.75 * resolution, 3.0 * omega + 3.0 * resolution, resolution / 2)
+    if len(near) > MOST_FREQUENCIES:
+        near = near[:: len(near) // MOST_FREQUENCIES + 1]
+    spectrum = np.abs(np.exp(-1j * np.outer(near, time)) @ residual) ** 2 / len(time)
+    # The fit has taken its own part out of the residual.
+    lost = len(time) / max(len(time) - 6, 1)
+    return float(np.mean(spectrum)) * lost, len(near)
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentFit:
-    """One segment of a fit.
-
-    Attributes:
-        segment: its data.
-        fitted: the model at its times, offset and drift included.
-        base: offset and drift alone.
-        envelope: amplitude of the swing at its times, in the unit of the data.
-        noise: standard deviation of what is left.
-        explained: part of the swing's variance that the model explains.
-        period_s: period of this segment alone.
-        damping_ratio: damping ratio of this segment alone.
-    """
+    """One segment of a fit."""
 
     segment: Segment
-    fitted: Array
-    base: Array
-    envelope: Array
-    noise: float
-    explained: float
-    period_s: Value
-    damping_ratio: Value
+    fitted: Array  # the model at its times, offset and drift included
+    base: Array  # offset and drift alone
+    envelope: Array  # amplitude of the swing at its times, in the unit of the data
+    noise: float  # standard deviation of what is left
+    period_s: float  # of this segment alone
+
+    @property
+    def angle_rad(self) -> float:
+        """Amplitude at its start, 0 where it is not known."""
+        first, kind = float(self.envelope[0]), self.segment.kind
+        if kind is Kind.OTHER:
+            return 0.0
+        return first * (1.0 if kind is Kind.ANGLE else self.period_s / 2.0 / math.pi)
+
+
+Damping = tuple[float, float]  # an amplitude in the unit of the data, and the damping ratio there
 
 
 @dataclass(frozen=True, slots=True)
 class DecayFit:
-    """Period and damping of a swing.
-
-    Attributes:
-        period_s: period of small damped swings, as a stopwatch shows it.
-        damping_ratio: damping ratio over the amplitudes that were seen.
-        segments: the segments.
-        swings: full swings that were seen.
-        friction: damping ratios at the largest and the smallest amplitude seen, with these
-            amplitudes in the unit of the data, where the damping surely changes with it.
-    """
+    """Period of small damped swings, as a stopwatch shows it, and damping ratio."""
 
     period_s: Value
     damping_ratio: Value
     segments: list[SegmentFit]
-    swings: float
-    friction: tuple[tuple[float, float], tuple[float, float]] | None
+    swings: float  # full swings that were seen
+    # At the largest and the smallest amplitude seen, where the damping surely changes with it.
+    friction: tuple[Damping, Damping] | None
 
 
 def fit_decay(segments: Sequence[Segment], period_s: float, damping_ratio: float) -> DecayFit:
-    """Fit one period and one damping to free swings.
+    """Fit one period and one damping to free swings, each of a swing and a half or more.
 
-    Args:
-        segments: at least one, each at least a swing and a half long.
-        period_s: start of the search, within some 10 %.
-        damping_ratio: start of the search.
+    The search starts at the period, which has to be known to some 10 %, and the damping ratio.
     """
     omega = 2.0 * math.pi / period_s
-    start = [omega, damping_ratio * omega]
     amplitudes = [float(np.ptp(s.value[: max(8, len(s.value) // 4)])) / 2.0 for s in segments]
     problem = DecayProblem(segments, amplitudes)
-    x = problem.solve(start)
+    x = problem.solve([omega, damping_ratio * omega])
     covariance, freedom = problem.covariance(x)
-    alone = []
+    common, sure = swing_values(*map(float, x)), deviations(x, covariance)
+    alone = []  # period and damping ratio of each segment by itself, and their deviations
     for segment, amplitude in zip(segments, problem.amplitudes, strict=True):
         one = DecayProblem([segment], [amplitude])
         best = one.solve(list(x)) if len(segments) > 1 else x
-        alone.append((swing_values(best), deviations(best, one.covariance(best)[0])))
-    period, ratio = swing_values(x)
-    sure = deviations(x, covariance)
+        alone.append((swing_values(*map(float, best)), deviations(best, one.covariance(best)[0])))
     factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, freedom))
-    model = MODEL_PERIOD * period, math.hypot(MODEL_RATIO * ratio, MODEL_RATIO_ABS)
-    noise = [
-        factor * max(deviation, _between([(a[k], d[k]) for a, d in alone], common))
-        for k, (deviation, common) in enumerate(zip(sure, (period, ratio), strict=True))
-    ]
-    halves = [math.hypot(*both) for both in zip(noise, model, strict=True)]
-    fits = [
-        _segment_fit(problem, i, x, [Value(v, factor * d) for v, d in zip(*alone[i], strict=True)])
-        for i in range(len(segments))
-    ]
-    swings = sum(float(s.time_s[-1]) for s in segments) / period
-    friction = _friction(problem, x)
-    return DecayFit(Value(period, halves[0]), Value(ratio, halves[1]), fits, swings, friction)
+    model = MODEL_PERIOD * common[0], math.hypot(MODEL_RATIO * common[1], MODEL_RATIO_ABS)
+    values = []
+    for k in (0, 1):
+        between = _between([(a[k], d[k]) for a, d in alone], common[k])
+        values.append(Value(common[k], math.hypot(factor * max(sure[k], between), model[k])))
+    fits = []
+    for i, segment in enumerate(segments):
+        basis, best, residual = problem.linear(i, x)
+        envelope = problem.basis(i, x)[1] * math.hypot(best[0], best[1])
+        base, noise = basis[:, 2:] @ best[2:], float(np.std(residual))
+        fits.append(SegmentFit(segment, basis @ best, base, envelope, noise, alone[i][0][0]))
+    swings = sum(float(s.time_s[-1]) for s in segments) / common[0]
+    return DecayFit(values[0], values[1], fits, swings, _friction(problem, x))
 
 
-def swing_values(x: Array) -> tuple[float, float]:
+def swing_values(omega: float, sigma: float) -> tuple[float, float]:
     """Period and damping ratio."""
-    omega, sigma = float(x[0]), float(x[1])
     return 2.0 * math.pi / omega, sigma / math.hypot(omega, sigma)
 
 
@@ -139,27 +241,8 @@ def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
     return math.sqrt(sum(terms) * count / (count - 1)) / sum(weights) if count > 1 else 0.0
 
 
-def _segment_fit(problem: DecayProblem, i: int, x: Array, own: list[Value]) -> SegmentFit:
-    basis, best, residual = problem.linear(i, x)
-    base = basis[:, 2:] @ best[2:]
-    swing = problem.segments[i].value - base
-    noise = float(np.std(residual))
-    return SegmentFit(
-        problem.segments[i],
-        basis @ best,
-        base,
-        problem.basis(i, x)[1] * math.hypot(best[0], best[1]),
-        noise,
-        1.0 - noise**2 / max(float(np.var(swing)), 1e-30),
-        own[0],
-        own[1],
-    )
-
-
-def _friction(
-    problem: DecayProblem, x: Array
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """(amplitude, damping ratio) at both ends, where the damping surely depends on amplitude."""
+def _friction(problem: DecayProblem, x: Array) -> tuple[Damping, Damping] | None:
+    """Damping at both ends, where it surely depends on amplitude."""
     if len({s.kind for s in problem.segments}) > 1:
         return None
     ends = [float(problem.basis(i, x)[1][-1]) * a for i, a in enumerate(problem.amplitudes)]

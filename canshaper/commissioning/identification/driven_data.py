@@ -1,4 +1,8 @@
-"""Stretches of a log in which an axis is driven."""
+"""Stretches of a log in which an axis is driven, and the model of its swing there.
+
+The tip follows its command after a delay, with a lag of first order, and drives the pendulum; a
+free swing, an offset and a drift of each stretch come on top.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,11 +11,14 @@ from typing import Final
 import numpy as np
 from scipy.signal import lfilter
 
+from canshaper.commissioning.identification.commands import STANDS
+from canshaper.commissioning.identification.decay import density
 from canshaper.commissioning.identification.series import (
     BIN_S,
     Array,
     Command,
     Kind,
+    Segment,
     Series,
     binned,
 )
@@ -20,22 +27,16 @@ from canshaper.shaping.sway import GRAVITY_M_S2
 # A stretch begins so many periods before its first command, to know the swing that is there
 # already, goes on so many after the last, and is at most about so many long.
 BEFORE, AFTER, LONGEST = 1.0, 2.0, 8.0
-# Commands, part of full speed, below which an axis stands.
-STANDS = 0.01
 # So much earlier than a stretch a command may still matter: a second of the filter's past, and the
 # longest delay of a valve.
 EARLIER_S = 2.0
+SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
 
 
 @dataclass(frozen=True, slots=True)
-class Driven:
-    """One stretch: its data, and the commands that drove it."""
+class Driven(Segment):
+    """One stretch: its data, and the commands that drove it, on the clock of the log."""
 
-    source: str
-    start_s: float
-    time_s: Array
-    value: Array
-    kind: Kind
     command: Command
 
 
@@ -68,37 +69,22 @@ def stretches(series: Series, period: float) -> list[Driven]:
         t, v = time[inside], value[inside]
         if len(t) > 20 and t[-1] - t[0] > period and np.diff(t).max() < period / 3.0:
             start = float(t[0])
-            its = _between(command, start - EARLIER_S, start + float(t[-1]))
-            result.append(Driven(series.source, start, t - start, v, series.unit.kind, its))
+            low, high = np.searchsorted(
+                command.time_s, [start - EARLIER_S, start + float(t[-1])], side="right"
+            )
+            part = slice(max(0, low - 1), high)  # with what holds at the start
+            held = Command(command.time_s[part], command.speed[part])
+            result.append(Driven(series.source, start, t - start, v, series.unit.kind, held))
     return result
 
 
-def _between(command: Command, first_s: float, last_s: float) -> Command:
-    """Return the commands in a time, with the command that holds at its start."""
-    low = max(0, int(np.searchsorted(command.time_s, first_s, side="right")) - 1)
-    part = slice(low, int(np.searchsorted(command.time_s, last_s, side="right")))
-    return Command(command.time_s[part], command.speed[part])
-
-
-SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
-
-
-def free_columns(one: Driven, omega: float, sigma: float) -> Array:
+def free_columns(one: Segment, omega: float, sigma: float) -> Array:
     """Return the columns of a stretch without a command: free swing, offset, drift."""
     t = one.time_s
     decay = np.exp(-sigma * t)
     return np.stack(
         [decay * np.cos(omega * t), decay * np.sin(omega * t), np.ones_like(t), t], axis=1
     )
-
-
-def bases_of(data: Sequence[Driven], omega: float, sigma: float) -> list[tuple[Array, Array]]:
-    """Return for each stretch: orthonormal basis of the free columns, and the data without them."""
-    bases = []
-    for one in data:
-        q, _ = np.linalg.qr(free_columns(one, omega, sigma))
-        bases.append((q, one.value - q @ (q.T @ one.value)))
-    return bases
 
 
 def responses(
@@ -109,17 +95,16 @@ def responses(
         kind: swing_filter(omega, sigma, max(lag, SHORTEST_LAG_S), kind)
         for kind in {one.kind for one in data}
     }
-    return [_response(one, filters[one.kind], delay) for one in data]
-
-
-def _response(one: Driven, coefficients: tuple[Array, Array], delay: float) -> tuple[Array, Array]:
-    grid = np.arange(0.0, float(one.time_s[-1]) + 1.0 + 2.0 * BIN_S, BIN_S)
-    at = np.searchsorted(one.command.time_s, one.start_s - 1.0 + grid - delay, side="right") - 1
-    speed = np.where(at >= 0, one.command.speed[np.maximum(at, 0)], 0.0)
-    # From rest at the first command's level; a swing before it is a free one.
-    swing = lfilter(*coefficients, speed - speed[0])
-    time = one.time_s + 1.0
-    return np.interp(time, grid, swing), np.interp(time, grid, speed)
+    pairs = []
+    for one in data:
+        grid = np.arange(0.0, float(one.time_s[-1]) + 1.0 + 2.0 * BIN_S, BIN_S)
+        at = np.searchsorted(one.command.time_s, one.start_s - 1.0 + grid - delay, side="right") - 1
+        speed = np.where(at >= 0, one.command.speed[np.maximum(at, 0)], 0.0)
+        # From rest at the first command's level; a swing before it is a free one.
+        swing = lfilter(*filters[one.kind], speed - speed[0])
+        time = one.time_s + 1.0
+        pairs.append((np.interp(time, grid, swing), np.interp(time, grid, speed)))
+    return pairs
 
 
 def swing_filter(
@@ -140,3 +125,31 @@ def swing_filter(
     parts = [residue * np.poly(np.delete(decays, i)) for i, residue in enumerate(residues)]
     b = np.convolve([1.0, -1.0], np.sum(parts, axis=0)).real
     return b, np.asarray(np.poly(decays).real, dtype=np.float64)
+
+
+Projected = Sequence[tuple[Array, Array]]  # swing and data of each stretch, without free swings
+
+
+def gain_of(projected: Projected) -> float:
+    """Gain of least squares between swing and data."""
+    square = sum(float(h @ h) for h, _ in projected)
+    return sum(float(h @ y) for h, y in projected) / max(square, 1e-30)
+
+
+def squares_of(projected: Projected) -> tuple[float, float]:
+    """Sum of the squares of the data, and of what the swing leaves of them."""
+    gain = gain_of(projected)
+    left = sum(float(np.sum((y - gain * h) ** 2)) for h, y in projected)
+    return sum(float(y @ y) for _, y in projected), left
+
+
+def covariance_of(slope: Array, residual: Array, data: Sequence[Segment], omega: float) -> Array:
+    """Covariance of parameters by the slopes of the residuals, and the noise around the swing."""
+    meat, first = np.zeros((slope.shape[1],) * 2), 0
+    for one in data:
+        part = slice(first, first + len(one.time_s))
+        noise, _ = density(one.time_s, residual[part], omega)
+        meat += noise * slope[part].T @ slope[part]
+        first = part.stop
+    inverse = np.linalg.pinv(slope.T @ slope)
+    return np.asarray(inverse @ meat @ inverse)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from canshaper.commissioning.identification.segments import FreeSwings, find_free
+from canshaper.commissioning.identification.segments import find_free
 from canshaper.commissioning.identification.series import Array, Series, ordered
 from canshaper.commissioning.identification.table import Table
 from canshaper.errors import IdentificationError
@@ -19,18 +19,13 @@ SWINGS = 6
 def series_of(table: Table, label: str, column: str | None, about_s: float | None = None) -> Series:
     """The swing in a table: a column, or without one what the gyroscope turns about most.
 
-    Args:
-        table: the table.
-        label: state of the grapple in it.
-        column: name of the column; None for the gyroscope.
-        about_s: the period as far as it is known, s.
+    ``about_s``: the period as far as it is known, s.
 
     Raises:
         IdentificationError: no such column, no gyroscope, or a clock that goes back.
     """
     if column is not None:
-        name = table.column(column)
-        return _series(table, label, name, table.columns[name], notes=[])
+        return _series(table, label, table.column(column))
     gyroscope = table.gyroscope()
     if not gyroscope:
         raise IdentificationError(
@@ -45,15 +40,8 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
             " the sensor on?"
         )
     if len(names) == 1:
-        return _series(table, label, names[0], table.columns[names[0]], notes=[])
-    rates = np.stack([table.columns[n] for n in names])
-    direction, round_ = _direction(table, names, about_s)
-    notes = []
-    if round_ > ROUND:
-        notes.append(
-            f"{table.path}: it swings round, {100.0 * round_:.0f} % as wide as long; swing it in"
-            " one direction only"
-        )
+        return _series(table, label, names[0])
+    direction, width = _direction([_series(table, label, n) for n in names], about_s)
     # The sign is free; the largest part counts positive.
     direction *= math.copysign(1.0, direction[int(np.argmax(np.abs(direction)))])
     parts = " ".join(
@@ -61,34 +49,36 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
         for v, n in zip(direction, names, strict=True)
         if abs(v) >= 0.05
     )
-    return _series(
-        table, label, f"gyroscope ({parts})", direction @ rates, notes=notes, like=names[0]
-    )
+    turned = direction @ np.stack([table.columns[n] for n in names])
+    one = _series(table, label, names[0], f"gyroscope ({parts})", turned)
+    if width > ROUND:
+        one.notes.append(
+            f"{table.path}: it swings round, {100.0 * width:.0f} % as wide as long; swing it in"
+            " one direction only"
+        )
+    return one
 
 
 def _series(
-    table: Table, label: str, name: str, values: Array, *, notes: list[str], like: str | None = None
+    table: Table, label: str, column: str, name: str = "", values: Array | None = None
 ) -> Series:
-    unit = table.unit(like or name)
+    """A column, or other values in its unit, under a name of their own."""
+    unit = table.unit(column)
+    name, values = (column, table.columns[column]) if values is None else (name, values)
     time, value = ordered(f"{table.path}: {name}", table.time_s, values * unit.factor)
-    source = f"{table.path.name}: {name}"
-    return Series(source, label, unit, time, value, notes=[*table.notes, *notes])
+    return Series(f"{table.path.name}: {name}", label, unit, time, value, notes=[*table.notes])
 
 
-def _direction(table: Table, names: Sequence[str], about_s: float | None) -> tuple[Array, float]:
+def _direction(columns: Sequence[Series], about_s: float | None) -> tuple[Array, float]:
     """Unit vector of the axis it swings about, and how round the swing is, 0 to 1."""
-    each = {n: _series(table, "", n, table.columns[n], notes=[]) for n in names}
-    widest = max(float(np.std(one.value)) for one in each.values())
-    best: FreeSwings | None = None
-    for one in each.values():
-        swings = find_free(one, about_s) if float(np.std(one.value)) > 0.3 * widest else None
-        if swings and (best is None or swings.worth > best.worth):
-            best = swings
-    if best is None:
-        spreads = np.array([float(np.std(one.value)) for one in each.values()])
+    spreads = np.array([float(np.std(one.value)) for one in columns])
+    wide = [one for one, s in zip(columns, spreads, strict=True) if s > 0.3 * spreads.max()]
+    free = [swings for one in wide if (swings := find_free(one, about_s))]
+    if not free:
         return np.asarray(spreads == spreads.max(), dtype=np.float64), 0.0
+    best = max(free, key=lambda swings: swings.worth)
     longest = max(best.segments, key=lambda s: float(np.var(s.value)) * float(s.time_s[-1]))
-    return _ellipse(list(each.values()), longest.start_s, best.period_s)
+    return _ellipse(columns, longest.start_s, best.period_s)
 
 
 def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[Array, float]:
@@ -108,7 +98,5 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
     if not ellipses:
         return np.eye(len(columns))[0], 0.0
     longest = max(ellipses, key=lambda f: f[0])
-    widths = [
-        width / max(length, 1e-12) for length, width, _ in ellipses if length > longest[0] / 3.0
-    ]
+    widths = [w / max(length, 1e-12) for length, w, _ in ellipses if length > longest[0] / 3.0]
     return longest[2], max(widths)

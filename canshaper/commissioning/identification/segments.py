@@ -7,23 +7,36 @@ they do not.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import find_peaks
 
-from canshaper.commissioning.identification.decay_problem import Segment
-from canshaper.commissioning.identification.series import Array, Series, binned, pieces
+from canshaper.commissioning.identification.series import (
+    Array,
+    Segment,
+    Series,
+    Span,
+    binned,
+    common,
+    pieces,
+    runs,
+)
 from canshaper.commissioning.identification.swing import (
     SAMPLES,
     SHORTEST_SWINGS,
     Run,
     Swing,
-    candidates,
     cut,
     refined,
-    smoothed,
 )
 
+SHORTEST_S, LONGEST_S = 0.3, 12.0
+# Values of a part of a signal from which on its spectrum shows something, and its length.
+LEAST_VALUES, PART_S = 24, 30.0
+# Width of the window that smooths, part of a period.
+SMOOTHED = 0.6
 # Windows a period; a segment's end is known to this part of a period.
 STEPS = 16
 # A window counts when its sinusoid explains all but this part of its own amplitude.
@@ -38,16 +51,8 @@ MOST_RUNS = 200
 SETTLING_S = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class FreeSwings:
-    """Free swings of a signal.
-
-    Attributes:
-        segments: each at least a period and a half.
-        period_s: about the period.
-        damping_ratio: about the damping ratio.
-        worth: energy times time of them all.
-    """
+class FreeSwings(NamedTuple):
+    """Free swings of a signal, about their period and damping ratio, and energy times time."""
 
     segments: list[Segment]
     period_s: float
@@ -56,115 +61,147 @@ class FreeSwings:
 
 
 def find_free(series: Series, about_s: float | None = None) -> FreeSwings | None:
-    """The free swings of a series, or None where there is none.
+    """The free swings of a series, each of a period and a half or more; None without any.
 
-    Args:
-        series: the signal.
-        about_s: the period as far as it is known, s; then 30 % around it is searched.
+    Where the period is known about, in s, some 30 % around it are searched.
     """
     time, value = binned(series.time_s, series.value)
     if about_s:
-        time, value = smoothed(time, value, about_s)
+        time, value = _smoothed(time, value, about_s)
+    signal = Segment(series.source, 0.0, time, value, series.unit.kind)
+    idle = [(-math.inf, math.inf)]
+    if series.idle is not None:
+        idle = [(begin + SETTLING_S, end) for begin, end in series.idle]
     best: FreeSwings | None = None
-    for period in candidates(time, value, about_s):
+    for period in _candidates(time, value, about_s):
         # What swings far less than the best so far need not be looked at.
         least = LEAST_WORTH * best.worth if best else 0.0
-        swings = _with_period(series, time, value, period, least)
+        swings = _with_period(signal, idle, period, least)
         # The period of the windows may be some percent off at first.
         if swings:
-            swings = _with_period(series, time, value, swings.period_s, least) or swings
+            swings = _with_period(signal, idle, swings.period_s, least) or swings
         if swings and (best is None or swings.worth > best.worth):
             best = swings
     return best
 
 
-def _with_period(
-    series: Series, time: Array, value: Array, period: float, least: float
-) -> FreeSwings | None:
-    """Free swings of about that period, and at least of such a worth."""
-    runs: list[tuple[Segment, Run]] = []
+def _smoothed(time: Array, value: Array, period: float) -> tuple[Array, Array]:
+    """A signal without what swings more than twice as fast as a period.
+
+    A weighted mean changes amplitude and phase of a damped swing, and neither its frequency nor its
+    decay; the amplitude is put right again.
+    """
+    times, values = [time[:0]], [value[:0]]
     for piece in pieces(time, period / 3.0):
         t, v = time[piece], value[piece]
-        for start, end in _idle(series, float(t[0]), float(t[-1])):
-            inside = (t >= start) & (t <= end)
-            whole = Segment(series.source, 0.0, t[inside], v[inside], series.unit.kind)
-            if len(whole.time_s) >= SHORTEST_SWINGS * SAMPLES:
-                runs += [(whole, run) for run in _runs(whole.time_s, whole.value, period)]
-    runs.sort(key=lambda r: -r[1].worth)
-    kept: list[Swing] = []
-    wholes: dict[float, Segment] = {}
-    for whole, run in runs[:MOST_RUNS]:
-        if run.worth < max(LEAST_WORTH * runs[0][1].worth, least):
-            break
-        if any(_overlap(run, k) > 0.5 for k in kept):
+        step = float(np.median(np.diff(t)))
+        grid = np.arange(t[0], t[-1], step)
+        window = np.hanning(round(SMOOTHED * period / step) + 2)[1:-1]
+        if len(grid) <= len(window) or len(window) < 2:
             continue
-        middle = 0.5 * (run.start_s + run.end_s)
-        low = max((k.end_s for k in kept if k.end_s <= middle), default=-math.inf)
-        high = min((k.start_s for k in kept if k.start_s >= middle), default=math.inf)
-        if swing := refined(cut(whole, low, high, 0.0), run):
+        window /= window.sum()
+        local = (np.arange(len(window)) - 0.5 * (len(window) - 1)) * step
+        gain = float(window @ np.cos(2.0 * math.pi / period * local))
+        mean = np.convolve(np.interp(grid, t, v), window, mode="valid")
+        times.append(grid[: len(mean)] + 0.5 * (len(window) - 1) * step)
+        values.append(mean / gain)
+    return np.concatenate(times), np.concatenate(values)
+
+
+def _candidates(time: Array, value: Array, about_s: float | None) -> list[float]:
+    """Periods at which a signal swings most, the strongest first, s."""
+    low, high = (0.7 * about_s, 1.4 * about_s) if about_s else (SHORTEST_S, LONGEST_S)
+    frequencies = np.geomspace(1.0 / high, 1.0 / low, 160)
+    power = np.zeros_like(frequencies)
+    for piece in pieces(time, high / 2.0):
+        length_s = time[piece][-1] - time[piece][0]
+        ends = np.linspace(0, piece.stop - piece.start, max(1, round(length_s / PART_S)) + 1)
+        for begin, end in pairwise(piece.start + ends.astype(int)):
+            t, v = time[begin:end], value[begin:end]
+            if len(t) < LEAST_VALUES or t[-1] - t[0] < 1.5 * low:
+                continue
+            base = np.polynomial.Polynomial.fit(t, v, 2)
+            window = np.hanning(len(t) + 2)[1:-1]
+            waves = np.exp(-2j * np.pi * np.outer(frequencies, t - t[0]))
+            power += np.abs(waves @ ((v - base(t)) * window)) ** 2 / len(t)
+    if not power.any():
+        return []
+    # What drifts has most power at the bottom; weighed by frequency a resonance stands out.
+    weighed = power * frequencies
+    peaks, _ = find_peaks(np.concatenate([[0.0], weighed, [0.0]]))
+    strongest = sorted(peaks - 1, key=lambda k: -weighed[k])[:4]
+    return [float(1.0 / frequencies[k]) for k in strongest]
+
+
+def _with_period(
+    signal: Segment, idle: list[Span], period: float, least: float
+) -> FreeSwings | None:
+    """Free swings of about that period, and at least of such a worth."""
+    time = signal.time_s
+    unbroken = [(float(t[0]), float(t[-1])) for t in (time[p] for p in pieces(time, period / 3.0))]
+    wholes = [cut(signal, begin, end, 0.0) for begin, end in common(unbroken, idle)]
+    found = [(whole, run) for whole in wholes for run in _runs(whole.time_s, whole.value, period)]
+    found.sort(key=lambda pair: -pair[1].worth)
+    kept: list[Swing] = []
+    for whole, run in found[:MOST_RUNS]:
+        if run.worth < max(LEAST_WORTH * found[0][1].worth, least):
+            break
+        middle, half = 0.5 * (run.start_s + run.end_s), 0.5 * (run.end_s - run.start_s)
+        parts = (k.segment for k in kept)
+        if any(min(run.end_s, p.end_s) - max(run.start_s, p.start_s) > half for p in parts):
+            continue
+        low = max((e for k in kept if (e := k.segment.end_s) <= middle), default=-math.inf)
+        high = min((b for k in kept if (b := k.segment.start_s) >= middle), default=math.inf)
+        if swing := refined(whole, run, low, high):
             kept.append(swing)
-            wholes[swing.start_s] = whole
     if not kept:
         return None
-    best = max(kept, key=lambda s: s.worth)
-    kept = sorted((s for s in kept if _alike(s, best)), key=lambda s: s.start_s)
-    kept = _joined(kept, wholes, period)
-    best = max(kept, key=lambda s: s.worth)
-    kept = [s for s in kept if _alike(s, best)]
-    weights = np.array([s.worth for s in kept])
-    omega = float(np.average([s.omega for s in kept], weights=weights))
-    sigma = float(np.average([s.sigma for s in kept], weights=weights))
-    ratio = max(sigma / omega, 1e-3)
+    kept = sorted(_like_the_best(kept), key=lambda swing: swing.segment.start_s)
+    kept = _like_the_best(_joined(kept, period))
+    worths = np.array([s.worth for s in kept])
+    omega = float(np.average([s.omega for s in kept], weights=worths))
+    sigma = float(np.average([s.sigma for s in kept], weights=worths))
     worth = sum(s.worth for s in kept)
-    return FreeSwings([s.segment for s in kept], 2.0 * math.pi / omega, ratio, worth)
+    segments = [s.segment for s in kept]
+    return FreeSwings(segments, 2.0 * math.pi / omega, max(sigma / omega, 1e-3), worth)
 
 
-def _alike(swing: Swing, best: Swing) -> bool:
-    """Whether a segment may be of the same pendulum as the best one; a weak one has to show it."""
-    if swing.worth < LEAST_WORTH * best.worth:
-        return False
-    near = abs(swing.omega / best.omega - 1.0) < ALIKE
-    return near or swing.worth > 0.3 * best.worth
+def _like_the_best(swings: Sequence[Swing]) -> list[Swing]:
+    """Swings that may be of the same pendulum as the best one; a weak one has to show it."""
+    best = max(swings, key=lambda swing: swing.worth)
+    return [
+        one
+        for one in swings
+        if one.worth > 0.3 * best.worth
+        or (one.worth >= LEAST_WORTH * best.worth and abs(one.omega / best.omega - 1.0) < ALIKE)
+    ]
 
 
-def _joined(swings: Sequence[Swing], wholes: dict[float, Segment], period: float) -> list[Swing]:
+def _joined(swings: Sequence[Swing], period: float) -> list[Swing]:
     """Return the swings, with neighbours joined that are one swing parted by noise."""
     result: list[Swing] = []
     for swing in swings:
-        if result and swing.start_s - result[-1].end_s < 1.5 * period:
+        if result and swing.segment.start_s - result[-1].segment.end_s < 1.5 * period:
             one = result[-1]
             better = one if one.worth > swing.worth else swing
-            whole = wholes[better.start_s]
-            run = Run(one.start_s, swing.end_s, better.omega, better.sigma, better.worth)
-            both = refined(cut(whole, run.start_s, run.end_s, 0.0), run)
-            if both and both.end_s - both.start_s > 0.9 * (run.end_s - run.start_s):
-                wholes[both.start_s] = whole
+            low, high = one.segment.start_s, swing.segment.end_s
+            run = Run(low, high, better.omega, better.sigma, better.worth)
+            both = refined(better.whole, run, low, high)
+            if both and both.segment.time_s[-1] > 0.9 * (high - low):
                 result[-1] = both
                 continue
         result.append(swing)
     return result
 
 
-def _overlap(one: Run, other: Swing) -> float:
-    """Part of the first that is within the second."""
-    common = min(one.end_s, other.end_s) - max(one.start_s, other.start_s)
-    return common / (one.end_s - one.start_s)
-
-
-def _idle(series: Series, start: float, end: float) -> list[tuple[float, float]]:
-    """Return the parts of a stretch without commands; all of it where commands are not known."""
-    if series.idle is None:
-        return [(start, end)]
-    inside = [(max(a + SETTLING_S, start), min(b, end)) for a, b in series.idle]
-    return [(a, b) for a, b in inside if b > a]
-
-
 def _runs(time: Array, value: Array, period: float) -> list[Run]:
     """Runs of windows that seem to swing freely."""
+    if len(time) < SHORTEST_SWINGS * SAMPLES:
+        return []
     dt = max(float(np.median(np.diff(time))), 1e-4)
     if period / dt < 0.9 * SAMPLES:
         return []
-    step = period / max(STEPS, 1)
+    step = period / STEPS
     per = max(1, round(step / dt))
     grid_dt = step / per if per > 1 else dt
     grid = np.arange(time[0], time[-1], grid_dt)
@@ -199,21 +236,14 @@ def _runs(time: Array, value: Array, period: float) -> list[Run]:
     free = good[:-lag] & good[lag:]
     free &= (np.abs(turn) < 0.09 * omega + doubt) & (decay > -0.012 * omega - doubt)
     free &= decay < 0.35 * omega + doubt
-    runs = []
-    for first, last in _stretches(free):
+    found = []
+    for first, end in runs(free):
         a = float(grid[first * stride])
-        b = float(grid[min((last + lag) * stride + width - 1, len(grid) - 1)])
+        b = float(grid[min((end - 1 + lag) * stride + width - 1, len(grid) - 1)])
         if b - a >= SHORTEST_SWINGS * period:
-            part = slice(first, last + 1)
-            weights = size[part] ** 2
-            faster = float(np.average(turn[part], weights=weights))
-            slower = float(np.average(decay[part], weights=weights))
-            energy = float(np.mean(weights)) * (b - a)
-            runs.append(Run(a, b, omega + faster, slower, energy))
-    return runs
-
-
-def _stretches(flags: Sequence[bool] | np.ndarray) -> list[tuple[int, int]]:
-    """First and last of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(flags, dtype=int), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+            weights = size[first:end] ** 2
+            faster = float(np.average(turn[first:end], weights=weights))
+            slower = float(np.average(decay[first:end], weights=weights))
+            worth = float(np.mean(weights)) * (b - a)
+            found.append(Run(a, b, omega + faster, slower, worth))
+    return found

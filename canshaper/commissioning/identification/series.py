@@ -2,10 +2,8 @@
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +11,12 @@ from numpy.typing import NDArray
 from canshaper.errors import IdentificationError
 
 Array = NDArray[np.float64]
+Span = tuple[float, float]  # start and end, s
 
 # Bins that a fast signal is averaged into; the shortest period that is looked for has 15 of them.
 BIN_S = 0.02
+# Step back that is still taken for reordering by the logger, s.
+_REORDERED_S = 0.1
 
 
 class Kind(Enum):
@@ -28,16 +29,30 @@ class Kind(Enum):
     OTHER = "other"
     """Something that swings along, such as a pressure, in its own unit."""
 
+    @property
+    def shown(self) -> tuple[float, str]:
+        """Factor to the unit for people, and its name; a signal of another kind has its own."""
+        if self is Kind.OTHER:
+            return 1.0, ""
+        return math.degrees(1.0), "degrees" if self is Kind.ANGLE else "degrees/s"
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A number with its confidence interval: ``value`` +- ``half``."""
+
+    value: float
+    half: float
+
+    @property
+    def relative(self) -> float:
+        """Half width as a part of the value."""
+        return self.half / abs(self.value) if self.value else math.inf
+
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Unit of a signal as it was logged.
-
-    Attributes:
-        kind: what the signal is.
-        factor: to rad or rad/s; 1 for other signals.
-        text: its name.
-    """
+    """Unit of a signal as it was logged: its kind, the factor to rad or rad/s, and its name."""
 
     kind: Kind
     factor: float
@@ -76,12 +91,7 @@ def unit_of(text: str) -> Unit:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """Commands of an axis, each held until the next value.
-
-    Attributes:
-        time_s: times of the commands, rising, on the clock of the signal.
-        speed: speed of the tip that each gives, part of full speed.
-    """
+    """Commands of an axis, each held until the next: rising times, and parts of full speed."""
 
     time_s: Array
     speed: Array
@@ -89,41 +99,38 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A signal of one axis.
+    """A signal of one axis, in rad, rad/s or its own unit; times from the start of the log, s."""
 
-    Attributes:
-        source: file and signal, for people.
-        label: state of the grapple it was logged in, such as "empty"; may be "".
-        unit: unit it was logged in.
-        time_s: rising times from the start of the log, s.
-        value: in rad, rad/s or its own unit.
-        command: commands of the axis, where the log has them.
-        idle: stretches in which no axis was commanded to move, s; None where that is not known.
-        others: stretches in which other axes were commanded, s.
-        at: value of the deployment's grapple signal, where the log has it.
-        notes: what was left out while reading.
-    """
+    source: str  # file and signal, for people
+    label: str  # state of the grapple it was logged in, such as "empty"; may be ""
+    unit: Unit
+    time_s: Array  # rising
+    value: Array
+    command: Command | None = None  # of the axis, where the log has them
+    idle: list[Span] | None = None  # no axis was commanded to move; None where that is not known
+    others: list[Span] = field(default_factory=list)  # other axes were commanded
+    at: float | None = None  # value of the deployment's grapple signal, where the log has it
+    notes: list[str] = field(default_factory=list)  # what was left out while reading
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A stretch of a signal, that begins at ``start_s`` in the log; its times count from there."""
 
     source: str
-    label: str
-    unit: Unit
+    start_s: float
     time_s: Array
     value: Array
-    command: Command | None = None
-    idle: list[tuple[float, float]] | None = None
-    others: list[tuple[float, float]] = field(default_factory=list)
-    at: float | None = None
-    notes: list[str] = field(default_factory=list)
+    kind: Kind
+
+    @property
+    def end_s(self) -> float:
+        """Its end in the log."""
+        return self.start_s + float(self.time_s[-1])
 
 
-def ordered(source: str, time_s: Array, value: Array, back: float = 0.1) -> tuple[Array, Array]:
-    """Times and values with numbers only, in order.
-
-    Args:
-        source: file and signal, for the error.
-        time_s: times, s.
-        value: values.
-        back: step back that is still taken for reordering by the logger, s.
+def ordered(source: str, time_s: Array, value: Array) -> tuple[Array, Array]:
+    """Times in s and values with numbers only, in order; ``source``: file and signal.
 
     Raises:
         IdentificationError: the time goes back: two clocks or two recordings in one file.
@@ -135,7 +142,7 @@ def ordered(source: str, time_s: Array, value: Array, back: float = 0.1) -> tupl
     latest = np.maximum.accumulate(time_s)
     drop = latest - time_s
     worst = int(np.argmax(drop))
-    if drop[worst] > back:
+    if drop[worst] > _REORDERED_S:
         raise IdentificationError(
             f"{source}: the time goes back by {drop[worst]:.3g} s after {latest[worst]:.3f} s:"
             " two clocks, or two recordings in one file; record on one clock, or split the file"
@@ -144,11 +151,11 @@ def ordered(source: str, time_s: Array, value: Array, back: float = 0.1) -> tupl
     return time_s[order], value[order]
 
 
-def binned(time_s: Array, value: Array, bin_s: float = BIN_S) -> tuple[Array, Array]:
+def binned(time_s: Array, value: Array) -> tuple[Array, Array]:
     """Means of times and values in bins, those without samples left out; times rise strictly."""
     if not len(time_s):
         return time_s, value
-    number = np.floor((time_s - time_s[0]) / bin_s + 1e-6).astype(np.int64)
+    number = np.floor((time_s - time_s[0]) / BIN_S + 1e-6).astype(np.int64)
     first = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
     count = np.diff(np.append(first, len(number)))
     return np.add.reduceat(time_s, first) / count, np.add.reduceat(value, first) / count
@@ -156,6 +163,25 @@ def binned(time_s: Array, value: Array, bin_s: float = BIN_S) -> tuple[Array, Ar
 
 def pieces(time_s: Array, gap_s: float) -> list[slice]:
     """Stretches without gaps longer than ``gap_s``."""
-    breaks = np.flatnonzero(np.diff(time_s) > gap_s) + 1
-    ends: Sequence[int] = [0, *(int(b) for b in breaks), len(time_s)]
-    return [slice(a, b) for a, b in pairwise(ends) if b > a]
+    near = np.diff(time_s) <= gap_s
+    return [slice(a, b + 1) for a, b in runs(np.append(near, False))]
+
+
+def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Each run of True, as the numbers of its first one and of the one behind its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def common(one: list[Span], other: list[Span]) -> list[Span]:
+    """Return the intersection of two lists of stretches, each in order."""
+    common, i, j = [], 0, 0
+    while i < len(one) and j < len(other):
+        start, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
+        if end > start:
+            common.append((start, end))
+        if one[i][1] < other[j][1]:
+            i += 1
+        else:
+            j += 1
+    return common

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from canshaper.commissioning.identification.series import Array, Unit, unit_of
 from canshaper.errors import IdentificationError
@@ -34,26 +33,15 @@ _LARGEST = 1e30
 _LATEST_S = 1e10
 _REPORT_EVERY = 20_000
 
-Lines = NDArray[np.int64]
-
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers over time.
-
-    Attributes:
-        path: the file.
-        time_s: times from the first line, s; in the order of the file.
-        columns: values by the name in the header.
-        units: unit of each column, as written; "" where the header has none.
-        notes: what was left out.
-    """
+    """Columns of numbers over time, which counts from the first line, in the order of the file."""
 
     path: Path
     time_s: Array
-    columns: dict[str, Array]
-    units: dict[str, str]
-    notes: list[str]
+    columns: dict[str, Array]  # by the name in the header
+    notes: list[str]  # what was left out
 
     def unit(self, name: str) -> Unit:
         """Unit of a column; a gyroscope without one is in rad/s, as phones have it.
@@ -61,7 +49,7 @@ class Table:
         Raises:
             IdentificationError: it is an acceleration.
         """
-        text = self.units[name]
+        text = _named(name)[1]
         where = name if _GYRO.search(name) else f"{self.path.stem} {name}"
         if not text and _GYRO.search(where):
             text = "rad/s"
@@ -80,8 +68,7 @@ class Table:
         """
         lower = name.strip().lower()
         for known in self.columns:
-            plain = _named(known)[0].lower()
-            if lower in (known.lower(), plain):
+            if lower in (known.lower(), _named(known)[0].lower()):
                 return known
         raise IdentificationError(
             f"{self.path}: expected a column, got {name!r}; there are {', '.join(self.columns)}"
@@ -108,38 +95,32 @@ def is_table(path: Path) -> bool:
 
 
 def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -> Table:
-    """Read a table.
-
-    Args:
-        path: the file.
-        on_progress: called with the part that is read, 0 to 1.
+    """Read a table; ``on_progress`` is called with the part that is read, 0 to 1.
 
     Raises:
-        IdentificationError: it is none, has no times, or its clock goes back.
+        IdentificationError: it is none, or has no times.
         OSError: it cannot be read.
     """
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         number, names, delimiter = _header(path, file)
-        values = [array("d") for _ in names]
-        lines = array("q")
+        flat = array("d")  # of each line its number and its values
         wrong: list[int] = []
-        size = max(path.stat().st_size, 1)
-        read = 0
+        size, read = max(path.stat().st_size, 1), 0
         for line, text in enumerate(file, number + 1):
             row = _row(path, line, text, delimiter)
-            read += sum(len(f) for f in row) + len(row) + 1
+            read += len(text)
             if on_progress and line % _REPORT_EVERY == 0:
                 on_progress(min(1.0, read / size))
-            if not row or not any(row):
+            if not any(row):
                 continue
             numbers = _numbers(row, delimiter)
             if numbers is None or len(numbers) != len(names):
                 wrong.append(line)
-                continue
-            lines.append(line)
-            for column, value in zip(values, numbers, strict=True):
-                column.append(value)
-    return _table(path, names, [np.array(v) for v in values], np.array(lines), wrong)
+            else:
+                flat.extend([line, *numbers])
+    lines, *values = np.array(flat).reshape(-1, 1 + len(names)).T
+    notes = _left_out(path, len(names), lines, wrong)
+    return _with_times(path, dict(zip(names, values, strict=True)), lines, notes)
 
 
 def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
@@ -150,24 +131,16 @@ def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
             continue
         if "\0" in text or "\ufffd" in text:
             break
-        delimiter = max("\t;,", key=_outside_quotes(text).count)
+        delimiter = max("\t;,", key=re.sub(r'"[^"]*"', "", text).count)
         names = [n.strip() for n in _row(path, number, text, delimiter)]
         if len(names) < 2:
-            raise IdentificationError(
-                f"{path}:{number}: expected a header with the names of at least two columns,"
-                f" separated by comma, semicolon or tab, got {text[:60]!r}"
-            )
+            what = "a header with the names of at least two columns, separated by comma, semicolon"
+            raise IdentificationError(f"{path}:{number}: expected {what} or tab, got {text[:60]!r}")
         if _numbers(names, delimiter) is not None:
-            raise IdentificationError(
-                f"{path}:{number}: expected a header that names the columns, such as"
-                ' "Time (s),Gyroscope x (rad/s)", got numbers'
-            )
+            what = 'a header that names the columns, such as "Time (s),Gyroscope x (rad/s)"'
+            raise IdentificationError(f"{path}:{number}: expected {what}, got numbers")
         return number, names, delimiter
     raise IdentificationError(f"{path}: expected a table with a header, got no text")
-
-
-def _outside_quotes(text: str) -> str:
-    return re.sub(r'"[^"]*"', "", text)
 
 
 def _row(path: Path, number: int, line: str, delimiter: str) -> list[str]:
@@ -190,46 +163,44 @@ def _numbers(row: list[str], delimiter: str) -> list[float] | None:
     return None if any(_LARGEST < abs(n) < math.inf for n in numbers) else numbers
 
 
-def _table(
-    path: Path, names: list[str], values: list[Array], lines: Lines, wrong: list[int]
-) -> Table:
-    count = len(lines)
-    notes = []
-    if wrong:
-        if len(wrong) * _WRONG_LINES > count + _WRONG_LINES:
-            raise IdentificationError(
-                f"{path}:{wrong[0]}: expected {len(names)} numbers a line, got"
-                f" {len(wrong)} lines of {count + len(wrong)} without"
-            )
-        ending = len(wrong) == 1 and (not count or wrong[0] > lines[-1])
-        what = "the last line is cut off and" if ending else f"{len(wrong)} lines are wrong and"
-        notes.append(f"{path}:{wrong[0]}: {what} left out")
+def _left_out(path: Path, width: int, lines: Array, wrong: list[int]) -> list[str]:
+    """Note on lines that are no numbers, which may be few only."""
+    count, bad = len(lines), len(wrong)
+    if bad * _WRONG_LINES > count + _WRONG_LINES:
+        text = f"expected {width} numbers a line, got {bad} lines of {count + bad} without"
+        raise IdentificationError(f"{path}:{wrong[0]}: {text}")
     if count < 2:
         raise IdentificationError(f"{path}: expected 2 lines of numbers or more, got {count}")
-    columns = dict(zip(names, values, strict=True))
-    time_name, factor = _time(path, columns)
-    time = columns.pop(time_name)
-    others = {n: c for n, c in columns.items() if not _TIME.search(n)}
-    if not others:
-        raise IdentificationError(
-            f"{path}: expected a column of values, got times only: {', '.join(names)}"
-        )
-    good = np.abs(time) * factor <= _LATEST_S  # which NaN is not
-    if not good.all():
-        place, wrong_times = f"{path}:{lines[~good][0]}", np.count_nonzero(~good)
-        if np.count_nonzero(good) < 2:
-            text = f"expected a time in each line of column {time_name}"
-            raise IdentificationError(f"{place}: {text}, got none in {wrong_times} of {count}")
-        notes.append(f"{place}: {wrong_times} lines are without a time and left out")
-    time = time[good]
+    if not wrong:
+        return []
+    ending = bad == 1 and wrong[0] > lines[-1]
+    what = "the last line is cut off and" if ending else f"{bad} lines are wrong and"
+    return [f"{path}:{wrong[0]}: {what} left out"]
+
+
+def _with_times(path: Path, columns: dict[str, Array], lines: Array, notes: list[str]) -> Table:
+    """Columns over the one that has the times, without the lines that have no time."""
+    name, factor = _time(path, columns)
     # Infinite is no number either; two of them would make a warning of a sum.
-    others = {n: np.where(np.isfinite(c), c, np.nan)[good] for n, c in others.items()}
-    units = {n: _named(n)[1] for n in others}
-    return Table(path, (time - time[0]) * factor, others, units, notes)
+    others = {
+        n: np.where(np.isfinite(c), c, np.nan) for n, c in columns.items() if not _TIME.search(n)
+    }
+    if not others:
+        text = f"expected a column of values, got times only: {', '.join(columns)}"
+        raise IdentificationError(f"{path}: {text}")
+    good = np.abs(columns[name]) * factor <= _LATEST_S  # which NaN is not
+    if not good.all():
+        place, wrong = f"{path}:{lines[~good][0]:.0f}", np.count_nonzero(~good)
+        if len(lines) - wrong < 2:
+            text = f"expected a time in each line of column {name}"
+            raise IdentificationError(f"{place}: {text}, got none in {wrong} of {len(lines)}")
+        notes = [*notes, f"{place}: {wrong} lines are without a time and left out"]
+    time = columns[name][good]
+    return Table(path, (time - time[0]) * factor, {n: c[good] for n, c in others.items()}, notes)
 
 
 def _named(header: str) -> tuple[str, str]:
-    """Name and unit of "Gyroscope x (rad/s)"."""
+    """Name and unit of "Gyroscope x (rad/s)"; a header without a unit has ""."""
     match = _HEADER.match(header)
     return (match[1], match[2]) if match else (header, "")
 
@@ -240,12 +211,12 @@ def _time(path: Path, columns: dict[str, Array]) -> tuple[str, float]:
     # One that counts seconds from the start rather than one that counts from 1970.
     named.sort(key=lambda n: (_unit_of_time(n) is None, not re.search("elapsed", n, re.IGNORECASE)))
     for name in named:
-        values = columns[name]
-        if not np.isfinite(values).any():
+        values = columns[name][np.isfinite(columns[name])]
+        if not len(values):
             continue
         if (factor := _unit_of_time(name)) is not None:
             return name, factor
-        steps = np.diff(values[np.isfinite(values)])
+        steps = np.diff(values)
         step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
         for factor in (1.0, 1e-3, 1e-6, 1e-9):
             if _SAMPLING_S[0] <= step * factor <= _SAMPLING_S[1]:
@@ -254,10 +225,8 @@ def _time(path: Path, columns: dict[str, Array]) -> tuple[str, float]:
             f'{path}: column {name}: expected a unit in the header, such as "Time (s)", got none,'
             f" and steps of {step:g} are no sampling in s, ms, µs or ns"
         )
-    raise IdentificationError(
-        f'{path}: expected a column that is called time, such as "Time (s)", got'
-        f" {', '.join(columns)}"
-    )
+    text = f'expected a column that is called time, such as "Time (s)", got {", ".join(columns)}'
+    raise IdentificationError(f"{path}: {text}")
 
 
 def _unit_of_time(name: str) -> float | None:

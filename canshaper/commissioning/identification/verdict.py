@@ -7,21 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from canshaper.commissioning.identification.data_quality import clipped, mixed
-from canshaper.commissioning.identification.decay import (
-    DecayFit,
-    SegmentFit,
-    Value,
-    fit_decay,
-)
-from canshaper.commissioning.identification.decay_problem import LARGEST_RAD
+from canshaper.commissioning.identification.decay import LARGEST_RAD, DecayFit, fit_decay
 from canshaper.commissioning.identification.driven import DrivenFit, fit_driven
 from canshaper.commissioning.identification.driven_data import driven_s
-from canshaper.commissioning.identification.segments import (
-    SETTLING_S,
-    FreeSwings,
-    find_free,
-)
-from canshaper.commissioning.identification.series import Kind, Series
+from canshaper.commissioning.identification.segments import SETTLING_S, find_free
+from canshaper.commissioning.identification.series import Series, Value
 from canshaper.commissioning.identification.swing import SAMPLES
 
 # Fewer full swings show no damping.
@@ -45,33 +35,19 @@ SWING_FREELY = (
 
 @dataclass
 class Finding:
-    """One axis in one state of the grapple.
-
-    Attributes:
-        axis: its name.
-        label: state of the grapple, may be "".
-        at: value of the grapple's signal, where it is known.
-        series: the signals.
-        free: free swings, where there are any.
-        driven: driven swing, where commands are known.
-        period_s: period of small damped swings; None where nothing was found.
-        damping_ratio: damping ratio.
-        full_speed_m_s: speed of the tip at full command; None where that was not seen.
-        poor: why it cannot be used, each with what to do; empty where it can.
-        notes: what else a person should know.
-    """
+    """One axis in one state of the grapple, or timed by hand without any signal."""
 
     axis: str
-    label: str
-    at: float | None
+    label: str  # state of the grapple, may be ""
+    at: float | None  # value of the grapple's signal, where it is known
     series: list[Series]
-    free: DecayFit | None = None
-    driven: DrivenFit | None = None
-    period_s: Value | None = None
+    free: DecayFit | None = None  # free swings, where there are any
+    driven: DrivenFit | None = None  # driven swing, where commands are known
+    period_s: Value | None = None  # of small damped swings; None where nothing was found
     damping_ratio: Value | None = None
-    full_speed_m_s: Value | None = None
-    poor: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    full_speed_m_s: Value | None = None  # of the tip; None where that was not seen
+    poor: list[str] = field(default_factory=list)  # why it cannot be used, with what to do
+    notes: list[str] = field(default_factory=list)  # what else a person should know
 
     @property
     def usable(self) -> bool:
@@ -84,60 +60,52 @@ def identify(
 ) -> Finding:
     """Period, damping and full speed of an axis from its signals in one state of the grapple.
 
-    Args:
-        axis: its name.
-        label: the state.
-        series: at least one signal.
-        about_s: the period as far as it is known, s.
+    ``about_s``: the period as far as it is known, s.
     """
     values = [s.at for s in series if s.at is not None]
-    at = float(np.median(values)) if values else None
-    finding = Finding(axis, label, at, list(series))
+    finding = Finding(axis, label, float(np.median(values)) if values else None, list(series))
+    finding.notes += dict.fromkeys(note for one in series for note in one.notes)
+    good, useless = [], []
     for one in series:
-        finding.notes += [n for n in one.notes if n not in finding.notes]
-    good = [one for one in series if not _useless(finding, one)]
+        if text := _useless(one):
+            useless.append(f"{one.source}: {text}")
+        else:
+            good.append(one)
     _free(finding, good, about_s)
     _driven(finding, good, about_s)
     if finding.period_s is None:
-        finding.poor = finding.poor or [_no_swing(good)]
-        return finding
-    finding.notes += finding.poor
-    _verdict(finding)
+        finding.poor = useless or [_no_swing(good)]
+    else:
+        finding.notes += useless
+        finding.poor = _faults(finding)
+        if finding.free:
+            finding.notes += _doubts(finding.free, usable=finding.usable)
     return finding
 
 
-def _useless(finding: Finding, series: Series) -> bool:
-    """Whether a signal is none at all; notes why."""
+def _useless(series: Series) -> str | None:
+    """Why a signal is none at all; None where it may be one."""
     if len(series.time_s) < 3 * SAMPLES:
-        text = f"only {len(series.time_s)} values; log for at least ten swings"
-    elif float(np.ptp(series.value)) == 0.0:
-        text = f"it stands at {series.value[0]:g}; is it the right signal, and the sensor on?"
-    elif (step := float(np.median(np.diff(series.time_s)))) > 0.25:
-        text = (
+        return f"only {len(series.time_s)} values; log for at least ten swings"
+    if float(np.ptp(series.value)) == 0.0:
+        return f"it stands at {series.value[0]:g}; is it the right signal, and the sensor on?"
+    if (step := float(np.median(np.diff(series.time_s)))) > 0.25:
+        return (
             f"expected {SAMPLES} values or more a swing, got one every {step:.2g} s: log it at"
             " 10 Hz or faster"
         )
-    else:
-        return False
-    finding.poor.append(f"{series.source}: {text}")
-    return True
+    return None
 
 
 def _no_swing(series: Sequence[Series]) -> str:
-    """Return what to do where no swing was found."""
-    if not series:
-        return "no signal that could be used"
-    flat = clipped(series[0], None)
-    if flat:
+    """Return what to do where no swing was found in signals that may be ones."""
+    if flat := clipped(series[0], None):
         return flat
     names = ", ".join(s.source for s in series)
-    if any(s.idle is not None and not _long_enough(s) for s in series):
-        return f"{names}: never left to swing freely for two swings: {SWING_FREELY}"
+    for idle in (s.idle for s in series if s.idle is not None):
+        if not any(b - a > SETTLING_S + 4.0 for a, b in idle):
+            return f"{names}: never left to swing freely for two swings: {SWING_FREELY}"
     return f"{names}: no decaying swing found: {SWING_FREELY}. Is it the right signal?"
-
-
-def _long_enough(series: Series) -> bool:
-    return any(b - a > SETTLING_S + 4.0 for a, b in series.idle or [])
 
 
 def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
@@ -148,10 +116,9 @@ def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> 
     best = max((f for _, f in swinging), key=lambda f: f.worth)
     segments = []
     for one, swings in swinging:
-        fitting: FreeSwings | None = swings
-        if abs(swings.period_s / best.period_s - 1.0) > 0.1:
-            fitting = find_free(one, best.period_s)
-        segments += fitting.segments if fitting else []
+        alike = abs(swings.period_s / best.period_s - 1.0) <= 0.1
+        if fitting := swings if alike else find_free(one, best.period_s):
+            segments += fitting.segments
     fit = fit_decay(segments, best.period_s, best.damping_ratio)
     finding.free, finding.period_s, finding.damping_ratio = fit, fit.period_s, fit.damping_ratio
 
@@ -162,8 +129,7 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
         return
     trusted = finding.free if finding.free and not _faults(finding) else None
     starts = (about_s,) if about_s else STARTS_S
-    periods = (trusted.period_s.value,) if trusted else starts
-    fit = fit_driven(series, periods, trusted)
+    fit = fit_driven(series, (trusted.period_s.value,) if trusted else starts, trusted)
     if fit is None:
         return
     finding.driven = fit
@@ -183,24 +149,24 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
         finding.full_speed_m_s = fit.full_speed_m_s
 
 
-def _verdict(finding: Finding) -> None:
-    finding.poor = _faults(finding)
-    fit = finding.free
-    if fit is None:
-        return
-    if fit.friction and not finding.poor:
+def _doubts(fit: DecayFit, *, usable: bool) -> list[str]:
+    """Notes on how far one damping and one period hold."""
+    notes = []
+    if fit.friction and usable:
         (large, at_large), (small, at_small) = fit.friction
-        unit, factor = _shown(fit.segments[0])
+        factor, unit = fit.segments[0].segment.kind.shown
+        unit = unit or "units"
         why = "dry friction" if at_small > at_large else "damping that grows with the swing"
-        finding.notes.append(
+        notes.append(
             f"the damping ratio changes from {at_large:.3f} at {large * factor:.2g} {unit} to"
             f" {at_small:.3f} at {small * factor:.2g} {unit}: {why}; the value given lies between"
         )
-    largest = max(_angle(s) for s in fit.segments)
+    largest = max(s.angle_rad for s in fit.segments)
     if LARGE_RAD < largest < LARGEST_RAD:
-        finding.notes.append(
+        notes.append(
             f"swings of {math.degrees(largest):.0f} degrees are beyond the model: use smaller ones"
         )
+    return notes
 
 
 def _faults(finding: Finding) -> list[str]:
@@ -214,24 +180,23 @@ def _faults(finding: Finding) -> list[str]:
                 f"expected {LEAST_SWINGS:g} swings or more, better ten, got {fit.swings:.1f}:"
                 f" {SWING_FREELY}"
             )
-        largest = max(_angle(s) for s in fit.segments)
+        largest = max(s.angle_rad for s in fit.segments)
         if largest >= LARGEST_RAD:
             faults.append(
                 f"a swing of {math.degrees(largest):.3g} degrees: is the unit of the signal right?"
             )
         if text := mixed(fit):
             faults.append(text)
-        flat = [c for s in finding.series if (c := clipped(s, fit))]
-        faults += flat[:1]
+        faults += [text for s in finding.series if (text := clipped(s, fit))][:1]
     if period.relative > WIDEST_PERIOD:
         faults.append(
             f"expected the period to {100 * WIDEST_PERIOD:g} %, got it to"
-            f" {100 * period.relative:.1f} %: {_noise_text(fit)}"
+            f" {100 * period.relative:.1f} %: {_remedy(fit)}"
         )
     elif ratio.half > max(WIDEST_RATIO * ratio.value, WIDEST_RATIO_ABS):
         faults.append(
             f"expected the damping ratio to {100 * WIDEST_RATIO:g} %, got {ratio.value:.3f}"
-            f" to {ratio.half:.3f}: {_noise_text(fit)}"
+            f" to {ratio.half:.3f}: {_remedy(fit)}"
         )
     elif ratio.value <= ratio.half:
         faults.append(
@@ -241,29 +206,14 @@ def _faults(finding: Finding) -> list[str]:
     return faults
 
 
-def _noise_text(fit: DecayFit | None) -> str:
-    """Return what stands in the way of a better result."""
+def _remedy(fit: DecayFit | None) -> str:
+    """Return what makes intervals narrower."""
     if fit is None:
         return SWING_FREELY
     best = max(fit.segments, key=lambda s: float(s.envelope[0]))
-    unit, factor = _shown(best)
+    factor, unit = best.segment.kind.shown
     first, noise = float(best.envelope[0]) * factor, best.noise * factor
     if noise > 0.2 * first:
+        unit = unit or "units"
         return f"swings of {first:.2g} {unit} in a noise of {noise:.2g}; {SWING_FREELY}"
     return f"log more swings, best several times; {SWING_FREELY}"
-
-
-def _shown(fit: SegmentFit) -> tuple[str, float]:
-    """Unit for people and factor to it."""
-    kind = fit.segment.kind
-    if kind is Kind.OTHER:
-        return "units", 1.0
-    return ("degrees" if kind is Kind.ANGLE else "degrees/s"), math.degrees(1.0)
-
-
-def _angle(fit: SegmentFit) -> float:
-    """Amplitude at the start of a segment in rad, 0 where it is not known."""
-    first = float(fit.envelope[0])
-    if fit.segment.kind is Kind.OTHER:
-        return 0.0
-    return first * (1.0 if fit.segment.kind is Kind.ANGLE else fit.period_s.value / 2.0 / math.pi)

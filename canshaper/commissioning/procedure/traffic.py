@@ -3,7 +3,6 @@
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from cantools.database.can import Message
 
@@ -12,7 +11,7 @@ from canshaper.codec.layout import Layout
 from canshaper.commissioning import suggest
 from canshaper.commissioning.doctor.listen import inputs_of
 from canshaper.commissioning.frame_finder import InputFinder
-from canshaper.commissioning.identification.commands import Samples, joystick_commands
+from canshaper.commissioning.identification.commands import Samples, joystick_commands, valve_part
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
 from canshaper.machine.valves import BoundAxis
@@ -93,10 +92,8 @@ class _Reader:
             if isinstance(bound, BoundJoystick):
                 self._joystick(bound, time_s, frame.data)
         for axis in self._valves.get(key, ()):
-            if len(frame.data) == axis.valve_message.length:
-                raw: dict[str, Any] = Layout(axis.valve_message).decode(frame.data)
-                if (steps := axis.valve.read(raw)) is not None:
-                    traffic.axes[axis.name].valve.add(time_s, steps / axis.valve.steps)
+            if (part := valve_part(axis, Layout(axis.valve_message), frame.data)) is not None:
+                traffic.axes[axis.name].valve.add(time_s, part)
         self._history.receive(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
         traffic.missed_deadlines = self._history.counters.get("MissedDeadlines")
         for name, status in self._history.axes.items():

@@ -16,11 +16,13 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from canshaper.commissioning.identification.canlog import read_can
-from canshaper.commissioning.identification.decay_problem import density
 from canshaper.commissioning.identification.driven_data import (
     SHORTEST_LAG_S,
     Driven,
+    covariance_of,
     free_columns,
+    gain_of,
+    squares_of,
     swing_filter,
 )
 from canshaper.commissioning.identification.series import Array, Series
@@ -126,15 +128,14 @@ class _Problem:
 
     def _residual(self, x: Array) -> Array:
         projected = self._projected(x)
-        gain = _gain(projected)
+        gain = gain_of(projected)
         return np.concatenate([y - gain * h for h, y in projected])
 
     def result(self, x: Array) -> SensorFit:
         """Return the fit at a solution."""
         projected = self._projected(x)
-        gain = _gain(projected)
-        total = sum(float(y @ y) for _, y in projected)
-        left = sum(float(np.sum((y - gain * h) ** 2)) for h, y in projected)
+        gain = gain_of(projected)
+        total, left = squares_of(projected)
         fitted, offsets = [], []
         for one, (driven, free) in zip(self._data, self._parts(x), strict=True):
             rest, *_ = np.linalg.lstsq(free, one.value - gain * driven, rcond=None)
@@ -166,27 +167,14 @@ class _Problem:
             columns.append((up - down) / (2.0 * step[j]))
         columns.append(-np.concatenate([h for h, _ in projected]) * gain)
         slope = np.stack(columns, axis=1)
-        residual = self._residual(x)
-        meat, first = np.zeros((slope.shape[1],) * 2), 0
-        for one in self._data:
-            part = slice(first, first + len(one.time_s))
-            noise, _ = density(one.time_s, residual[part], float(x[1]))
-            meat += noise * slope[part].T @ slope[part]
-            first = part.stop
-        inverse = np.linalg.pinv(slope.T @ slope)
-        variances = np.diag(inverse @ meat @ inverse)
+        covariance = covariance_of(slope, self._residual(x), self._data, float(x[1]))
+        variances = np.diag(covariance)
         delay, omega, sigma, size = (math.sqrt(max(0.0, float(v))) for v in variances)
         return delay, omega, sigma, size
 
     def _at(self, x: Array, gain: float) -> Array:
         """Residual with a gain that stays."""
         return np.concatenate([y - gain * h for h, y in self._projected(x)])
-
-
-def _gain(projected: Sequence[tuple[Array, Array]]) -> float:
-    """Return the gain of least squares."""
-    square = sum(float(h @ h) for h, _ in projected)
-    return sum(float(h @ y) for h, y in projected) / max(square, 1e-30)
 
 
 def _held(one: Driven) -> tuple[Array, Array]:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.table import Table
 
-from canshaper.commissioning.identification.commands import is_simulated
-from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.identification.canlog import is_simulated
+from canshaper.commissioning.identification.series import Value
 from canshaper.commissioning.sensor.finding import Finding, changes
 from canshaper.config.origin import note, written_by
 from canshaper.edit.edit import Change, FileValue, change

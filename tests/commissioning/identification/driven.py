@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
+from canshaper.commissioning.identification.series import Command, Kind, Series, Unit, runs
 from tests.commissioning.identification.machine import Coloured, Push, driven
 
 
@@ -19,11 +19,5 @@ def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
     speed = np.sign(commands) * np.maximum(0.0, (np.abs(commands) - 0.05) / 0.95)
     unit = Unit(kind, 1.0, "rad/s" if rate else "rad")
     value = swing + np.array([noise() for _ in time])
-    return Series("log", "", unit, time, value, Command(time - 0.02, speed), _idle(time, commands))
-
-
-def _idle(time: Array, commands: Array) -> list[tuple[float, float]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[1], (commands != 0.0).astype(int), [1]])))
-    return [
-        (float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)
-    ]
+    idle = [(float(time[a]), float(time[b - 1])) for a, b in runs(commands == 0.0)]
+    return Series("log", "", unit, time, value, Command(time - 0.02, speed), idle)

@@ -48,6 +48,16 @@ def truth(grapple: Grapple, direction: int) -> tuple[float, float]:
     return period_of(mode), mode.zeta
 
 
+def check(
+    finding: Finding, expected: tuple[float, float], *, period: float, ratio: float = math.inf
+) -> None:
+    """Good enough to use, and the period and the damping ratio within such parts of the truth."""
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio
+    assert finding.period_s.value == pytest.approx(expected[0], rel=period)
+    assert finding.damping_ratio.value == pytest.approx(expected[1], rel=ratio)
+
+
 @pytest.mark.parametrize(
     "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))]
 )
@@ -56,11 +66,7 @@ def truth(grapple: Grapple, direction: int) -> tuple[float, float]:
 def test_two_degrees_in_noise(grapple: Grapple, direction: int, seed: int) -> None:
     time, angle = swung(grapple, 2.0, direction)
     finding = identify("slew", "", [noisy(time, angle, seed, 0.15)])
-    assert finding.usable, finding.poor
-    assert finding.period_s and finding.damping_ratio
-    period, ratio = truth(grapple, direction)
-    assert finding.period_s.value == pytest.approx(period, rel=0.01)
-    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.2)
+    check(finding, truth(grapple, direction), period=0.01, ratio=0.2)
 
 
 @pytest.mark.slow
@@ -84,17 +90,13 @@ def test_the_interval_holds_the_truth() -> None:
 
 def test_a_large_swing_is_slower_and_reported_as_a_small_one() -> None:
     time, angle = swung(EMPTY, 40.0, SLEW)
-    finding = identify("slew", "", [noisy(time, angle, 1, 0.2)])
-    assert finding.usable, finding.poor
-    assert finding.period_s and finding.damping_ratio
-    period, ratio = truth(EMPTY, SLEW)
-    assert finding.period_s.value == pytest.approx(period, rel=0.003)
-    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.05)
+    expected = truth(EMPTY, SLEW)
+    check(identify("slew", "", [noisy(time, angle, 1, 0.2)]), expected, period=0.003, ratio=0.05)
     # In a unit that tells no angle there is nothing to correct by, and it comes out too long.
     bars = noisy(time, angle, 1, 0.2)
     plain = identify("slew", "", [Series("p", "", Unit(Kind.OTHER, 1.0, "bar"), time, bars.value)])
     assert plain.period_s
-    assert plain.period_s.value > 1.004 * period
+    assert plain.period_s.value > 1.004 * expected[0]
 
 
 def test_the_interval_holds_what_the_model_leaves_out() -> None:
@@ -120,13 +122,9 @@ def test_a_crane_in_mujoco(direction: int) -> None:
     swings, _ = simulate(model, step_s, still, start)
     time = np.arange(len(swings)) * step_s
     finding = identify("slew", "", [noisy(time, swings[:, direction], 3, 0.2)])
-    assert finding.usable, finding.poor
-    assert finding.period_s and finding.damping_ratio
     g = crane.grapple
     grapple = Grapple(g.l1_m, g.l2_m, g.m1_kg, g.m2_kg, g.c5_n_m_s_rad, g.c6_n_m_s_rad)
-    period, ratio = truth(grapple, direction)
-    assert finding.period_s.value == pytest.approx(period, rel=0.005)
-    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.1)
+    check(finding, truth(grapple, direction), period=0.005, ratio=0.1)
 
 
 STROKES = [Push("near_far", 2, 0.7, 0.4), Push("near_far", 22, 0.7, -0.3)]
@@ -136,7 +134,7 @@ BUSY = [Push("near_far", 2.0 * k, 1.0, 0.3 * (-1) ** k) for k in range(20)]
 @pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
 def test_full_speed_by_single_strokes(kind: Kind) -> None:
     finding = identify("near_far", "", [drive(STROKES, 45.0, kind, 1)])
-    check(finding)
+    check_driven(finding)
     assert finding.free and finding.free.swings > 10
     assert finding.free.segments[0].segment.start_s > 2.7 + 0.5  # not while it was driven
 
@@ -145,17 +143,14 @@ def test_full_speed_by_single_strokes(kind: Kind) -> None:
 @pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
 def test_never_free_but_driven(kind: Kind) -> None:
     finding = identify("near_far", "", [drive(BUSY, 41.0, kind, 2)])
-    check(finding)
+    check_driven(finding)
     assert finding.free is None
     assert any("from driven motion" in note for note in finding.notes)
 
 
-def check(finding: Finding) -> None:
-    assert finding.usable, finding.poor
-    assert finding.period_s and finding.damping_ratio and finding.full_speed_m_s
-    period, ratio = truth(EMPTY, NEAR_FAR)
-    assert finding.period_s.value == pytest.approx(period, rel=0.01)
-    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.2)
+def check_driven(finding: Finding) -> None:
+    check(finding, truth(EMPTY, NEAR_FAR), period=0.01, ratio=0.2)
+    assert finding.full_speed_m_s
     assert finding.full_speed_m_s.value == pytest.approx(1.0, rel=0.12)
 
 
@@ -165,14 +160,12 @@ def test_driving_in_the_log_is_not_taken_for_a_free_swing() -> None:
     time = np.array([s.time_s for s, _ in reported])
     angle = np.array([s.theta6_rad for s, _ in reported])
     finding = identify("near_far", "", [noisy(time, angle, 4, 0.05)])
-    assert finding.usable, finding.poor
+    check(finding, truth(EMPTY, NEAR_FAR), period=0.005)
     assert finding.free
     assert len(finding.free.segments) == 2
     for part, stroke in zip(finding.free.segments, STROKES, strict=True):
         ended = stroke.start_s + stroke.duration_s
         assert ended < part.segment.start_s < ended + 2.0
-    assert finding.period_s
-    assert finding.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.005)
 
 
 def test_a_slow_sensor_with_jitter_and_lost_values() -> None:
@@ -182,19 +175,15 @@ def test_a_slow_sensor_with_jitter_and_lost_values() -> None:
     shaken = time[keep] + random.uniform(0.0, 0.01, int(keep.sum()))
     value = np.interp(shaken, time, angle)
     finding = identify("slew", "", [noisy(shaken, value, 6, 0.1)])
-    assert finding.usable, finding.poor
-    assert finding.period_s
-    assert finding.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.003)
+    check(finding, truth(EMPTY, SLEW), period=0.003)
 
 
 def test_a_hole_in_the_log_parts_a_swing() -> None:
     time, angle = swung(EMPTY, 10.0, SLEW)
     keep = (time < 8.0) | (time > 14.0)
     finding = identify("slew", "", [noisy(time[keep], angle[keep], 7, 0.05)])
-    assert finding.usable, finding.poor
+    check(finding, truth(EMPTY, SLEW), period=0.005)
     assert finding.free and len(finding.free.segments) == 2
-    assert finding.period_s
-    assert finding.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.005)
 
 
 @pytest.mark.slow

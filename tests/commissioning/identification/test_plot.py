@@ -7,7 +7,7 @@ import numpy as np
 
 from canshaper.commissioning.identification.data import timed_by_hand
 from canshaper.commissioning.identification.plot import figure
-from canshaper.commissioning.identification.recommend import advise, headlines
+from canshaper.commissioning.identification.recommend import advice_on, headlines
 from canshaper.commissioning.identification.series import Kind, Series, Unit
 from canshaper.commissioning.identification.verdict import Finding, identify
 
@@ -21,8 +21,7 @@ def test_a_picture_says_only_what_its_headings_do_not() -> None:
     good, poor = by_hand("slew"), replace(by_hand("lift"), poor=["Too short."])
     states = [by_hand("near_far"), replace(by_hand("near_far"), label="loaded")]
     findings = [good, poor, *states]
-    advice = [advise("slew", [good], 1.0), advise("lift", [poor], 1.0)]
-    advice.append(advise("near_far", states, 1.0))
+    advice = advice_on(findings, None)
     assert headlines(findings, advice) == [advice[1].text, advice[2].text]
     assert "Too short." in advice[1].text
 

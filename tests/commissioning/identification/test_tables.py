@@ -1,6 +1,7 @@
 """Tables of phones and loggers, right and wrong ones."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -85,26 +86,45 @@ def test_a_round_swing_is_reported(tmp_path: Path) -> None:
     assert any("swing it in one direction only" in note for note in series.notes)
 
 
-def test_a_table_that_is_cut_off(tmp_path: Path) -> None:
-    file = phone(tmp_path / "a.csv", SWUNG)
-    text = file.read_text()
-    file.write_text(text[: len(text) - 25])
-    table = read_table(file)
-    assert len(table.time_s) == len(SWUNG) - 1
-    assert table.notes == [f"{file}:1501: the last line is cut off and left out"]
+Edits = dict[int, Callable[[str], str]]
 
 
-def test_some_wrong_lines_are_left_out_and_reported(tmp_path: Path) -> None:
+def edited(tmp_path: Path, edits: Edits) -> Path:
+    """The table of a phone, with some lines changed."""
     file = phone(tmp_path / "a.csv", SWUNG)
     lines = file.read_text().splitlines()
-    lines[100] = "battery low"
-    lines[300] = "1.0,,,"
-    lines[400] = '"' + lines[400]
+    for number, edit in edits.items():
+        lines[number] = edit(lines[number])
     file.write_text("\n".join(lines))
-    table = read_table(file)
-    assert table.notes == [f"{file}:101: 2 lines are wrong and left out"]
-    assert len(table.time_s) == len(SWUNG) - 2
-    assert identify("slew", "", [series_of(table, "", None)]).usable
+    return file
+
+
+ROWS = range(1, 1501)
+EDITS: dict[str, tuple[Edits, int, str]] = {
+    "cut off": ({-1: lambda row: row[:-25]}, 1499, ":1501: the last line is cut off and left out"),
+    "no numbers": (
+        {100: lambda _: "battery low", 300: lambda _: "1.0,,,", 400: lambda row: '"' + row},
+        1497,
+        ":101: 2 lines are wrong and left out",
+    ),
+    "beyond any sensor": (
+        {100: lambda row: row.rpartition(",")[0] + ",1e308"},
+        1499,
+        ":101: 1 lines are wrong and left out",
+    ),
+    "infinite": ({100: lambda row: row.partition(",")[0] + ",inf,-inf,inf"}, 1499, ""),
+    "empty column": (dict.fromkeys(ROWS, lambda row: row.rpartition(",")[0] + ","), 1500, ""),
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_what_is_no_number_is_left_out_and_reported(tmp_path: Path, name: str) -> None:
+    edits, left, note = EDITS[name]
+    file = edited(tmp_path, edits)
+    series = series_of(read_table(file), "", None)
+    assert series.notes == ([f"{file}{note}"] if note else [])
+    assert len(series.time_s) == left
+    assert identify("slew", "", [series]).usable
 
 
 @pytest.mark.parametrize("number", ["", "nan", "inf", "1e12"])
@@ -112,53 +132,22 @@ def test_some_wrong_lines_are_left_out_and_reported(tmp_path: Path) -> None:
 def test_a_line_without_a_time_is_left_out_and_reported(
     tmp_path: Path, at: int, number: str
 ) -> None:
-    file = phone(tmp_path / "a.csv", SWUNG)
-    lines = file.read_text().splitlines()
-    lines[at - 1] = number + "," + lines[at - 1].partition(",")[2]
-    file.write_text("\n".join([*lines, ""]))
+    file = edited(tmp_path, {at - 1: lambda row: number + "," + row.partition(",")[2]})
     table = read_table(file)
     assert table.notes == [f"{file}:{at}: 1 lines are without a time and left out"]
     assert table.time_s[0] == 0.0
-    finding = identify("slew", "", [series_of(table, "", None)])
-    assert finding.usable, finding.poor
-
-
-def test_a_value_that_none_can_be_makes_a_line_wrong(tmp_path: Path) -> None:
-    file = phone(tmp_path / "a.csv", SWUNG)
-    lines = file.read_text().splitlines()
-    lines[100] = lines[100].rpartition(",")[0] + ",1e308"
-    file.write_text("\n".join([*lines, ""]))
-    table = read_table(file)
-    assert table.notes == [f"{file}:101: 1 lines are wrong and left out"]
     assert identify("slew", "", [series_of(table, "", None)]).usable
 
 
-def test_an_infinite_value_is_as_good_as_none(tmp_path: Path) -> None:
-    file = phone(tmp_path / "a.csv", SWUNG)
-    lines = file.read_text().splitlines()
-    lines[100] = lines[100].partition(",")[0] + ",inf,-inf,inf"
-    file.write_text("\n".join([*lines, ""]))
-    series = series_of(read_table(file), "", None)
-    assert len(series.time_s) == len(SWUNG) - 1
-    assert identify("slew", "", [series]).usable
-
-
-def test_a_gyroscope_with_an_empty_column(tmp_path: Path) -> None:
-    file = phone(tmp_path / "a.csv", SWUNG)
-    header, *rows = file.read_text().splitlines()
-    file.write_text("\n".join([header, *(row.rpartition(",")[0] + "," for row in rows), ""]))
-    assert identify("slew", "", [series_of(read_table(file), "", None)]).usable
-    file.write_text("\n".join([header, *(row.partition(",")[0] + ",,," for row in rows), ""]))
-    with pytest.raises(
-        IdentificationError, match=r"a\.csv: expected a number in each line of Gyroscope x"
-    ):
+def test_a_gyroscope_without_a_number(tmp_path: Path) -> None:
+    file = edited(tmp_path, dict.fromkeys(ROWS, lambda row: row.partition(",")[0] + ",,,"))
+    text = r"a\.csv: expected a number in each line of Gyroscope x"
+    with pytest.raises(IdentificationError, match=text):
         series_of(read_table(file), "", None)
 
 
 def test_a_clock_that_goes_back(tmp_path: Path) -> None:
-    file = phone(tmp_path / "a.csv", SWUNG)
-    lines = file.read_text().splitlines()
-    file.write_text("\n".join([*lines, *lines[1:200]]))
+    file = edited(tmp_path, {1500: lambda row: f"{row}\n0.0,0,0,0"})
     with pytest.raises(IdentificationError, match=r"a\.csv: .*the time goes back by 30 s"):
         series_of(read_table(file), "", None)
 
@@ -215,7 +204,12 @@ def test_a_column_that_is_not_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "header", ["Time (s),Acceleration x (m/s^2)", "time,accel_x", "Time (s),ax (g)"]
+    "header",
+    [
+        "Time (s),Acceleration x (m/s^2)",
+        "time,accel_x",
+        *(f"Time (s),ax ({unit})" for unit in ("g", "mg", "m/s²", "m/s/s")),
+    ],
 )
 def test_an_acceleration_is_refused(tmp_path: Path, header: str) -> None:
     file = tmp_path / "a.csv"
