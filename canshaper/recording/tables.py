@@ -31,6 +31,11 @@ Reader = Callable[[bytes, Place], TimedFrame | None]
 _new = tuple.__new__  # TimedFrame(...) in half the time
 
 
+def is_log(header: str) -> bool:
+    """Whether this first line of a table is that of a log of frames, or nearly one."""
+    return "arbitration_id" in header or header.startswith(GVRET_HEADERS)
+
+
 def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     """A table by its header."""
     rows = lines(file, place)

@@ -17,6 +17,7 @@ import numpy as np
 
 from canshaper.commissioning.identification.series import Array, Unit, unit_of
 from canshaper.errors import IdentificationError
+from canshaper.recording.tables import is_log
 
 _HEADER = re.compile(r"^(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
 _TIME = re.compile(r"time|zeit|seconds|timestamp|^t$|uptime", re.IGNORECASE)
@@ -91,7 +92,7 @@ def is_table(path: Path) -> bool:
     if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return "arbitration_id" not in file.readline(10_000)
+        return not is_log(file.readline(10_000))
 
 
 def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -> Table:

@@ -12,6 +12,7 @@ from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.identification.table import is_table, read_table
 from canshaper.commissioning.identification.verdict import identify
 from canshaper.errors import IdentificationError
+from canshaper.recording.tables import CSV_HEADER, GVRET_HEADERS
 from canshaper_sim.grapple import Grapple, Sway
 from tests.commissioning.identification.machine import driven, period_of, phone
 
@@ -239,3 +240,12 @@ def test_progress(tmp_path: Path) -> None:
     read_table(file, reported.append)
     assert reported == sorted(reported)
     assert 0.0 < reported[0] < reported[-1] <= 1.0
+
+
+@pytest.mark.parametrize("header", [CSV_HEADER, *(f"{one},D2" for one in GVRET_HEADERS)])
+def test_a_log_of_frames_is_no_table(tmp_path: Path, header: str) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(f"{header}\n")
+    assert not is_table(file)
+    file.write_text("Time (s),x\n")
+    assert is_table(file)
