@@ -13,14 +13,14 @@ _ON = re.compile(
     r"|occupied|engaged|operated|actuated|requested|touched|ja|ein|an|aktiv|freigegeben"
     r"|gedrückt|betätigt)\b"
 )
-_NOT_FREE = re.compile(r"\b(not|no|nicht) (ok|okay|ready|normal|safe|free|healthy)\b")
+_NOT_FREE = re.compile(r"\b(not|no|nicht) (ok|okay|ready|normal|safe|free|closed|healthy)\b")
 _FREE = re.compile(
-    r"\b(not|no|free|closed|released|ok|okay|normal|ready|safe|healthy|inactive|deactivated|off|unpressed"
-    r"|run|running|nicht|frei|entriegelt)\b"
+    r"\b(not|no|free|closed|released|ok|okay|normal|ready|safe|healthy|inactive|deactivated|off"
+    r"|unpressed|run|running|nicht|frei|entriegelt)\b"
 )
 _STOP = re.compile(
-    r"\b(e?stop|stopped|opened|open|emergency|pressed|active|activated|actuated|operated|engaged|trigger(ed)?"
-    r"|trip(ped)?|halt|on|locked|latched|gedrückt|betätigt|aktiv|notaus|nothalt)\b"
+    r"\b(e?stop|stopped|opened|open|emergency|pressed|active|activated|actuated|operated|engaged"
+    r"|trigger(ed)?|trip(ped)?|halt|on|locked|latched|gedrückt|betätigt|aktiv|notaus|nothalt)\b"
 )
 _REST = re.compile(
     r"\b(block(ed)?|neutral|stop|hold|off|rest|idle|cent(er|re)|zero|none|(do ?n.?t|no) ?care"
@@ -85,20 +85,22 @@ def turned(positive: str, negative: str) -> bool:
     return bool(contrary) and not (_FORTH.search(one) or _BACK.search(other))
 
 
-def contrary(names: Mapping[int, str], signal: str, *, stop: bool = False) -> str | None:
-    """Where a switch is, by its names, when it does what it may not mean; None where they agree.
+def contrary(
+    names: Mapping[int, str], signal: str, *, stop: bool = False, known: bool = False
+) -> str | None:
+    """Where a switch is, by its names, when it does what it should not; None where they agree.
 
     Args:
         names: of its raw values 0 and 1, where the DBC has some.
         signal: its own name, which counts where the names of its values say neither.
         stop: of an emergency stop, whose 0 is free; of every other switch 1 is on.
+        known: whether a name that says neither, which may be that of a fault, does not agree.
     """
     sense = free if stop else on
     acts, rests = (names.get(raw, "") for raw in ((0, 1) if stop else (1, 0)))
-    if acts and sense(acts) is not True:  # the contrary, or a word that no one knows: a fault?
-        return f'"{acts}"'
-    if sense(rests) is True and not acts:
-        return f'not "{rests}"'
+    guessed = sense(acts) is None and (sense(rests) is True or (known and bool(acts)))
+    if sense(acts) is False or guessed:
+        return f'"{acts}"' if acts else f'not "{rests}"'
     if sense(acts) is None and sense(rests) is None and of_signal(signal, stop=stop) is stop:
         return f"not {signal}" if stop else signal
     return None

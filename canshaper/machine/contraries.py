@@ -8,7 +8,7 @@ from cantools.database.can import Signal
 from canshaper.codec.sense import contrary, shows_sway_control
 from canshaper.codec.signals import names_broken
 
-_OTHER = "name another signal, or correct VAL_ where the DBC is wrong"
+_OTHER = "name another signal, or correct VAL_ where the DBC is wrong or says neither"
 
 
 class Contrary(NamedTuple):
@@ -18,21 +18,26 @@ class Contrary(NamedTuple):
         effect: in words that end before the position of the switch.
         cure: what to write instead.
         stop: whether it is an emergency stop.
+        known: whether a name that says neither is refused too: it would let a valve move.
     """
 
     effect: str
     cure: str = _OTHER
     stop: bool = False
+    known: bool = False
 
 
 ENABLE = Contrary(
-    "enable while", f"{_OTHER}; one in a message of its own may be one of switches, with code: 0"
+    "enable while",
+    f"{_OTHER}; one in a message of its own may be one of switches, with code: 0",
+    known=True,
 )
-SWITCH = Contrary("enable while", "write code: 0, or code: 1 where it is meant so")
+SWITCH = Contrary("enable while", "write code: 0, or code: 1 where it is meant so", known=True)
 STOP = Contrary(
     "free the stop while",
     f"{_OTHER}; one whose 1 is free may be one of switches, in every enable",
     stop=True,
+    known=True,
 )
 SWITCHES = {
     "reset": Contrary("reset a trip while"),
@@ -51,7 +56,7 @@ def contrary_fault(signal: Signal, key: str | int, wrong: Contrary) -> str | Non
     choices: Mapping[int, object] = signal.choices or {}
     names = {raw: str(n) for raw, n in choices.items() if not names_broken(str(n))}
     off = key == "anti_sway_off"  # whose own name says off, as it should
-    where = contrary(names, "" if off else signal.name, stop=wrong.stop)
+    where = contrary(names, "" if off else signal.name, stop=wrong.stop, known=wrong.known)
     if where is None and off and shows_sway_control(signal.name):
         where = f"{signal.name} is on"
     if where is None:

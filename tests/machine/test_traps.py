@@ -58,6 +58,16 @@ def test_a_table_that_agrees_passes(machine: Machine, make: Any, zero: str, one:
     assert said(made(trap, machine)) == ([], [])
 
 
+@pytest.mark.parametrize(
+    ("signal", "zero", "one"), [("Reset", "Idle", "Reset"), ("AntiSwayOff", "Normal", "Bypass")]
+)
+def test_a_button_that_moves_nothing_may_have_any_name(
+    machine: Machine, signal: str, zero: str, one: str
+) -> None:
+    trap = traps_of_signals.table(f"{zero}/{one}", "", signal=signal)
+    assert said(made(trap, machine)) == ([], [])
+
+
 def test_a_switch_whose_code_is_written_may_have_any_names(machine: Machine) -> None:
     made(traps_of_signals.seat("Occupied", "Empty"), machine)
     machine.in_yaml("signal: Stop, ", "signal: Stop, code: 0, ")

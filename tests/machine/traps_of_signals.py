@@ -106,6 +106,7 @@ TABLES = [
     stop("x", "Normal"),
     stop("x", "y"),
     stop("Loose contact", "Pressed"),
+    stop("Not closed", "Closed"),
     stop("", "", "EmergencyStopOk"),
     stop("", "", "StopReleased"),
     seat("Occupied", "Empty"),
