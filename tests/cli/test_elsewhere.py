@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 from canshaper.cli.app import LINUX_ONLY
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.nodes.eds_files import JOYSTICK, VALVE, write
-from tests.studio.conftest import Page
+from tests.studio.page import Page
 
 ROOT = Path(__file__).parents[2]
 # Names of Windows' Python are fewer than those of macOS; numpy and matplotlib look at some of

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
 from tests.lane.outcome import NoLane
 from tests.lane.packages import install, missing
-from tests.studio.conftest import DISTURBED, TRIES
+from tests.studio.page import DISTURBED, TRIES
 
 PROGRAMS = {"chromium": "chromium"}
 FLAGS = [

@@ -1,36 +1,28 @@
-"""A studio as a user starts it, and a page without a browser."""
+"""A studio as a user starts it."""
 
-import json
 import os
 import re
 import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
+from tests.studio.page import WAIT_S, Page
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
     from playwright.sync_api import Page as Tab
 
-# Only to end a test that hangs.
-WAIT_S = 60.0
-# Drives that a busy machine may hold up, and what the page says of that.
-TRIES = 8
-DISTURBED = re.compile(
-    "is silent|no joystick message|joystick messages are not|too late|stood still"
-)
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 
@@ -91,7 +83,7 @@ class Studio:
         return sorted(pid for pid in children if verb is None or verb in command_of(pid))
 
     @contextmanager
-    def page(self, **options: Any) -> Iterator["Page"]:
+    def page(self, **options: Any) -> Iterator[Page]:
         """A page that is connected."""
         options = {"origin": f"http://{self.host}", "open_timeout": WAIT_S, **options}
         if token := self.url.partition("token=")[2]:
@@ -125,110 +117,6 @@ def command_of(pid: int) -> list[str]:
         return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
     except OSError:
         return []
-
-
-class Page:
-    """What a page does, without a browser."""
-
-    def __init__(self, connection: ClientConnection) -> None:
-        self.connection = connection
-        self.events: list[list[Any]] = []
-        self.refused: list[str] = []
-        self.joysticks: dict[str, float] | None = None
-        hello = json.loads(connection.recv(timeout=WAIT_S))["hello"]
-        self.hello: dict[str, Any] = hello
-        self.shown = self.look()
-
-    def send(self, **message: Any) -> None:
-        """Send one message."""
-        self.connection.send(json.dumps(message))
-
-    def look(self) -> dict[str, Any]:
-        """The next picture; a hand that holds the joysticks goes on holding them."""
-        self.shown = json.loads(self.connection.recv(timeout=WAIT_S))
-        self.events += self.shown.get("events", [])
-        self.refused += self.shown.get("refused", [])
-        if self.joysticks is not None:
-            self.send(joysticks=self.joysticks)
-        return self.shown
-
-    def until(self, condition: Callable[[dict[str, Any]], bool], what: str = "") -> dict[str, Any]:
-        """Look until something is so."""
-        limit = time.monotonic() + WAIT_S
-        while not condition(self.look()):
-            assert time.monotonic() < limit, f"{what} not within {WAIT_S} s: {self.shown}"
-        return self.shown
-
-    def now(self) -> dict[str, Any]:
-        """What is to be seen now; a page that was not looked at for a while has old pictures."""
-        now_s = time.monotonic()  # the studio's clock, too
-        return self.until(lambda s: s["t"] >= now_s, "now")
-
-    def for_s(self, duration_s: float) -> list[dict[str, Any]]:
-        """Every picture of so long, by the clock of the studio."""
-        end = self.shown["t"] + duration_s
-        pictures = []
-        while self.shown["t"] < end:
-            pictures.append(self.look())
-        return pictures
-
-    def drive(self) -> None:
-        """Take the joysticks and press enable, with the axes ready."""
-        self.until(lambda s: all(c["daemon"] and c["crane"] for c in s["cranes"].values()))
-        self.send(do="take")
-        self.joysticks = dict.fromkeys(self.hello["axes"], 0.0)
-        self.until(lambda s: s["driver"] == self.hello["page"], "driver")
-        self.until(lambda s: not s["enable"], "enable released by the last one")
-        self.send(do="enable")
-        self.until(lambda s: self.states() == {"ready"}, "axes ready")
-
-    def hold(
-        self, level: float, condition: Callable[[dict[str, Any]], bool], what: str = ""
-    ) -> dict[str, Any]:
-        """Hold all joysticks out until something is so.
-
-        On a busy machine a page is silent for longer than it may be, and enable goes: then again.
-        """
-
-        def held(_shown: dict[str, Any]) -> bool:
-            if self.shown["driver"] != self.hello["page"] or not self.shown["enable"]:
-                self.drive()
-            self.joysticks = dict.fromkeys(self.hello["axes"], level)
-            return condition(self.shown)
-
-        return self.until(held, what)
-
-    def stroke(self, part: float, duration_s: float) -> dict[str, float]:
-        """Slew so long and let go; the swing that is left of each crane, in degrees.
-
-        Where a busy machine held up page or joysticks meanwhile, once more.
-        """
-        for _ in range(TRIES):
-            before = len(self.events)
-            if self.joysticks is None or not self.shown["enable"]:
-                self.drive()
-            self.joysticks = {**dict.fromkeys(self.hello["axes"], 0.0), "slew": part}
-            self.until(
-                lambda s: (
-                    all(c["axes"]["slew"]["valve"] for c in s["cranes"].values()) or not s["enable"]
-                )
-            )
-            self.for_s(duration_s)
-            self.joysticks["slew"] = 0.0
-            self.until(lambda s: self.states() == {"ready"} or not s["enable"], "at rest")
-            swings = {name: one["swing"] for name, one in self.for_s(3.0)[-1]["cranes"].items()}
-            if not any(DISTURBED.search(event[3]) for event in self.events[before:]):
-                return swings
-        pytest.skip(f"the machine was too busy in each of {TRIES} drives")
-
-    def states(self) -> set[str]:
-        """Levels of all axes; one without a status message has none."""
-        axes = [axis for c in self.shown["cranes"].values() for axis in c["axes"].values()]
-        return {axis["level"] for axis in axes if axis["state"]}
-
-    def texts(self) -> list[str]:
-        """What happened."""
-        return [event[3] for event in self.events]
 
 
 @pytest.fixture(scope="module")

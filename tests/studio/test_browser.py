@@ -18,7 +18,8 @@ from tests.studio.browser import (
     swing,
     undisturbed,
 )
-from tests.studio.conftest import WAIT_S, Studio, command_of
+from tests.studio.conftest import Studio, command_of
+from tests.studio.page import WAIT_S
 
 DAEMON_SILENT = re.compile("daemon silent: shaped")
 

@@ -18,7 +18,8 @@ from canshaper.commissioning.procedure.files import Files
 from canshaper.studio.access import Access
 from canshaper.studio.commission import Commission
 from canshaper.studio.server import Guard, listening, server
-from tests.studio.conftest import ROOT, WAIT_S
+from tests.studio.conftest import ROOT
+from tests.studio.page import WAIT_S
 
 pytestmark = pytest.mark.processes
 Request = Callable[..., Any]

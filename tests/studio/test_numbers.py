@@ -11,8 +11,8 @@ from websockets.sync.client import connect
 
 from canshaper.cli.app import app
 from canshaper.commissioning import control_client as client
-from tests.studio.conftest import Page
 from tests.studio.machine import A1, PERIOD, Machine
+from tests.studio.page import Page
 
 
 @pytest.fixture

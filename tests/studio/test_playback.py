@@ -18,8 +18,9 @@ from canshaper.cli.playback import opened_drives
 from canshaper.design.parallel import Processes
 from canshaper.studio import in_process
 from canshaper.studio.playback import Playback
-from tests.studio.conftest import WAIT_S, Opened
+from tests.studio.conftest import Opened
 from tests.studio.drives import black_box, recorded
+from tests.studio.page import WAIT_S
 
 SENT = frozenset((0x200, 0x201, 0x202))
 ALL = (0.0, None)

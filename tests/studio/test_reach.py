@@ -13,7 +13,8 @@ from urllib.request import HTTPCookieProcessor, build_opener
 import pytest
 
 from canshaper.studio.access import qr_code, reachable
-from tests.studio.conftest import ROOT, WAIT_S
+from tests.studio.conftest import ROOT
+from tests.studio.page import WAIT_S
 
 
 def test_all_addresses_are_named_by_one_of_this_machine() -> None:

@@ -8,7 +8,8 @@ import pytest
 
 from canshaper.cli.common import loader
 from canshaper.studio.swing import residuals
-from tests.studio.conftest import WAIT_S, Studio
+from tests.studio.conftest import Studio
+from tests.studio.page import WAIT_S
 
 PERIOD = "axes.slew.sway.period_s"
 

@@ -11,7 +11,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from tests.faults.shipped import NAMES
-from tests.studio.conftest import WAIT_S, Studio
+from tests.studio.conftest import Studio
+from tests.studio.page import WAIT_S
 from tests.studio.shown import pose, valves
 
 # Their cranes are in the page's process: each crane has one multicast group.

@@ -10,7 +10,8 @@ from websockets.sync.client import connect
 
 from canshaper.studio.client import MOST_BYTES, MOST_NONSENSE, MOST_PER_S
 from canshaper.studio.server import MOST_PAGES
-from tests.studio.conftest import WAIT_S, Page, Studio
+from tests.studio.conftest import Studio
+from tests.studio.page import WAIT_S, Page
 from tests.studio.shown import pose, valves
 
 NONSENSE = [

@@ -12,7 +12,8 @@ import pytest
 
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
-from tests.studio.conftest import ROOT, WAIT_S, Listener, Studio, command_of
+from tests.studio.conftest import ROOT, Listener, Studio, command_of
+from tests.studio.page import WAIT_S
 
 
 @pytest.mark.slow
