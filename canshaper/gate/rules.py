@@ -121,7 +121,7 @@ def distance(axis: AxisState, velocity: float) -> str:
             return "limit=time of added velocity"
         way = axis.way + velocity * of.period_s
         path = of.path
-        # Steps of the frame add up: a tenth, and .01 s of full speed.
+        # A tenth more, and .01 s of full speed.
         if path and abs(way) > 1.1 * path + 0.01 and way * velocity > 0.0:
             return "limit=path of added velocity"
     return ""

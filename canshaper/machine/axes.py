@@ -26,13 +26,13 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
         for shared in shared_valves.values():
             if not isinstance(shared.codec, RewrittenMessage):  # its signals are the joystick's
                 shared.used.check_start_values(shared.codec.start)
-    tick_s = lookup.config.tick_ms / 1000.0
-    periods = {n: tick_s * axis.period_ticks for n, axis in axes.items() if axis}
     bound = {n: axis for n, axis in axes.items() if axis}
     if not any(axis.sway_sensor for axis in lookup.config.axes.values()):
         return bound
     from canshaper.machine.sway_sensor import bind_sway_sensors
 
+    tick_s = lookup.config.tick_ms / 1000.0
+    periods = {n: tick_s * axis.period_ticks for n, axis in bound.items()}
     sensors = bind_sway_sensors(lookup, periods)
     return {n: replace(axis, sway_sensor=sensors.get(n)) for n, axis in bound.items()}
 

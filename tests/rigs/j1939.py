@@ -50,14 +50,11 @@ def request(pgn: int, source: int = OTHER, to: int = GLOBAL) -> Frame:
     return Frame("crane", 0x18EA0000 | to << 8 | source, True, pgn.to_bytes(3, "little"))
 
 
-load = read
-
-
 class Rig:
     """A controller with its clock; what it sends is seen as frames."""
 
     def __init__(self, path: Path = ROOT / "config" / "j1939-forwarder.yaml") -> None:
-        self.deployment = load(path)
+        self.deployment = read(path)
         self.controller = Controller(self.deployment)
         config = self.deployment.config.buses["crane"].j1939
         assert config is not None

@@ -140,11 +140,13 @@ def _with_period(
     time = signal.time_s
     unbroken = [(float(t[0]), float(t[-1])) for t in (time[p] for p in pieces(time, period / 3.0))]
     wholes = [cut(signal, begin, end, 0.0) for begin, end in common(unbroken, idle)]
-    found = [(whole, run) for whole in wholes for run in _runs(whole.time_s, whole.value, period)]
-    found.sort(key=lambda pair: -pair[1].worth)
+    candidates = [
+        (whole, run) for whole in wholes for run in _runs(whole.time_s, whole.value, period)
+    ]
+    candidates.sort(key=lambda pair: -pair[1].worth)
     kept: list[Swing] = []
-    for whole, run in found[:MOST_RUNS]:
-        if run.worth < max(LEAST_WORTH * found[0][1].worth, least):
+    for whole, run in candidates[:MOST_RUNS]:
+        if run.worth < max(LEAST_WORTH * candidates[0][1].worth, least):
             break
         middle, half = 0.5 * (run.start_s + run.end_s), 0.5 * (run.end_s - run.start_s)
         parts = (k.segment for k in kept)
@@ -236,7 +238,7 @@ def _runs(time: Array, value: Array, period: float) -> list[Run]:
     free = good[:-lag] & good[lag:]
     free &= (np.abs(turn) < 0.09 * omega + doubt) & (decay > -0.012 * omega - doubt)
     free &= decay < 0.35 * omega + doubt
-    found = []
+    swinging = []
     for first, end in runs(free):
         a = float(grid[first * stride])
         b = float(grid[min((end - 1 + lag) * stride + width - 1, len(grid) - 1)])
@@ -245,5 +247,5 @@ def _runs(time: Array, value: Array, period: float) -> list[Run]:
             faster = float(np.average(turn[first:end], weights=weights))
             slower = float(np.average(decay[first:end], weights=weights))
             worth = float(np.mean(weights)) * (b - a)
-            found.append(Run(a, b, omega + faster, slower, worth))
-    return found
+            swinging.append(Run(a, b, omega + faster, slower, worth))
+    return swinging

@@ -1,6 +1,5 @@
 """Is the file fit to start, and slow enough for the first motion?"""
 
-from collections.abc import Collection
 from functools import partial
 
 from matplotlib.figure import Figure
@@ -60,26 +59,26 @@ def run(context: Context) -> Outcome:
     outcome.poor += [str(source.problem(place, text)) for place, text in faults]
     axes = stopping(deployment)
     outcome.figures[""] = lambda: figure(axes)
-    fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > FIRST_PCT]
-    fast = [] if MOTION in context.numbers else fast
+    limits = {name: axis.limits for name, axis in deployment.config.axes.items()}
+    first = MOTION not in context.numbers
+    fast = [name for name, one in limits.items() if first and one.max_pct > FIRST_PCT]
     if fast:
         outcome.sheet.print(f"The first motion is at reduced speed: {', '.join(fast)}")
-    proposed = {
-        f"axes.{name}.limits.stop_distance_m": axis.limits.stop_distance_m
-        for name, axis in deployment.config.axes.items()
-    }
-    proposed = {key: proposed[key] for key in deployment.config.assumed if key in proposed}
-    for key, metres in proposed.items():
-        outcome.sheet.print(
-            f"{key} {metres} is a proposal: to go on is to allow the tip so much;"
-            " type less into the file where there is less room"
-        )
-    if fast or proposed:
-        outcome.edit = partial(_write, fast=fast, allowed=proposed)
+    allowed = []
+    for name, one in limits.items():
+        key = f"axes.{name}.limits.stop_distance_m"
+        if key in deployment.config.assumed:
+            allowed.append(key)
+            outcome.sheet.print(
+                f"{key}: {one.stop_distance_m:g} m is a guess: to write this step is to allow the"
+                f" tip of {name} to travel so far when it stops; type less where there is less room"
+            )
+    if fast or allowed:
+        outcome.edit = partial(_write, fast=fast, allowed=allowed)
     return outcome
 
 
-def _write(deployment: Deployment, fast: list[str], allowed: Collection[str]) -> list[str]:
+def _write(deployment: Deployment, fast: list[str], allowed: list[str]) -> list[str]:
     sections, slow = deployment.config.axes, {"max_pct": FIRST_PCT}
     slower = [of_limits(name, sections[name], slow) for name in fast]
     change(deployment.path, [*slower, *confirmed(deployment.path, allowed)])
