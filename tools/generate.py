@@ -16,6 +16,7 @@ import canshaper.config.schema  # noqa: F401  (its classes are the sections)
 from canshaper.checksums.kinds import checksum_table
 from canshaper.cli.verbs.config_schema import filter_table
 from canshaper.codec.frame import FrameFault
+from canshaper.codec.status import AXIS_STATUS
 from canshaper.commissioning.procedure.state import FILE
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.config.protection import PROFILES
@@ -62,6 +63,13 @@ def state_rows() -> Iterator[str]:
     yield "|---|---|---|---|"
     for state, text in STATE_TEXTS.items():
         yield f"| {int(state)} | {state.name} | {text.valve} | {text.meaning} |"
+
+
+def status_rows() -> Iterator[str]:
+    """List of the signals of a status message."""
+    for required in (True, False):
+        names = ", ".join(f"`{one.name}`" for one in AXIS_STATUS if one.required is required)
+        yield f"- {'always' if required else 'where the DBC has them'}: {names}"
 
 
 def diagram() -> Iterator[str]:
@@ -210,6 +218,7 @@ def step_rows() -> Iterator[str]:
 
 TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "states": state_rows,
+    "status": status_rows,
     "diagram": diagram,
     "reasons": lambda: reason_rows(Reason, REASON_TEXTS),
     "faults": fault_rows,

@@ -213,9 +213,8 @@ class AxisSection(Section):
     feedback: FeedbackSection | None = None
     """Feedback of the valve, compared with what was commanded."""
     status: Status | None = None
-    """Message with the status of the axis: signals State, Reason, RawCommand, ShapedCommand,
-    PredictedSway and optionally ActiveSet, SwaySensor, SwingLength. Sent every GenMsgCycleTime and
-    at every transition; no one else may use its id."""
+    """Message with the status of the axis, with the signals of docs/states.md. Sent every
+    GenMsgCycleTime and at every transition; no one else may use its id."""
     sway: Sway | None = None
     """Swing of the tool on this axis."""
     sway_sensor: SwaySensorSection | None = None

@@ -168,8 +168,8 @@ class ShapedAxis:
                     demand = joystick.command
                 if not size < math.inf:  # it would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
-            elif state is STOPPING and joystick.command * stage.side < -self._neutral_band:
-                stage.reverse()
+            elif state is STOPPING and abs(joystick.command) > self._neutral_band:
+                stage.stop_against(joystick.command)
             self.command = demand
 
             adds = may_add and state is ACTIVE

@@ -84,7 +84,6 @@ class OutputStage:
             rounded one, it would stick on a coarse grid.
         largest_added: largest |velocity| that the motion of two axes may give to this axis while no
             one commands it; 0 where it may add nothing.
-        side: to which side the joystick was deflected last, 1 or -1.
         tail: ticks for which the output may run on.
     """
 
@@ -100,6 +99,7 @@ class OutputStage:
         "_rates",
         "_recent",
         "_reversal",
+        "_side",
         "_small",
         "_spreads",
         "_tick_s",
@@ -107,7 +107,6 @@ class OutputStage:
         "limits",
         "output",
         "ramp",
-        "side",
         "tail",
     )
 
@@ -125,7 +124,7 @@ class OutputStage:
         self._demanded = RecentCommand(self.tail)  # the same, but no rest ends it
         self._no_run_on = 0  # ticks that are left without run-on
         self._ran = 0.0  # how far it has run beyond what was asked, full speed times seconds
-        self.side = 1.0
+        self._side = 1.0  # to which the joystick was deflected last, 1 or -1
         self._crossed = 0  # ticks since the joystick was deflected to this side
         self.change_limits(limits)
         self._own_ramp = 0.0  # what ``ramp`` would be if nothing had been added
@@ -215,10 +214,10 @@ class OutputStage:
         fallen from its velocity. Another demand of so much velocity begins the way again.
         """
         recent, own = self._recent, self._own_ramp
-        if demand * self.side < 0.0:
-            self.reverse()
-        if self._crossed >= self._reversal and (recent.low if self.side > 0.0 else recent.high):
-            recent.clear_against(self.side)
+        if demand * self._side < 0.0:
+            self._reverse()
+        if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
+            recent.clear_against(self._side)
         self._crossed += 1
         held = demand if own > 0.0 else -demand
         beyond = abs(own) - held if held > 0.0 else abs(own)
@@ -268,9 +267,19 @@ class OutputStage:
         self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
         self._carry = 0.0
 
-    def reverse(self) -> None:
+    def _reverse(self) -> None:
         """Begin a reversal: the joystick is deflected to the other side than it was last."""
-        self.side, self._crossed = -self.side, 0
+        self._side, self._crossed = -self._side, 0
+
+    def stop_against(self, held: float) -> None:
+        """End the run-on of a stop where the joystick is held against it.
+
+        By the fall, and then in neutral; or after the time that a reversal has.
+        """
+        if held * self._side < 0.0:
+            self._reverse()
+        if not self._reversal and held * self.ramp < 0.0:
+            self._recent.clear()
 
     def hold_run_on(self) -> None:
         """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.

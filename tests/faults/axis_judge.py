@@ -170,7 +170,8 @@ class AxisJudge:
             self._side, self._crossed = -self._side, index
         low, high = self._range = self._range_since(index - axis.tail, index)
         in_motion = self.raw or before or self.command
-        if self.state == BYPASS_ON and in_motion and not self.joystick.bypasses():
+        released = self.state == BYPASS_ON and in_motion and not self.joystick.bypasses()
+        if released and self.mode == FREE:  # a stop goes on with what drove the axis before
             self._shaped_since = index
         self.commanded = low < 0.0 or high > 0.0
         if index < self._shaped_since + axis.tail:  # the filter does not run on yet

@@ -69,6 +69,21 @@ def test_it_begins_no_run_on_against_a_joystick_that_is_held(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_in_the_middle_of_a_reversal_it_ends_in_neutral(drive_with: DriveWith, sign: float) -> None:
+    """The other direction was commanded too, and does not begin in the stop."""
+    shaper = Delay()
+    drive = drive_with(shaper, LIMITS)
+    drive.to_ready().run(CommandInput(sign * 0.8), 1.0)
+    drive.run(CommandInput(-sign * 0.8), 0.1)
+    assert sign * drive.axis.sent > 0.2
+    shaper.repeated = -sign * 0.8
+    for _ in range(20):
+        drive.tick(CommandInput(-sign * 0.8, fault=LATE))
+        assert sign * drive.axis.sent >= 0.0
+    assert drive.axis.raw == 0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_short_touch_is_enough(drive_with: DriveWith, sign: float) -> None:
     """It does not run on again when the joystick is let go of."""
     drive = stopping(drive_with, sign)
