@@ -9,6 +9,7 @@ import pytest
 
 from canshaper.config.bus import Bus
 from canshaper.machine.binding import load_deployment
+from canshaper.machine.stopping import unstated
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = sorted(
@@ -37,8 +38,9 @@ def test_help_says_what_is_measured(
 
 def test_the_deployments_they_make_are_valid(tmp_path: Path) -> None:
     kilohertz, rig, tick = (import_module(name) for name in ("kilohertz", "rig", "tick"))
-    eight = load_deployment(kilohertz.deployment(tmp_path, 8, 1, BUS))
-    assert (len(eight.axes), eight.config.tick_ms) == (8, 1)
+    eight = load_deployment(kilohertz.deployment(tmp_path, 8, 2, BUS))
+    assert (len(eight.axes), eight.config.tick_ms) == (8, 2)
+    assert not [*unstated(eight)]  # the daemon would refuse it
     assert len(tick.four_axes(tmp_path).axes) == 4
     assert list(load_deployment(rig.slew_only(tmp_path, "vcan0", 1)).axes) == ["slew"]
     assert load_deployment(rig.on_channel(tmp_path, BUS)).config.buses["crane"] == BUS
