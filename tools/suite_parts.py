@@ -118,13 +118,13 @@ def rows_of_test() -> list[list[Part]]:
     kernel = hil("socketcan daemon", "-m", "not slow")
     return [
         [Part("lint", "style and format", style)],
-        [Part("fast", "all tests of less than a second of a processor", [fast])],
         [
+            Part("fast", "all tests of less than a second of a processor", [fast]),
             Part(
                 "socketcan", "ports and a drive of the daemon on a real kernel", [kernel], no_lane
             ),
-            Part("browser", "the live page in Chromium", [few], no_chromium, WINDOW),
         ],
+        [Part("browser", "the live page in Chromium", [few], no_chromium, WINDOW)],
     ]
 
 
