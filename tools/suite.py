@@ -47,9 +47,9 @@ class Runner:
         while any(thread.is_alive() for thread in threads):
             for thread in threads:
                 thread.join(0.2)
-            if row[0].status is not None and time.monotonic() - last > STILL_S:
+            names = " ".join(p.name for p in row[1:] if p.status is None and not p.not_run)
+            if names and row[0].status is not None and time.monotonic() - last > STILL_S:
                 last = time.monotonic()
-                names = " ".join(p.name for p in row if p.status is None and not p.not_run)
                 print(f"-- still running after {last - begin:.0f} s: {names}", flush=True)
 
     def _part(self, part: Part, live: bool) -> None:

@@ -10,6 +10,10 @@ FOREIGN_NS = 1_000_000_000
 """So long a second sender has to be silent."""
 BLEND_S = 0.3
 """Seconds for which a velocity may go on as it was, where another filter takes over from one."""
+UP = 0.5
+"""Steps of a frame by which a velocity may be rounded up."""
+ROUNDING = 1.0 + UP
+"""Steps between two frames that rounding makes: the end of the range rounds down by up to one."""
 
 
 class Asked:
@@ -74,12 +78,14 @@ class AxisState(Pending):
             on the same side.
         forth, back: what was asked in each direction.
         least, most: what may leave in this tick.
-        asks, asked: something is asked of it or its partner: in this period, in it or the last one.
+        asked_now, asked: something is asked of it or its partner: in this period; in this or the
+            last one.
         due: it has its turn in this tick, and has sent nothing yet.
         ticks: periods since its last frame; ``sent_at`` number of the deadline of that.
         flips: how often anti-sway was switched in its joystick, as this axis knows it.
         last: velocity of that frame; ``top`` what it may have been before it was rounded.
-        uncounted: up to this velocity a fall counts no distance.
+        way_back: velocity of a fall, at its rate, from what was asked last: it is no run-on, and
+            what is no faster counts no distance.
         zero_at: ticks that were made before it came to rest, or lost the right to move.
         ran: how far it has run beyond the demand and what a partner may add, since it did not.
         way, alone: distance and periods in motion since something was asked of it, or nothing
@@ -101,9 +107,9 @@ class AxisState(Pending):
         self.now, self.held, self.ran = 0.0, 0, 0.0
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
-        self.asks = self.asked = self.due = False
+        self.asked_now = self.asked = self.due = False
         self.ticks = self.flips = self.sent_at = 0
-        self.last, self.top, self.uncounted = 0.0, axis.step, axis.step
+        self.last, self.top, self.way_back = 0.0, axis.step, axis.step
         self.zero_at = NEVER
         self.way, self.alone = 0.0, 0
 
@@ -160,6 +166,8 @@ class AxisState(Pending):
         else:
             moving = self.last or self.forth.most or self.back.most
             self.stop_left = left if moving else 0
+            # The cause is noted in the axis' turn, which may be a period after it was received: a
+            # press since the turn before may be the later one of the two, and counts.
             if not self.latched or self.joystick.press >= self.cause - of.period:
                 self.latched, self.armed = False, True
         self.hard, self.latches, self.lost = "", False, False
@@ -171,7 +179,7 @@ class AxisState(Pending):
         self.held = self.held + passed if now * before > 0.0 else 0
         if self.flips != self.joystick.flips:
             self.flips = self.joystick.flips
-            self.blend()
+            self.change_filter()
         if now and not before:
             began = self.forth if now > 0.0 else self.back
             began.remaining = max(began.remaining, 0.0)
@@ -180,8 +188,8 @@ class AxisState(Pending):
         self.forth.note(now if now > 0.0 else 0.0, forth, period, of)
         self.back.note(-now if now < 0.0 else 0.0, forth - distance, period, of)
 
-    def blend(self) -> None:
-        """Another filter takes over, or none: what differs between both fades."""
+    def change_filter(self) -> None:
+        """Another filter takes over, or none: the output may go on as it was for BLEND_S."""
         (self.forth if self.last > 0.0 else self.back).remaining += abs(self.last) * BLEND_S
 
     def dropped(self, made: int) -> float:
@@ -206,22 +214,21 @@ class AxisState(Pending):
         if not velocity:
             if self.last:
                 self.zero_at = made
-            fall = of.fall * max(passed, 1) + 1.5 * of.step
+            fall = of.fall * max(passed, 1) + ROUNDING * of.step
             if abs(self.last) > fall + self.dropped(made):
                 # Nothing falls so fast but a stop: from here on it is neutral first.
                 self.halt("fell to neutral at once", made, latch=False)
         self.way += velocity * of.period_s
         self.alone += velocity != 0.0
-        # Of a fall counts what is faster than the way back from what was asked last.
         held = max(self.now if velocity > 0.0 else -self.now, 0.0)
         beyond = size - held - of.added
         if beyond > 0.0:
             self.ran += beyond * of.period_s * passed
         elif self.now:
             self.ran = 0.0
-        on = self.uncounted - of.fall * passed if velocity * self.last > 0.0 else 0.0
-        self.uncounted = max(on, held + of.step)
-        if size > min(fallen, self.uncounted) + EPSILON:
+        on = self.way_back - of.fall * passed if velocity * self.last > 0.0 else 0.0
+        self.way_back = max(on, held + of.step)
+        if size > min(fallen, self.way_back) + EPSILON:
             asked.remaining -= size * of.period_s * passed
         self.top = size + of.step
         if size > reach + EPSILON:  # on its way back, by the fall with each frame

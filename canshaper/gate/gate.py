@@ -153,7 +153,7 @@ class Gate:
         name, section, last = key.rsplit(".", 2)
         axis = self.axes[name.removeprefix("axes.")]
         axis.of.set(f"{section}.{last}", value)
-        axis.blend()
+        axis.change_filter()
 
     def measure(self, name: str, part: float) -> None:
         """A measurement moves an axis: so large a part of full command is the demand, [-1, 1]."""
@@ -187,10 +187,10 @@ class Gate:
         for axis in axes:
             if axis.due:
                 partner = axis.partner
-                asks = bool(axis.forth.most or axis.back.most)
+                asked_now = bool(axis.forth.most or axis.back.most)
                 if partner is not None:
-                    asks = asks or bool(partner.forth.most or partner.back.most)
-                axis.asks, axis.asked = asks, asks or axis.asks
+                    asked_now = asked_now or bool(partner.forth.most or partner.back.most)
+                axis.asked_now, axis.asked = asked_now, asked_now or axis.asked_now
                 if not axis.asked or axis.forth.most or axis.back.most:
                     axis.way, axis.alone = 0.0, 0
                 axis.least, axis.most = rules.bounds(axis)

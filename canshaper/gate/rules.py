@@ -4,7 +4,7 @@
 not, 10 why an identifier may not. Empty text, or None for no fault, is that it may.
 """
 
-from canshaper.gate.axis import FOREIGN_NS, AxisState
+from canshaper.gate.axis import FOREIGN_NS, ROUNDING, UP, AxisState
 from canshaper.gate.fields import EPSILON, Word
 from canshaper.gate.received import SwitchState
 from canshaper.gate.record import Key, Record, Valve
@@ -83,21 +83,21 @@ def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
 
 
 def rise(axis: AxisState, velocity: float, ticks: int) -> str:
-    """Rule 5: limit: ``rise_per_s``, and half a step of rounding; one period a frame."""
+    """Rule 5: limit: ``rise_per_s``, and rounding; one period a frame."""
     of, last = axis.of, abs(axis.last)
     step, most = of.step, of.rise * ticks
     if velocity * axis.last >= 0.0:
-        highest = axis.top + most + 0.5 * step
+        highest = axis.top + most + UP * step  # ``top`` has the rounding down
     else:  # a part of the time goes by on the way to zero
         left = 1.0 - max(last - step, 0.0) / (of.fall * ticks) if ticks else 0.0
-        highest = max(left, 0.0) * most + 1.5 * step
+        highest = max(left, 0.0) * most + ROUNDING * step
     return "" if abs(velocity) <= highest + EPSILON else f"limit=rise allowed={highest:.3f}"
 
 
 def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
-    """Rule 6: limit: ``fall_per_s``, and a step and a half; neutral ends the motion instead."""
+    """Rule 6: limit: ``fall_per_s``, and rounding; neutral ends the motion instead."""
     of, size = axis.of, abs(velocity) if velocity * axis.last >= 0.0 else 0.0
-    least = abs(axis.last) - of.fall * max(ticks, 1) - 1.5 * of.step - EPSILON
+    least = abs(axis.last) - of.fall * max(ticks, 1) - ROUNDING * of.step - EPSILON
     if size < least and size < least - axis.dropped(made):
         return f"limit=fall allowed={least:.3f}"
     return ""
