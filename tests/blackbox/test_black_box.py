@@ -72,6 +72,7 @@ def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path)
     assert about["identity"] == load_deployment(tmp_path / "machine.yaml").identity.lines()
 
 
+@pytest.mark.slow
 def test_the_error_of_a_filter_is_in_log_and_file(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -114,6 +115,7 @@ def test_a_daemon_that_ends_writes_first(bench: Bench, tmp_path: Path, ticks: in
     assert (tmp_path / "machine-0001.zip").exists()
 
 
+@pytest.mark.slow
 def test_without_a_trip_or_a_folder_nothing_is_written(
     bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
 ) -> None:
@@ -125,6 +127,7 @@ def test_without_a_trip_or_a_folder_nothing_is_written(
     assert log() == []
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_costs_one_line(
     bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
 ) -> None:
@@ -221,6 +224,7 @@ def test_it_is_written_at_once_whatever_the_other_axes_do(
     assert first - bench.now_ns + 6 * 10**9 <= 20_000_000
 
 
+@pytest.mark.slow
 def test_the_copies_are_those_that_were_loaded(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -285,6 +289,7 @@ def test_it_reaches_a_minute_back_and_not_much_further(
     assert data["axes"]["slew"]["trips"] == 1
 
 
+@pytest.mark.slow
 def test_a_reload_of_the_same_files_is_played_through(bench: Bench, tmp_path: Path) -> None:
     folder = tmp_path / "boxes"
     folder.mkdir()
@@ -310,6 +315,7 @@ def inside(box: Path, folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_frames_that_were_not_sent_are_not_sent_again(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -344,6 +350,7 @@ def test_frames_that_were_not_sent_are_not_sent_again(
     assert len(off) == 20
 
 
+@pytest.mark.slow
 def test_one_bit_that_is_not_the_same_is_reported_with_its_time(box: Path, tmp_path: Path) -> None:
     path = inside(box, tmp_path)
     data = bytearray(path.read_bytes())
@@ -374,6 +381,7 @@ def checked(data: bytearray, at: int, begin: int, size: int) -> None:
     ).to_bytes(4, "little")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.0, 0.001, 0.02, 0.5, 0.9, 0.999])
 def test_one_that_is_cut_off_is_played_up_to_there_or_reported(
     box: Path, tmp_path: Path, part: float

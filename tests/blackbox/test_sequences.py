@@ -107,6 +107,7 @@ def test_no_function_of_a_state_holds_on_to_another_controller(name: str) -> Non
     assert not [one for one in seen.values() if getattr(one, "__closure__", None)]
 
 
+@pytest.mark.slow
 def test_a_frame_that_is_too_long_stays_so(tmp_path: Path) -> None:
     """No classical bus has one; an adapter that is broken might, and it is refused in both."""
     lengths: set[int] = set()

@@ -81,6 +81,7 @@ def test_shares_make_the_same_drives_as_one_campaign(tmp_path: Path) -> None:
     assert rows(tmp_path / "merged") == rows(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_it_was_and_never_by_mistake(tmp_path: Path) -> None:
     arguments = (PLAIN, "--processes", "1", "--out", str(tmp_path))
     campaign(*arguments, "-n", "3")
@@ -212,6 +213,7 @@ def test_a_drive_of_the_second_file_is_looked_at_with_the_ranges_of_the_first(
     assert peaks[0]["peak_deg"] != pytest.approx(row["peak_deg"], abs=0.02)
 
 
+@pytest.mark.slow
 def test_files_with_other_axes_are_not_compared(tmp_path: Path) -> None:
     joints = str(CONFIG / "forwarder-joints.yaml")
     line = (

@@ -114,6 +114,7 @@ def test_what_is_measured_on_the_fly_is_what_the_recorded_drive_shows(seed: int)
     assert row["run_on_m"] == pytest.approx(recorded.run_on_m, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_drive_does_not_depend_on_those_before_it() -> None:
     alone = measured_drive(load_deployment(ROBUST.path), 4, RANGES)
     deployment = load_deployment(ROBUST.path)
@@ -140,6 +141,7 @@ def test_a_frame_that_the_gate_refuses_is_a_broken_promise(
     assert "output=refused" in row["why"]
 
 
+@pytest.mark.slow
 def test_late_lost_and_garbled_frames_reach_the_controller_as_such() -> None:
     kinds = {}
     for seed in range(300):

@@ -56,6 +56,7 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     assert "slewing: of one that slews" not in "".join(lines)
 
 
+@pytest.mark.slow
 def test_check_says_which_axis_moves_without_its_joystick() -> None:
     note = (
         "  NOTE: while slew moves, near_far moves too without its joystick: by up to 0.25 m/s,"
@@ -65,6 +66,7 @@ def test_check_says_which_axis_moves_without_its_joystick() -> None:
     assert "without its joystick" not in invoke("check", str(SHIPPED)).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["forwarder-sensor", "j1939-sensor", "canopen-sensor"])
 def test_check_counts_what_a_sway_sensor_moves_it_besides(tmp_path: Path, name: str) -> None:
     way = " m/s, 0.6 m in or out (0.3 for slewing, as much to damp by its sway sensor), 6 s"
@@ -79,6 +81,7 @@ def test_check_counts_what_a_sway_sensor_moves_it_besides(tmp_path: Path, name: 
     assert row.endswith(" m/s, 0.3 m in or out, 6 s")
 
 
+@pytest.mark.slow
 def test_check_says_where_a_filter_no_longer_fits(
     tmp_path: Path,
 ) -> None:
@@ -193,6 +196,7 @@ def test_check_refuses_a_path_that_the_system_would_not_take(
     assert (result.exit_code, result.stderr.splitlines()) == (2, [problem, "1 problem"])
 
 
+@pytest.mark.slow
 def test_a_shipped_file_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("forwarder.yaml", "config/forwarder.yaml"):
@@ -202,6 +206,7 @@ def test_a_shipped_file_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.Mon
     assert invoke("check", "forwarder.yaml").exit_code == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "slews"),
     [

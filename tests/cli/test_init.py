@@ -50,6 +50,7 @@ def test_messages_of_can_fd_make_the_bus_one(tmp_path: Path) -> None:
     assert load_deployment(classical).config.buses["crane"].fd is False
 
 
+@pytest.mark.slow
 def test_messages_that_cannot_be_used_are_shown_and_left_out(tmp_path: Path) -> None:
     other = tmp_path / "other.dbc"
     signal = 'SG_ S : 0|9@1+ (1,0) [0|0] "" A'
@@ -86,6 +87,7 @@ def test_sway_sensors_are_offered_and_watched_first(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_gyro_is_a_rate(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     dbc = str(ROOT / "dbc" / "sway-sensor.dbc")
@@ -139,6 +141,7 @@ def test_a_first_deployment_is_of_the_kind_that_is_recommended(tmp_path: Path) -
     assert load_deployment(file).config.motion == shipped.motion
 
 
+@pytest.mark.slow
 def test_a_crane_that_no_axis_turns_has_no_motion(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     lines = answers({"slew turns": "n"}).splitlines()

@@ -103,6 +103,7 @@ Flow: its value at full = 125
 """
 
 
+@pytest.mark.slow
 def test_a_machine_of_offsets_and_pages_without_ranges_or_cycles(tmp_path: Path) -> None:
     """The shipped ecu.dbc, whose DBC says least; what the shipped deployment has is asked."""
     result = of_dbc(tmp_path, [ROOT / "dbc" / "ecu.dbc", DBC], ECU)

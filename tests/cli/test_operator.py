@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[2]
 GROUP = f"239.79.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_script_is_not_exit_0(number: int) -> None:
     command = [sys.executable, "-m", "canshaper", "operator", "config/forwarder.yaml"]

@@ -51,6 +51,7 @@ def variant(tmp_path: Path, *changes: tuple[str, str]) -> Deployment:
     return load_deployment(file)
 
 
+@pytest.mark.slow
 def test_one_axis_after_the_other_reaches_its_numbers() -> None:
     deployment = load_deployment(FILE)
     script = SCRIPTS["one-by-one"]

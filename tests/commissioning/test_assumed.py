@@ -71,6 +71,7 @@ def test_a_report_is_fit_to_sign_without_any(
     assert "fit to sign" not in str(report.run(again).sheet.parts)
 
 
+@pytest.mark.slow
 def test_to_go_on_after_the_check_is_to_allow_the_stop_distance(
     guessed: Machine, tmp_path: Path
 ) -> None:

@@ -51,6 +51,7 @@ def state_of(pid: int) -> str:
         return "Z"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.parametrize("code", [POOL, DRIVE], ids=["pool", "drive"])
 def test_they_end_with_their_parent(code: str, how: signal.Signals, tmp_path: Path) -> None:
@@ -68,6 +69,7 @@ def test_they_end_with_their_parent(code: str, how: signal.Signals, tmp_path: Pa
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parent", "status"), [("os.getppid()", 0), ("os.getpid()", 1)])
 def test_a_process_of_a_pool_whose_parent_has_ended_before_it_began(
     parent: str, status: int

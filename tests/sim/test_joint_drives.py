@@ -26,6 +26,7 @@ def residual_reduction_pct(file: str, script: str, axis: str, machine: str | Non
     return reduction
 
 
+@pytest.mark.slow
 def test_near_far_pulse_through_the_tip_controller() -> None:
     """98.7 % where valves move the tip itself; four valves in the place of one cost a percent."""
     reduction_pct = residual_reduction_pct(
@@ -77,6 +78,7 @@ def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
     assert loading[1] > 0.9 * loading[0]  # it takes nothing of the swing away
 
 
+@pytest.mark.slow
 def test_drive_joint_by_joint_is_recorded() -> None:
     deployment = load_deployment(CONFIG / "forwarder-joints.yaml")
     recording = drive(deployment, SCRIPTS["loading-joints"])

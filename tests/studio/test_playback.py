@@ -67,6 +67,7 @@ def test_a_log_shows_its_own_crane_and_what_each_deployment_would_have_done(tmp_
     assert valves[1] != valves[2]
 
 
+@pytest.mark.slow
 def test_a_log_of_joysticks_alone_has_no_recorded_crane(tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     rows = recorded(tmp_path / "all.log").read_text().splitlines(keepends=True)
@@ -74,6 +75,7 @@ def test_a_log_of_joysticks_alone_has_no_recorded_crane(tmp_path: Path) -> None:
     assert list(opened(log, "forwarder.yaml")[1]) == ["forwarder"]
 
 
+@pytest.mark.slow
 def test_a_black_box_is_played_as_it_was_next_to_another_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,6 +108,7 @@ def test_of_a_pause_there_are_no_pictures_and_no_silence_is_reported_in_it(tmp_p
     assert not [text for text in texts(playback, "forwarder") if "silent" in text]
 
 
+@pytest.mark.slow
 def test_of_a_long_log_the_first_pictures_or_those_of_a_window_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -150,6 +153,7 @@ def test_the_worst_drives_of_a_campaign_can_be_chosen(tmp_path: Path) -> None:
     assert choices[0].load().title in choices[0].title
 
 
+@pytest.mark.slow
 def test_what_cannot_be_opened_is_reported(tmp_path: Path) -> None:
     log = recorded(tmp_path / "drive.log", without=frozenset((0x110, 0x111)))
     (tmp_path / "none").mkdir()

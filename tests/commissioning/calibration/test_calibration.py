@@ -43,6 +43,7 @@ def measured(deployment: Deployment, *changes: str, ramp: Ramp = RAMP) -> Calibr
     return drive.result()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("deadband", "more", "gain", "dead_time"),
     [
@@ -223,6 +224,7 @@ def test_wrong_options_are_reported(arguments: list[str], says: str) -> None:
     assert says in reported.output
 
 
+@pytest.mark.slow
 def test_a_signal_that_is_none_of_the_axis_is_reported(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "VerticalSpeed"), RAMP)
     run_simulated(drive, deployment, None, nothing)

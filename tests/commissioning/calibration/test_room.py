@@ -24,6 +24,7 @@ def of_joint(axis: str, ramp: Ramp) -> CalibrationDrive:
     return drive
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["lift_cylinder", "knuckle", "extension"])
 def test_a_joint_has_room_for_the_ramp_that_is_proposed(axis: str) -> None:
     """The lift cylinder begins at its upper end, and is brought back first."""

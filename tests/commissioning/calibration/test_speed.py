@@ -146,6 +146,7 @@ def test_it_waits_for_every_joystick() -> None:
     assert drive.waiting_for == "the joystick of near_far"
 
 
+@pytest.mark.slow
 def test_in_a_gateway_the_frames_of_the_joystick_move_the_crane() -> None:
     deployment = load_deployment(ROOT / "config" / "gateway-forwarder.yaml")
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)

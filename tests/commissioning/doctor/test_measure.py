@@ -112,6 +112,7 @@ def children() -> list[int]:
     return [int(p) for p in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
 
 
+@pytest.mark.slow
 def test_no_process_outlives_its_block() -> None:
     before = children()
     with pytest.raises(ZeroDivisionError), Children() as processes:

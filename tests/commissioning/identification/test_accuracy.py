@@ -131,6 +131,7 @@ STROKES = [Push("near_far", 2, 0.7, 0.4), Push("near_far", 22, 0.7, -0.3)]
 BUSY = [Push("near_far", 2.0 * k, 1.0, 0.3 * (-1) ** k) for k in range(20)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
 def test_full_speed_by_single_strokes(kind: Kind) -> None:
     finding = identify("near_far", "", [drive(STROKES, 45.0, kind, 1)])
@@ -154,6 +155,7 @@ def check_driven(finding: Finding) -> None:
     assert finding.full_speed_m_s.value == pytest.approx(1.0, rel=0.12)
 
 
+@pytest.mark.slow
 def test_driving_in_the_log_is_not_taken_for_a_free_swing() -> None:
     """Without commands too: the shape tells where the free swing begins."""
     reported = driven(40.0, STROKES)

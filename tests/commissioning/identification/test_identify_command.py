@@ -143,6 +143,7 @@ def test_sets_where_the_deployment_knows_the_grapple(
     assert "- breakpoint: 1200 # 1200 sway: { period_s: 2.7" in said(result)
 
 
+@pytest.mark.slow
 def test_a_log_without_a_deployment(tmp_path: Path, logs: Path) -> None:
     dbc = ROOT / "dbc" / "forwarder.dbc"
     options = "--dbc", dbc, "--signal", "boom=GrappleSway.SwayParallel"

@@ -114,6 +114,7 @@ def test_the_same_data_is_good_enough() -> None:
     assert not finding.notes
 
 
+@pytest.mark.slow
 def test_only_noise() -> None:
     time = times(60.0)
     for seed in range(10):
@@ -153,6 +154,7 @@ def test_a_pressure_serves_too() -> None:
     assert finding.damping_ratio.value == pytest.approx(RATIO, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
     """A stronger oscillation, of the pump or the boom, is passed over."""
     value = decay(T25, 2.0) + decay(T25, 6.0, period=0.7, ratio=0.02) + noise(len(T25), 0.05)

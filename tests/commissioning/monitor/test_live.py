@@ -141,6 +141,7 @@ def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
     assert [m for m in from_our_bus if m.channel == GROUP] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["monitor", "record"])
 @pytest.mark.parametrize(
     ("number", "codes"), [(signal.SIGINT, (130, -2)), (signal.SIGTERM, (-15,))]

@@ -192,6 +192,7 @@ class _Interrupted(Prompts):
         raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_an_interrupted_step_leaves_the_others_as_they_were(machine: Path) -> None:
     one = procedure()
     one.accept(one.run(one.step("buses")))
@@ -223,6 +224,7 @@ def test_answers_come_from_a_file(machine: Path) -> None:
     assert "answers.txt:1: joysticks: accept: expected one of yes, again, skip, stop" in shown
 
 
+@pytest.mark.slow
 def test_state_is_read_as_it_was_written(machine: Path) -> None:
     one = procedure()
     one.accept(one.run(one.step("buses")))

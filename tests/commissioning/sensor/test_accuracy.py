@@ -35,11 +35,13 @@ def judge(drive: Drive, case: Sequence[float], part: float = 1.0) -> Finding:
     return finding
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "axis"), SOME)
 def test_an_angle(case: Sequence[float], axis: str) -> None:
     judge(Drive(machine(), axis, case[-1]), case)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "axis"), SOME[::2])
 def test_a_rate(case: Sequence[float], axis: str) -> None:
     judge(Drive(machine(*GYRO), axis, case[-1]), case, 3.0)
@@ -89,6 +91,7 @@ def test_what_is_written() -> None:
     assert off["offset_max_deg"] == 6
 
 
+@pytest.mark.slow
 def test_a_valve_that_is_quicker_than_the_file_says_lowers_its_lag() -> None:
     slow = machine(("timeout_ms: 80 }", "timeout_ms: 80, valve_lag_ms: 200 }"))
     bound = slow.axes["near_far"]

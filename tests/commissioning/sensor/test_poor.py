@@ -43,10 +43,12 @@ def pushed(time: Array, at_s: float, degrees: float = 6.0) -> Array:
     return math.radians(degrees) * np.exp(-0.14 * after) * np.sin(2.85 * after)
 
 
+@pytest.mark.slow
 def test_the_same_data_is_good_enough() -> None:
     assert not examine(AXIS, good()).poor
 
 
+@pytest.mark.slow
 def test_nothing_moved() -> None:
     refused(at_rest(), "expected near_far driven alone for 2 s or more, got 0.0 s", DRIVE_IT)
 
@@ -77,6 +79,7 @@ def test_one_push_is_seen_or_does_no_harm(at_s: float) -> None:
     assert finding.poor or abs(finding.delay_s.value - 0.05) < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", ["slew", "lift"])
 def test_another_axis_moves_all_the_time(other: str) -> None:
     both = tuple(replace(s, axis=other, level=0.3) for s in hand_driven(["near_far"]).strokes)
@@ -142,6 +145,7 @@ def test_another_unit(factor: float) -> None:
     refused(fine, "the file has 1: is the unit in the DBC right?")
 
 
+@pytest.mark.slow
 def test_a_delay_of_more_than_a_quarter_of_a_swing() -> None:
     refused(Drive(machine()).series(delay_s=0.6), "expected a delay up to 550 ms, a quarter")
 

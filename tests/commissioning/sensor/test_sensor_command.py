@@ -86,6 +86,7 @@ def test_what_a_log_shows_is_written_and_then_trusted(tmp_path: Path, file: Path
     assert trust(file) == ["UNPROVED", "TRUSTED"]
 
 
+@pytest.mark.slow
 def test_what_is_too_poor_is_not_written(tmp_path: Path, file: Path) -> None:
     log, before = tmp_path / "drive.log", file.read_bytes()
     log_simulated(log, load_deployment(file), REAL, Script("rest", (), 20.0))
@@ -164,6 +165,7 @@ def own_signals() -> Iterator[None]:
         signal.signal(number, handler)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_signals")
 def test_live_it_listens_to_what_is_driven(tmp_path: Path) -> None:
     """A rest of three seconds of another program: kept as a log, what is missing is reported."""
@@ -197,6 +199,7 @@ def test_live_it_listens_to_what_is_driven(tmp_path: Path) -> None:
     assert " 410#" in (tmp_path / "sensor.log").read_text()
 
 
+@pytest.mark.slow
 def test_a_log_without_the_sensor(tmp_path: Path, file: Path) -> None:
     log = tmp_path / "drive.log"
     log_simulated(log, machine(), CraneParameters(), hand_driven(["near_far"]))

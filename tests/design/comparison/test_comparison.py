@@ -61,6 +61,7 @@ def test_the_load_is_picked_up_while_the_joysticks_are_neutral() -> None:
     assert set(load.script.strokes) < set(SCRIPTS["loading"].strokes)
 
 
+@pytest.mark.slow
 def test_a_pulse_with_robust_and_off(deployment: Deployment, by_name: dict[str, Candidate]) -> None:
     pulse = task("pulse near-far")
     off = measure(deployment, by_name["off"], pulse, 0)
@@ -129,6 +130,7 @@ def test_initial_sway_hangs_along_the_boom(
     assert swinging.peak_deg >= 10.0
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_gives(
     deployment: Deployment, by_name: dict[str, Candidate]
 ) -> None:

@@ -70,6 +70,7 @@ def test_rows_and_recommendations(deployment: Deployment) -> None:
     assert better.name == ROBUST
 
 
+@pytest.mark.slow
 def test_the_tables_fit_80_columns(
     deployment: Deployment, capsys: pytest.CaptureFixture[str]
 ) -> None:

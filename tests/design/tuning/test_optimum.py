@@ -106,6 +106,7 @@ def test_the_result_does_not_depend_on_the_scale_of_the_pendulum() -> None:
     assert b.poles_rad_s[0] == pytest.approx(a.poles_rad_s[0] / 2.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_long_grids_solve_too() -> None:
     tuning = tune(Task(MODE, tick_s=0.005), 1)
     assert tuning.poles_rad_s == pytest.approx((-2.8592, -2.8592), rel=1e-3)
@@ -145,6 +146,7 @@ def test_no_poles_are_held_apart_by_nothing() -> None:
     assert tuning.poles_rad_s == pytest.approx((-2.6146, -3.7011), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_pole_distance_in_both_senses() -> None:
     far = 5.0 * MODE.pole.real
     heavy = SwayMode(MODE.omega_rad_s, 0.3)
@@ -182,6 +184,7 @@ def test_each_requirement_is_kept_by_the_running_filter() -> None:
             assert np.max(np.abs(np.diff(y, prepend=0.0))) <= 5.0 * 0.02 * (1.0 + 1e-6)
 
 
+@pytest.mark.slow
 def test_third_pole_takes_the_jump_away() -> None:
     """Three poles that keep a full step within 5 full speeds per second lie near 3.5 rad/s."""
     tuning = tune(Task(MODE, require=Requirements(third_pole=True, max_rate_per_s=5.0)))

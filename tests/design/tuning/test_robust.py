@@ -79,6 +79,7 @@ def test_time_optimal_limit(rate: float, low: float, seconds: float) -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_cannot_be_is_refused_with_what_can() -> None:
     with pytest.raises(ValueError, match=r"duration: expected 0.2 s or more, got 0.1 s"):
         least_residual(MODE, duration_s=0.1, range_pct=15.0, **VALVE)

@@ -73,6 +73,7 @@ def test_write_lengthens_a_tail_that_is_too_short(file: Path) -> None:
     assert warning in " ".join(checked.split())
 
 
+@pytest.mark.slow
 def test_a_filter_that_the_adjustable_range_refuses_is_not_written(file: Path) -> None:
     adjustable = "adjustable: { axes.slew.sway.period_s: [1.5, 3.0] }"
     before = f"{file.read_text()}\ncontrol: {{ socket: /tmp/machine.sock, {adjustable} }}\n"
@@ -83,11 +84,13 @@ def test_a_filter_that_the_adjustable_range_refuses_is_not_written(file: Path) -
     assert file.read_text() == before
 
 
+@pytest.mark.slow
 def test_a_tail_too_short_is_reported(file: Path) -> None:
     assert "tail_s is 2 s" in run(str(file), "--axis", "near_far", "--duration", "2.4")[1]
     assert "tail_s" not in run(str(file), "--axis", "near_far", "--duration", "1.6")[1]
 
 
+@pytest.mark.slow
 def test_it_reports_how_far_the_tip_travels_and_what_a_longer_tail_would_need(file: Path) -> None:
     words = (str(file), "--axis", "near_far", "--duration")
     good, long = (" ".join(run(*words, seconds)[1].split()) for seconds in ("1.8", "2.4"))

@@ -216,6 +216,7 @@ def test_the_shortest_keeps_both_modes_below_the_residual() -> None:
     assert alone.duration_s <= covering.duration_s < alone.duration_s + 0.2
 
 
+@pytest.mark.slow
 def test_it_prints_what_the_second_mode_costs_and_gains(file: Path) -> None:
     status, output = robust(file, "--second", option(), "--duration", "1.8")
     assert status == 0
@@ -224,6 +225,7 @@ def test_it_prints_what_the_second_mode_costs_and_gains(file: Path) -> None:
     assert "with it 1.80 0.84 9.6 4.8" in output
 
 
+@pytest.mark.slow
 def test_the_file_records_it(file: Path) -> None:
     bound = designed(file, "--second", option(25.0))
     design = bound.config.filter.design()

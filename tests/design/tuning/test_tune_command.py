@@ -170,6 +170,7 @@ def test_limits_that_the_file_leaves_out_get_a_section(file: Path) -> None:
     assert load_config(file)[0].axes["near_far"].limits.tail_s == 2.6
 
 
+@pytest.mark.slow
 def test_another_filter_is_replaced_on_write(file: Path) -> None:
     file.write_text(
         file.read_text().replace("{ kind: gff, a1: 0.708, a2: 0.12 }\n", "{ kind: zv }\n")
@@ -180,6 +181,7 @@ def test_another_filter_is_replaced_on_write(file: Path) -> None:
     assert load_config(file)[0].axes["slew"].filter.kind == "gff"
 
 
+@pytest.mark.slow
 def test_length_range_takes_the_tail_as_run_on(file: Path) -> None:
     result = run(file, "--axis", "near_far", "--length-range", "15", "--json")
     assert result.exit_code == 0, result.output
