@@ -1,8 +1,10 @@
 """Whatever happens to an axis, these things hold: an independent oracle watches every tick.
 
 It knows inputs and outputs, nothing of the axis' inside. Time is in ticks, missed ones included.
+The joystick moves the axis, and in some machines a motion of two axes, which asks for anything.
 """
 
+import copy
 import math
 
 from hypothesis import HealthCheck, settings
@@ -20,25 +22,22 @@ from tests.shaping.axis_histories import (
     CAUSES,
     SETUPS,
     SWITCHES,
+    WAYS,
     Setup,
     Wild,
+    additions,
     anything,
     durations,
     joysticks,
     modes,
 )
 
+History = tuple[CommandInput, float]
+histories = st.tuples(anything, st.just(0.0) | additions)
 MODE = SwayMode(2.86, 0.05)
 DRIVEN = (State.ACTIVE, State.BYPASS_ON)
 MAY_MOVE = (*DRIVEN, State.STOPPING)
-WAYS = {
-    State.NEUTRAL_WAIT: {State.READY, State.TRIPPED},
-    State.READY: {State.NEUTRAL_WAIT, State.ACTIVE, State.BYPASS_ON, State.TRIPPED},
-    State.ACTIVE: {State.READY, State.BYPASS_ON, State.STOPPING, State.TRIPPED},
-    State.BYPASS_ON: {State.READY, State.ACTIVE, State.STOPPING, State.TRIPPED},
-    State.STOPPING: {State.NEUTRAL_WAIT, State.TRIPPED},
-    State.TRIPPED: {State.NEUTRAL_WAIT},
-}
+DEAF = (State.NEUTRAL_WAIT, State.TRIPPED, State.STOPPING)
 
 
 class AxisUnderWatch(RuleBasedStateMachine):
@@ -53,20 +52,24 @@ class AxisUnderWatch(RuleBasedStateMachine):
         shaper = self.shaper(model, (-5.655, -4.112))
         rest = {"neutral_band": BAND, "stop_s": setup.stop_s, "grid_steps": setup.steps}
         self.axis = ShapedAxis(setup.tick_s, limits, sway=model, shaper=shaper, **rest)
+        self.axis.allow_added(setup.added, 3600.0)
         self.shadow = SwayModel(MODE, setup.tick_s)  # the hanging tool, as far as it is known
         self.rise, self.fall = limits.rise_per_s * setup.tick_s, limits.fall_per_s * setup.tick_s
         # Rates act before rounding. Half a step to either side makes one step; one and a half where
         # one of the two had to be rounded down because of a bound.
         self.slack = 1.5 / (setup.steps * (1.0 - limits.deadband)) + 1e-12
         self.tail = round(limits.tail_s / setup.tick_s)
+        self.falling = math.ceil(limits.maximum / self.fall)  # ticks from full speed
         self.stop = max(1, round(setup.stop_s / setup.tick_s))
-        self.joystick = CommandInput()
+        self.joystick, self.added = CommandInput(), 0.0
         # the oracle's memory
         self.now = 0
         self.armed = False  # joystick seen valid, enabled and neutral since it last was not usable
-        # when which command was given by such a joystick
+        # when which command was given by such a joystick, since the axis was at rest, and in all
         self.commanded: list[tuple[int, float]] = []
-        self.overtime = 0  # ticks since the tail after the last of them ended
+        self.demanded: list[tuple[int, float]] = []
+        self.mixed = False  # something was added since the axis was at rest
+        self.overtime = 0  # ticks for which nothing has moved it, beyond the tail
         self.stop_from = 0
         self.enabled_before = self.reset_before = True
         self.tick()
@@ -76,27 +79,50 @@ class AxisUnderWatch(RuleBasedStateMachine):
             return Gff(model, poles)
         return self.wild if self.setup.filter == "wild" else Off()
 
-    @rule(command=joysticks, ticks=durations)
-    def push(self, command: float, ticks: int) -> None:
+    @rule(command=joysticks, added=st.just(0.0) | additions, ticks=durations)
+    def push(self, command: float, added: float, ticks: int) -> None:
+        self.added = added
         self.keep(self.joystick._replace(command=command), ticks)
+
+    @rule(added=st.lists(additions, min_size=1, max_size=20))
+    def ask(self, added: list[float]) -> None:
+        for self.added in added:
+            self.tick()
+
+    @rule(bad=st.sampled_from([math.nan, math.inf, -math.inf, 1.1, -1e300]))
+    def ask_for_nonsense(self, bad: float) -> None:
+        """It trips an axis that would carry it out, and is nothing to any other."""
+        before, self.added = self.axis.state, bad
+        self.tick()
+        if self.setup.added and before not in DEAF and self.usable and not self.joystick.bypass:
+            assert (self.axis.state, self.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
+        self.added = 0.0
+
+    @rule()
+    def let_go(self) -> None:
+        """At rest after tail or stop, and the time to fall from full speed."""
+        self.added = 0.0
+        self.keep(CommandInput(reset=True), max(self.tail, self.stop) + self.falling + 10)
+        assert self.axis.raw == 0
+        assert self.axis.state in (State.READY, State.TRIPPED)
 
     @rule(command=joysticks, ticks=durations, then=durations)
     def stroke(self, command: float, ticks: int, then: int) -> None:
         """Get going, if need be, and reverse."""
         if self.axis.state not in (State.READY, *DRIVEN):
             self.recover()
-        self.push(command, ticks)
-        self.push(-command, then)
+        self.push(command, 0.0, ticks)
+        self.push(-command, 0.0, then)
 
     @rule()
     def recover(self) -> None:
         """What an operator does when nothing moves: let go, switch off and on."""
-        self.joystick = CommandInput(bypass=self.joystick.bypass)
+        self.joystick, self.added = CommandInput(bypass=self.joystick.bypass), 0.0
         self.keep(self.joystick._replace(enabled=False), 1)
         self.keep(self.joystick, 2)
 
-    @rule(cause=st.sampled_from(CAUSES), ticks=durations, then=st.lists(anything, max_size=5))
-    def fail(self, cause: tuple[str, Reason], ticks: int, then: list[CommandInput]) -> None:
+    @rule(cause=st.sampled_from(CAUSES), ticks=durations, then=st.lists(histories, max_size=5))
+    def fail(self, cause: tuple[str, Reason], ticks: int, then: list[History]) -> None:
         name, reason = cause
         self.keep(self.joystick._replace(**{name: reason}), ticks)
         self.joystick = self.joystick._replace(**{name: None})
@@ -106,10 +132,10 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def switch(self, name: str, on: bool, ticks: int) -> None:
         self.keep(self.joystick._replace(**{name: on}), ticks)
 
-    @rule(inputs=st.lists(anything, min_size=1, max_size=12))
-    def chaos(self, inputs: list[CommandInput]) -> None:
+    @rule(inputs=st.lists(histories, min_size=1, max_size=12))
+    def chaos(self, inputs: list[History]) -> None:
         before = self.joystick
-        for self.joystick in inputs:
+        for self.joystick, self.added in inputs:
             self.tick()
         self.joystick = before
 
@@ -117,7 +143,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def miss(self, ticks: int) -> None:
         self.axis.hold(ticks)
         for _ in range(ticks):
-            self.shadow.step(self.axis.sent)
+            self.shadow.step(self.axis.applied)
         self.now += ticks
 
     @rule(mode=modes, pole=st.floats(-8.0, -0.5), ticks=durations)
@@ -125,7 +151,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
         known = self.axis.sway is not None
         self.axis.retune(mode, lambda model: self.shaper(model, (pole, 1.5 * pole)))
         fresh = SwayModel(mode, self.setup.tick_s)
-        self.shadow = self.shadow.retuned(mode, self.axis.sent) if known else fresh
+        self.shadow = self.shadow.retuned(mode, self.axis.applied) if known else fresh
         self.keep(self.joystick, ticks)
 
     @rule(says=st.one_of(joysticks, st.sampled_from([1e300, -1e300, math.nan, math.inf])))
@@ -140,13 +166,21 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def tick(self) -> None:
         joystick, axis = self.joystick, self.axis
         old, sent_before = axis.state, axis.sent
-        transition = axis.tick(joystick)
-        self.now += 1
-        if axis.state is State.TRIPPED and axis.reason is Reason.OUTPUT_INVALID and transition:
-            self.shadow = SwayModel(self.shadow.mode, self.setup.tick_s)
-        self.shadow.step(axis.sent)
         self.usable = joystick.fault is None and joystick.trip is None and joystick.enabled
         self.centred = joystick.fault is None and abs(joystick.command) <= BAND
+        adds = bool(self.setup.added) and self.usable and not joystick.bypass and old not in DEAF
+        twin = copy.deepcopy(axis) if self.setup.added and self.added and not adds else None
+        transition = axis.tick(joystick, self.added)
+        if twin is not None:  # nothing that may be added to
+            twin.tick(joystick)
+            assert (axis.state, axis.raw, axis.sent) == (twin.state, twin.raw, twin.sent)
+            assert axis.applied == twin.applied == axis.sent
+        self.now += 1
+        self.carried = self.added if adds and axis.state is State.ACTIVE else 0.0
+        assert axis.applied == axis.sent - self.carried
+        if axis.state is State.TRIPPED and axis.reason is Reason.OUTPUT_INVALID and transition:
+            self.shadow = SwayModel(self.shadow.mode, self.setup.tick_s)
+        self.shadow.step(axis.applied)
         self.remember()
         self.check_frame()
         self.check_way(old, transition, sent_before)
@@ -157,9 +191,13 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def remember(self) -> None:
         """What the operator asked for, by the inputs alone."""
         if self.usable and self.armed and not self.centred:
-            self.commanded.append((self.now, self.joystick.command))
-        self.commanded = [(at, c) for at, c in self.commanded if self.now - at <= self.tail]
-        self.overtime = 0 if self.commanded else self.overtime + 1
+            for demands in (self.commanded, self.demanded):
+                demands.append((self.now, self.joystick.command))
+        since = self.now - self.tail if self.axis.state in MAY_MOVE else self.now + 1
+        self.commanded = [(at, c) for at, c in self.commanded if at >= since]
+        self.demanded = [(at, c) for at, c in self.demanded if self.now - at <= self.tail]
+        self.mixed = bool(self.carried) or (self.mixed and self.axis.raw != 0)
+        self.overtime = 0 if self.commanded or self.carried else self.overtime + 1
         self.armed = self.usable and (self.armed or self.centred)
 
     def check_frame(self) -> None:
@@ -186,7 +224,9 @@ class AxisUnderWatch(RuleBasedStateMachine):
             if axis.state in (*DRIVEN, State.READY):
                 assert self.usable
             assert axis.state is not State.READY or self.centred
-            assert old is not State.READY or axis.state not in DRIVEN or not self.centred
+            if old is State.READY and axis.state in DRIVEN and self.centred:
+                assert self.carried
+                assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
         if old is State.TRIPPED and axis.state is not State.TRIPPED:
             assert self.centred
             assert joystick.trip is None
@@ -213,14 +253,16 @@ class AxisUnderWatch(RuleBasedStateMachine):
         assert joystick.trip is None
         assert joystick.fault is not None or joystick.enabled
         assert joystick.fault is None or axis.state is State.STOPPING
-        # after the tail, as long as it takes to fall from full speed
-        assert self.overtime <= math.ceil(self.limits.maximum / self.fall)
+        assert self.overtime <= self.falling
 
     def check_speed(self, before: float) -> None:
         """Not faster than asked within the tail, not against the joystick, except while falling."""
         limits, sent = self.limits, self.axis.sent
-        high = max([0.0, *(c for _, c in self.commanded)])
-        low = max([0.0, *(-c for _, c in self.commanded)])
+        # Where something is added, demands count that a stop or a trip came after.
+        demands = self.demanded if self.mixed else self.commanded
+        most = self.setup.added if self.mixed else 0.0
+        high = max([0.0, *(c for _, c in demands)]) or most
+        low = max([0.0, *(-c for _, c in demands)]) or most
         if limits.allow_faster:
             high, low = math.ceil(high), math.ceil(low)
         if limits.allow_reverse:
@@ -230,7 +272,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
         elif self.axis.state in DRIVEN and self.axis.command < 0.0:
             high = 0.0
         allowed, falling = (high, before) if sent > 0.0 else (low, -before)
-        falling = min(falling, falling - self.fall + self.slack)
+        # The own part falls by the rate, whatever is added; so it does where that has ended.
+        falling = min(falling, falling - (not self.mixed) * self.fall + self.slack)
         assert abs(sent) <= max(allowed, falling, 0.0) + 1e-12
 
     def check_rate(self, old: State, before: float) -> None:
