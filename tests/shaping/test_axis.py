@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.states import CommandInput, Reason, State, Transition
 
 Drive = Any  # the class of conftest.py
@@ -38,64 +37,12 @@ def test_the_first_move_takes_two_ticks_of_a_centred_joystick(drive: Drive) -> N
     assert drive.axis.command == 0.8
 
 
-@pytest.mark.parametrize("command", [0.021, -0.021, 1.0])
-def test_a_joystick_that_was_never_neutral_moves_nothing(drive: Drive, command: float) -> None:
-    refused_start(drive, CommandInput(command), Reason.JOYSTICK_NOT_NEUTRAL)
-
-
-def test_a_joystick_that_is_not_enabled_moves_nothing(drive: Drive) -> None:
-    refused_start(drive, CommandInput(enabled=False), Reason.ENABLE_OFF)
-
-
 @pytest.mark.parametrize("fault", LOST)
 def test_a_joystick_that_is_not_valid_moves_nothing(drive: Drive, fault: Reason) -> None:
     refused_start(drive, CommandInput(fault=fault), fault)
 
 
-def test_enabling_a_joystick_that_was_moved_before_moves_nothing(drive: Drive) -> None:
-    drive.to_ready()
-    assert drive.run(CommandInput(0.8, enabled=False), 0.2) == [
-        Transition(State.READY, State.NEUTRAL_WAIT, Reason.ENABLE_OFF)
-    ]
-    refused_start(drive, PUSHED, Reason.JOYSTICK_NOT_NEUTRAL)
-    drive.to_ready().tick(PUSHED)
-    assert drive.state is State.ACTIVE
-
-
-@pytest.mark.parametrize("fault", LOST)
-def test_a_joystick_lost_while_ready_has_to_be_seen_neutral_again(
-    drive: Drive, fault: Reason
-) -> None:
-    drive.to_ready()
-    lost = drive.tick(CommandInput(fault=fault))
-    assert lost == Transition(State.READY, State.NEUTRAL_WAIT, fault)
-    refused_start(drive, PUSHED, Reason.JOYSTICK_NOT_NEUTRAL)
-
-
-@pytest.mark.parametrize("command", [0.0, 0.02, -0.02])
-def test_within_the_neutral_band_nothing_moves(drive: Drive, command: float) -> None:
-    drive.to_ready()
-    assert drive.run(CommandInput(command), 1.0) == []
-    assert not any(drive.raw)
-
-
 # -- release ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("bypass", [False, True])
-@pytest.mark.parametrize("tail_s", [0.0, 0.5, 2.0])
-def test_after_release_the_run_on_is_bounded(
-    drive_with: DriveWith, tail_s: float, bypass: bool
-) -> None:
-    limits = OutputLimits(fall_per_s=2.0, tail_s=tail_s)
-    drive = drive_with(limits=limits).moving(1.0, bypass=bypass)
-    before = len(drive.sent)
-    (ready,) = drive.run(CommandInput(bypass=bypass), 5.0)
-    assert ready.new is State.READY
-    assert ready.reason is Reason.AT_REST
-    moved_s = 0.02 * sum(map(bool, drive.raw[before:]))
-    assert moved_s <= tail_s + 1.0 / limits.fall_per_s + 0.02
-    assert not any(drive.raw[before + round((tail_s + 0.5) / 0.02) + 1 :])
 
 
 def test_a_reversal_within_the_run_on_goes_on_at_once(drive: Drive) -> None:
@@ -118,29 +65,6 @@ def test_a_lost_joystick_gives_a_shaped_stop(drive: Drive, fault: Reason, bypass
     assert done == Transition(State.STOPPING, State.NEUTRAL_WAIT, Reason.STOP_DONE)
     assert drive.axis.raw == 0
     assert drive.axis.reason is fault
-
-
-@pytest.mark.parametrize("stop_s", [0.02, 0.1, 0.6])
-def test_a_stop_is_bounded_in_time_whatever_the_filter_wants(
-    drive_with: DriveWith, stop_s: float
-) -> None:
-    class Stubborn:
-        def step(self, command: float) -> float:
-            return 1.0
-
-    drive = drive_with(Stubborn(), OutputLimits(tail_s=2.0), stop_s=stop_s).moving()
-    before = len(drive.raw)
-    drive.run(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), 3.0)
-    assert sum(map(bool, drive.raw[before:])) == round(stop_s / 0.02)
-    assert not any(drive.raw[before + round(stop_s / 0.02) :])
-
-
-def test_a_joystick_that_comes_back_in_a_stop_has_to_be_seen_neutral(drive: Drive) -> None:
-    drive.moving().tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
-    (done,) = drive.run(PUSHED, 3.0)
-    assert done.new is State.NEUTRAL_WAIT
-    assert drive.axis.reason is Reason.JOYSTICK_NOT_NEUTRAL
-    drive.to_ready()
 
 
 def test_a_released_enable_is_more_than_a_lost_frame(drive: Drive) -> None:

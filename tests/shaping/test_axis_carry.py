@@ -27,7 +27,7 @@ def axis_with(limits: OutputLimits, steps: int = 125) -> ShapedAxis:
     return axis
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1.1])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1.1, -1.1])
 @pytest.mark.parametrize("command", [0.0, 0.5])
 def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> None:
     axis = axis_with(OutputLimits(tail_s=0.4))

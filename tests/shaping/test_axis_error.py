@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from canshaper.shaping.axis import ShapedAxis
+from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.output import Output
 from canshaper.shaping.states import CommandInput, Reason, State, Transition
 
@@ -82,6 +84,15 @@ def test_an_added_velocity_that_is_none_is_named_too(drive_with: DriveWith) -> N
     tripped = drive.moving().axis.tick(PUSHED, math.nan)
     assert tripped == INVALID
     assert tripped.error.startswith("ValueError: added velocity is nan (")
+
+
+def test_an_axis_without_a_sway_model_trips_too() -> None:
+    faulty = Faulty()
+    axis = ShapedAxis(0.02, OutputLimits(), sway=None, shaper=faulty)
+    axis.tick(CommandInput())
+    faulty.error = ZeroDivisionError("again")
+    assert axis.tick(PUSHED) == Transition(State.READY, State.TRIPPED, Reason.OUTPUT_INVALID)
+    assert axis.raw == 0
 
 
 def test_a_filter_that_goes_on_raising_is_reported_once(drive_with: DriveWith) -> None:

@@ -138,17 +138,6 @@ def test_full_speed_may_be_added(drive_with: DriveWith, sign: float) -> None:
     assert axis.sent == sign
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_in_motion_the_edge_of_the_neutral_band_is_neutral(drive: Drive, sign: float) -> None:
-    """As at rest: no one can hold an axis in motion where no one could have started it."""
-    drive.moving(0.8 * sign).tick(CommandInput(0.02 * sign))
-    assert drive.axis.command == 0.0
-    drive.tick(CommandInput(0.021 * sign))
-    assert drive.axis.command == 0.021 * sign
-    (ready,) = drive.run(CommandInput(0.02 * sign), 3.0)
-    assert (ready.new, ready.reason) == (State.READY, Reason.AT_REST)
-
-
 def test_an_axis_that_starts_latched_is_not_freed_by_an_enable_that_is_held(drive: Drive) -> None:
     drive.axis.restore(State.TRIPPED, Reason.EMERGENCY_STOP)
     drive.run(CommandInput(), 0.2)

@@ -115,12 +115,6 @@ def test_the_way_out_of_a_trip_is_an_edge_with_a_centred_joystick(
     assert drive.state is State.ACTIVE
 
 
-def test_switches_that_are_on_at_the_start_make_no_edge(drive: Drive) -> None:
-    drive.tick(CommandInput(reset=True, trip=Reason.SEND_FAILED))
-    drive.run(RESET, 0.2)
-    assert drive.state is State.TRIPPED
-
-
 # -- a filter gone wrong ---------------------------------------------------------------------------
 
 

@@ -62,15 +62,6 @@ def test_a_tick_is_spent_at_most_once(target: float, last: float, rise: float, f
         assert spent == pytest.approx(1.0)  # and none of it is wasted
 
 
-@given(velocities, velocities, rates, rates)
-def test_the_rate_limit_gets_there(target: float, last: float, rise: float, fall: float) -> None:
-    ticks = 0
-    while last != target:
-        last = rate_limited(target, last, rise, fall)
-        ticks += 1
-        assert ticks <= math.ceil(2.0 / min(rise, fall)) + 2
-
-
 # -- what the operator allows ----------------------------------------------------------------------
 
 DEFAULT = OutputLimits()
@@ -106,25 +97,6 @@ def test_allowed_range(
     expected: tuple[float, float],
 ) -> None:
     assert allowed_range(*recent, limits) == expected
-
-
-@given(
-    st.lists(velocities, min_size=1, max_size=20),
-    st.floats(0.1, 1.0),
-    st.booleans(),
-    st.booleans(),
-)
-def test_the_range_holds_neutral_and_is_symmetric(
-    commands: list[float], maximum: float, faster: bool, reverse: bool
-) -> None:
-    limits = OutputLimits(maximum=maximum, allow_faster=faster, allow_reverse=reverse)
-    lowest, highest = min(0.0, *commands), max(0.0, *commands)
-    low, high = allowed_range(lowest, highest, limits)
-    assert -maximum <= low <= 0.0 <= high <= maximum
-    assert allowed_range(-highest, -lowest, limits) == (-high, -low)
-    if not faster and not reverse:
-        assert lowest <= low
-        assert high <= highest
 
 
 # -- minimum and non-numbers -----------------------------------------------------------------------

@@ -3,19 +3,24 @@
 import math
 import random
 from itertools import pairwise
+from unittest.mock import Mock
 
 import pytest
 
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir, zv_taps
+from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.small_strokes import SMALL_S, SmallStrokes, least_velocity
-from canshaper.shaping.states import CommandInput, Reason
+from canshaper.shaping.states import CommandInput
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 from canshaper.shaping.valve_curve import ValveCurve
+from tests.shaping.observed import sensed_sway
 from tests.shaping.taps import LIMITS, MODE, TICK_S, axis_with, tapped
 
 LEVELS = (0.1, 0.13, 0.2, 0.34, 0.55, 0.79, 1.0)
 CURVE = ValveCurve((-1, -0.1, 0.1, 1), (-1, 0, 0, 0.8))
+SENSOR = SensorTiming(Measured.ANGLE, TICK_S, 0.0, 0.0, lost_s=0.07)
 DURATIONS = (0.06, 0.1, 0.14, 0.2, 0.3, 0.36, 0.46, 1.0)
 
 
@@ -215,18 +220,6 @@ def test_a_frame_of_one_step_has_full_speed_only() -> None:
     assert least_velocity(LIMITS, 1) == 1.0
 
 
-@pytest.mark.parametrize(
-    "joystick",
-    [CommandInput(enabled=False), CommandInput(trip=Reason.EMERGENCY_STOP)],
-    ids=["enable", "trip"],
-)
-def test_a_step_that_is_held_ends_at_once(joystick: CommandInput) -> None:
-    axis = axis_with()
-    assert tapped(axis, 0.1, 0.1, rest_s=0.4)[-1]
-    axis.tick(joystick)
-    assert axis.raw == 0
-
-
 def test_a_step_that_is_held_ends_with_the_tail() -> None:
     """Whatever is due: a valve's rate has kept the axis from it."""
     limits = OutputLimits(deadband=0.05, tail_s=0.4, rise_per_s=0.1)
@@ -269,3 +262,35 @@ def test_it_is_never_faster_than_asked_nor_against_the_joystick(seed: int) -> No
 )
 def test_the_least_velocity_of_a_frame(limits: OutputLimits, steps: int, velocity: float) -> None:
     assert least_velocity(limits, steps) == pytest.approx(velocity)
+
+
+def test_small_strokes_are_left_alone_only_while_swing_is_damped() -> None:
+    plain = tapped(axis_with(), 0.1, 0.1)
+    sent = {}
+    for weight in (0.0, 0.5):
+        axis = axis_with()
+        sway = axis.sway
+        assert sway is not None
+        axis.sensed = sensed_sway(sway, SENSOR, SensorLimits(0.002, 0.05), damps=True)
+        sent[weight] = []
+        for tick in range(len(plain)):
+            axis.sensed.weight = weight
+            axis.tick(CommandInput(0.1 if tick < 5 else 0.0))
+            sent[weight].append(axis.sent)
+    assert sent[0.0] == plain
+    assert sent[0.5] != plain
+
+
+def test_missed_ticks_count_and_a_retune_and_a_stop_lose_the_travel() -> None:
+    axis = axis_with()
+    for _ in range(20):
+        axis.tick(CommandInput(0.3))
+    axis._stage._small = small = Mock(wraps=axis._stage._small)
+    axis.hold(5)
+    small.hold.assert_called_once_with(axis.command, axis.applied, 5)
+    axis.tick(CommandInput(0.3))
+    assert not small.lose.called
+    axis.retune(MODE, lambda sway: Gff(sway, (-5.0, -4.0)))
+    assert small.lose.call_count == 1
+    axis.tick(CommandInput(enabled=False))
+    assert small.lose.call_count == 2
