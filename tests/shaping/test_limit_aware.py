@@ -7,13 +7,13 @@ import pytest
 
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import KINDS, build_shaper
+from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.fir import Fir, zv_taps
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import POLE_PER_OMEGA, LimitAware
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import CommandInput, Reason, State
+from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
@@ -66,7 +66,6 @@ def test_it_is_stretched_with_all_its_taps_at_the_same_period() -> None:
 RATE = OutputLimits(rise_per_s=2.0, fall_per_s=2.0, tail_s=3.0)
 CLIP = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, maximum=0.6, tail_s=3.0)
 FREE = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, tail_s=3.0)
-RELEASE = [1.0] * 100 + [0.0] * 600
 # Held against the swing in the middle of its run: the output may not go against the joystick.
 REVERSAL = [1.0] * 100 + [-0.3] * 30 + [0.8] * 60 + [0.0] * 600
 
@@ -115,98 +114,6 @@ def test_a_slow_valve_gets_feedback_that_it_can_follow(mode: SwayMode, rate: flo
         return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
 
     assert residual(aware=True) < 0.8 * residual(aware=False)
-
-
-@pytest.mark.slow
-@modes
-def test_a_million_restless_ticks_stay_bounded(mode: SwayMode) -> None:
-    sway = SwayModel(mode, TICK_S)
-    aware = LimitAware(sway, Fir(zv_taps(mode, TICK_S)))
-    source = random.Random(3)
-    command = sent = 0.0
-    for i in range(1_000_000):
-        if i % 37 == 0:
-            command = source.uniform(-1.0, 1.0)
-        unlimited = aware.step(command)
-        step = min(max(unlimited - sent, -0.05), 0.05)
-        sent = round(125.0 * min(max(sent + step, -0.7), 0.7)) / 125.0
-        sway.step(sent)
-        # A command that the valve cannot follow may ask for several times full speed, not more.
-        assert abs(unlimited) < 6.0
-    for _ in range(3000):
-        sent = aware.step(0.0)
-        sway.step(sent)
-    assert abs(sent) < 1e-9
-    assert math.hypot(mode.omega_rad_s * sway.angle, sway.rate + sent) < 1e-9
-
-
-class Broken:
-    """A shaper that fails on demand."""
-
-    def __init__(self, shaper: Fir) -> None:
-        self.shaper = shaper
-        self.broken = False
-
-    def step(self, command: float) -> float:
-        unlimited = self.shaper.step(command)
-        return math.nan if self.broken else unlimited
-
-
-def test_after_output_invalid_it_starts_again() -> None:
-    mode = MODES[1]
-    sway = SwayModel(mode, TICK_S)
-    broken = Broken(Fir(zv_taps(mode, TICK_S)))
-    axis = ShapedAxis(TICK_S, RATE, sway=sway, shaper=LimitAware(sway, broken))
-    for command in [0.0, *[1.0] * 70]:
-        axis.tick(CommandInput(command))
-    assert axis.sent > 0.5
-    broken.broken = True
-    axis.tick(CommandInput(1.0))
-    assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
-    broken.broken = False
-    axis.tick(CommandInput(enabled=False))
-    for _ in range(80):  # longer than the impulse response
-        axis.tick(CommandInput())
-    assert axis.state is State.READY
-    # From here on it does what a fresh one does.
-    fresh_sway = SwayModel(mode, TICK_S)
-    fresh = ShapedAxis(
-        TICK_S, RATE, sway=fresh_sway, shaper=LimitAware(fresh_sway, Fir(zv_taps(mode, TICK_S)))
-    )
-    fresh.tick(CommandInput())
-    for command in RELEASE:
-        axis.tick(CommandInput(command))
-        fresh.tick(CommandInput(command))
-        assert axis.raw == fresh.raw
-    assert fresh.raw == 0
-
-
-@modes
-def test_missed_ticks_leave_no_swing(mode: SwayMode) -> None:
-    """The output is held while the loop is late: the pendulum swings on, and is calmed again."""
-
-    def residual(*, known: bool) -> float:
-        sway = SwayModel(mode, TICK_S)
-        fir = Fir(zv_taps(mode, TICK_S))
-        limits = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, tail_s=4.0)
-        shaper = LimitAware(sway, fir) if known else fir
-        axis = ShapedAxis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
-        for i, command in enumerate([0.0, *RELEASE]):
-            if i in (20, 45, 130):
-                axis.hold(12)
-            axis.tick(CommandInput(command))
-        return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
-
-    bare = residual(known=False)
-    assert bare > 0.02
-    assert residual(known=True) < 0.05 * bare
-
-
-def test_a_swing_too_quick_for_the_tick_is_refused_in_the_words_of_the_user() -> None:
-    says = r"natural frequency: expected up to 17\.8571 rad/s .* tick of 0\.04 s, got 20 rad/s"
-    with pytest.raises(ValueError, match=says):
-        build_shaper("robust", 0.04, SwayModel(SwayMode(20.0, 0.0), 0.04), taps=[1.0])
-    build_shaper("robust", 0.04, SwayModel(SwayMode(17.8, 0.0), 0.04), taps=[1.0])
 
 
 def test_the_quickest_swing_for_a_tick_is_allowed() -> None:

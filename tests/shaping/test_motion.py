@@ -2,12 +2,9 @@
 
 import pytest
 
-from canshaper.shaping.motion import TwoAxisMotion
-from canshaper.shaping.moving_axis import MOST_STEP, MovingAxis
-from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.moving_axis import MOST_STEP
 from tests.shaping.two_axes import (
     NEAR_FAR,
-    OUT_M_S,
     STILL,
     TICK_S,
     TURN_RAD_S,
@@ -68,18 +65,6 @@ def test_near_far_alone_gets_nothing_added() -> None:
     assert set(added) == {(0.0, 0.0)}
 
 
-def test_what_a_missed_tick_has_added_more_is_taken_back() -> None:
-    axis = MovingAxis(OUT_M_S, TICK_S, SwayModel(NEAR_FAR, TICK_S))
-    axis.add(0.001, 1.0)
-    assert axis.added == pytest.approx(0.05)
-    axis.held(2 * TICK_S)
-    assert axis.reached == pytest.approx(0.003)
-    axis.add(0.001, 1.0)
-    assert axis.added == pytest.approx(-0.05)  # no further than a step in a tick
-    axis.add(0.001, 1.0)
-    assert axis.reached == pytest.approx(0.001)
-
-
 @pytest.mark.parametrize("radius_m", [2.0, 9.0])
 def test_no_step_of_the_added_part_is_large(radius_m: float) -> None:
     drive = Drive(start_m=radius_m)
@@ -112,31 +97,6 @@ def test_it_ends_in_a_fifth_of_a_second_where_an_axis_can_no_more_and_begins_fro
     slew.able = True
     drive.motion.step(TICK_S, 3.0)
     assert abs(near_far.added) <= MOST_STEP
-
-
-def test_a_lost_radius_is_carried_on_and_a_jump_of_it_moves_nothing_at_once() -> None:
-    pair = stroke(0.2, 3.0), stroke(0.2, 2.4)
-    carried, jumped = Drive(), Drive()
-    for drive in (carried, jumped):
-        drive.run(*pair, until_s=2.0, motion=True)
-    assert carried.near_far.moving.added == jumped.near_far.moving.added
-    carried.motion.step(TICK_S, None)
-    jumped.motion.step(TICK_S, jumped.radius_m + 1.0)
-    difference = carried.near_far.moving.added - jumped.near_far.moving.added
-    assert 0.0 < abs(difference) < 0.5 * MOST_STEP
-
-
-def test_without_a_radius_or_another_axis_slew_keeps_its_part() -> None:
-    drive = Drive()
-    drive.run(stroke(0.2, 3.0), STILL, until_s=0.8, motion=True)
-    slew = drive.slew.moving
-    alone = MovingAxis(TURN_RAD_S, TICK_S, slew.sway, slew.applied, commanded=True, able=True)
-    TwoAxisMotion(alone, None, path_m=1.0).step(TICK_S, None)
-    nowhere = MovingAxis(TURN_RAD_S, TICK_S, slew.sway, slew.applied, commanded=True, able=True)
-    near_far = MovingAxis(OUT_M_S, TICK_S, SwayModel(NEAR_FAR, TICK_S), able=True)
-    TwoAxisMotion(nowhere, near_far, path_m=1.0).step(TICK_S, None)
-    assert alone.added == nowhere.added != 0.0
-    assert near_far.added == 0.0
 
 
 def test_near_far_may_damp_what_slewing_makes_it_swing() -> None:

@@ -95,16 +95,6 @@ def test_what_is_added_stops_before_the_bound_of_the_way(sign: float, fall_per_s
     assert sign * axis.added > 0.0
 
 
-def test_beyond_the_bound_nothing_is_added_outwards() -> None:
-    _, _, axis = slewing()
-    axis.farthest, axis.way = 0.2, 0.21
-    assert axis.room(1.0) == 0.0
-    axis.add(1.0, 1.0)
-    assert axis.added == 0.0
-    axis.add(-1.0, 1.0)
-    assert axis.added < 0.0
-
-
 def test_the_way_begins_again_with_the_next_motion() -> None:
     motion, slew, near_far = slewing()
     near_far.sent = -0.25

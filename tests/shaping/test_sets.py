@@ -1,7 +1,6 @@
 """Sets of sway data and filter: between two of them, and bumpless in motion."""
 
 import math
-from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -42,56 +41,9 @@ def test_values_beyond_the_ends_are_the_ends(value: float, steps: int) -> None:
     assert position(SETS, value) == steps
 
 
-@given(st.floats(-100, 1000))
-def test_a_value_is_met_within_a_step(value: float) -> None:
-    sway_set = at_position(SETS, position(SETS, value))
-    assert abs(sway_set.at - min(max(value, 0.0), 800.0)) <= 800.0 / STEPS_BETWEEN / 2 + 1e-9
-
-
-@given(st.integers(0, STEPS_BETWEEN))
-def test_between_two_sets_everything_lies_between(steps: int) -> None:
-    sway_set = at_position(SETS, steps)
-    share = steps / STEPS_BETWEEN
-    assert sway_set.mode.period_s == pytest.approx(2.0 + 0.8 * share)
-    assert sway_set.mode.damping_ratio == pytest.approx(0.03 + 0.02 * share)
-    shaper = build_shaper("gff", TICK_S, SwayModel(sway_set.mode, TICK_S), **sway_set.parameters)
-    assert isinstance(shaper, Gff)
-    assert all(pole < 0.0 for pole in shaper.poles_rad_s)
-
-
 def test_the_ends_are_the_sets_themselves() -> None:
     assert at_position(SETS, 0) is SETS[0]
     assert at_position(SETS, STEPS_BETWEEN) is SETS[1]
-
-
-def test_a_measured_period_is_met_exactly() -> None:
-    """Two sets whose value is their period: between them every period is itself."""
-    sets = [ParameterSet(p, SwayMode.from_period(p, 0.04), "zv", {}) for p in (1.5, 3.0)]
-    sway_set = at_position(sets, position(sets, 2.25))
-    assert sway_set.mode.period_s == pytest.approx(2.25)
-
-
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [
-        # 12.000000000000002 s by rounding
-        (SwayMode.from_period(12.0, 0.449), SwayMode.from_period(12.0, 0.449)),
-        # 22.6 s, which no stopwatch is asked for
-        (SwayMode.from_grapple(30.0, 270000.0, 300.0), SwayMode.from_period(2.0, 0.03)),
-        (SwayMode(0.5, 0.0), SwayMode(0.5, 0.95)),
-        (SwayMode(50.0, 0.95), SwayMode(50.0, 0.0)),
-    ],
-)
-def test_between_two_valid_modes_there_is_always_one(first: SwayMode, second: SwayMode) -> None:
-    sets = [ParameterSet(0.0, first, "zv", {}), ParameterSet(1.0, second, "zv", {})]
-    for steps in range(1, STEPS_BETWEEN):
-        mode = at_position(sets, steps).mode
-        ratio = first.damping_ratio + steps / STEPS_BETWEEN * (
-            second.damping_ratio - first.damping_ratio
-        )
-        assert mode.damping_ratio == ratio
-        period_s = first.period_s + steps / STEPS_BETWEEN * (second.period_s - first.period_s)
-        assert mode.period_s == pytest.approx(period_s) or mode.omega_rad_s == 0.5
 
 
 MODES = st.builds(SwayMode, st.floats(0.5, 50.0), st.floats(0.0, 0.95))
@@ -194,36 +146,6 @@ def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
         assert abs(axis.sent - last) <= 0.02  # a fifth of the rate of the valve
         assert axis.sent == pytest.approx(before, abs=0.005 + 2.0 * swing)
         last = axis.sent
-
-
-@pytest.mark.parametrize("kind", ["robust", "zv", "gff"])
-def test_a_change_on_the_way_makes_no_jump(kind: str) -> None:
-    """Half-way through its rise the output goes on from where it is."""
-    axis = axis_with(kind)
-    axis.tick(CommandInput())
-    sent = []
-    for n in range(150):
-        if n == 25:
-            axis.retune(FULL, lambda sway: make(kind, sway))
-        axis.tick(CommandInput(0.6))
-        sent.append(axis.sent)
-    steps = [abs(b - a) for a, b in pairwise(sent)]
-    # 5 full speeds a second over a tick is the valve's own rate.
-    assert max(steps[24:27]) <= 5.0 * TICK_S + 1e-3
-    assert min(sent[25:]) >= sent[24] - 0.05
-
-
-@pytest.mark.parametrize("sway", [True, False])
-def test_an_output_that_is_no_number_trips_with_and_without_a_model(sway: bool) -> None:
-    class Broken:
-        def step(self, _command: float) -> float:
-            return math.nan
-
-    model = SwayModel(EMPTY, TICK_S) if sway else None
-    axis = ShapedAxis(TICK_S, OutputLimits(), sway=model, shaper=Broken())
-    axis.tick(CommandInput())
-    axis.tick(CommandInput(0.5))
-    assert (axis.state.name, axis.reason.name, axis.raw) == ("TRIPPED", "OUTPUT_INVALID", 0)
 
 
 def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:

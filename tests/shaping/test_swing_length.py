@@ -128,24 +128,6 @@ def test_after_a_doubt_the_motion_says_nothing_more() -> None:
     assert world.run(2.0, 1.0) is None
 
 
-@pytest.mark.parametrize("length_m", [0.5, 2.4])
-def test_beyond_its_range_no_length_is_one(length_m: float) -> None:
-    world = World(Measured.ANGLE, length_m)
-    world.run(2.0, 0.0)
-    assert world.run(3.0, 1.0) is None
-
-
-def test_a_length_that_is_not_sure_is_none() -> None:
-    """So much noise leaves one that explains the motion and may be 8 % off."""
-    for seed in range(40):
-        world = World(Measured.RATE, 1.8, noise=8.0)
-        world.noise = random.Random(seed)
-        world.run(2.0, 0.0)
-        for _ in range(150):
-            seen = world.run(TICK_S, 1.0)
-            assert seen is None or seen.sd_pct <= 7.0
-
-
 def test_of_nothing_that_was_measured_there_is_no_length() -> None:
     limits = SensorLimits(math.radians(0.1), math.radians(3.0))
     estimate = SwingLengthEstimate(MODE, Measured.ANGLE, limits, TICK_S)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.sway import SwayMode, SwayModel
@@ -61,18 +60,6 @@ def test_zeros_on_the_swing_three_poles_and_gain_one(
     assert np.max(np.abs(transfer(mode, tick_s, poles, zero))) < 1e-8
 
 
-@modes
-@ticks
-def test_the_first_jump_is_small(mode: SwayMode, tick_s: float) -> None:
-    """Of the jump by 1/(a2 w^2) only the part that the lag lets through in one tick."""
-    poles = (-5.655, -4.112)
-    sway, other = SwayModel(mode, tick_s), SwayModel(mode, tick_s)
-    without, lagged = Gff(sway, poles), Gff(other, poles, -5.0)
-    jump = without.step(1.0)
-    assert jump > 2.0
-    assert lagged.step(1.0) == pytest.approx(-math.expm1(-5.0 * tick_s) * jump)
-
-
 @ticks
 @pytest.mark.parametrize("times_omega", [0.7, 1.0, 1.4, 1.9])
 @modes
@@ -86,28 +73,6 @@ def test_a_step_through_a_triple_pole_never_passes_the_command(
     assert max(out) <= 1.0 + 1e-12
     assert min(out) >= 0.0
     assert out[-1] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_one_quicker_than_that_does() -> None:
-    mode, tick_s = SwayMode(2.86, 0.0), 0.005
-    pole = -1.2 * QUICKEST * mode.omega_rad_s
-    sway = SwayModel(mode, tick_s)
-    assert max(response(Gff(sway, (pole, pole), pole), sway, [1.0] * 400)) > 1.02
-
-
-@modes
-def test_small_ticks_approach_the_continuous_filter(mode: SwayMode) -> None:
-    w, z, pole = mode.omega_rad_s, mode.damping_ratio, -4.0
-    top, bottom = [1.0 / w**2, 2.0 * z / w, 1.0], np.poly([pole] * 3) / -(pole**3)
-    errors = []
-    for tick_s in (0.01, 0.005):
-        times = np.arange(round(3.0 / tick_s)) * tick_s
-        _, right = signal.step((top, bottom), T=times)
-        sway = SwayModel(mode, tick_s)
-        got = response(Gff(sway, (pole, pole), pole), sway, [1.0] * len(times))
-        errors.append(float(np.max(np.abs(np.array(got) - right))))
-    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15)
-    assert errors[1] < 0.05
 
 
 @pytest.mark.parametrize("bad", [0.0, 0.1, -50.1, math.nan, -math.inf])

@@ -248,16 +248,6 @@ def test_when_it_begins_again_no_bend_from_before_is_left(before_deg: float) -> 
     assert bent(one, 0.5, 0.36, 1) == [Trust.STUCK]
 
 
-def test_a_velocity_that_goes_to_and_fro_is_distinguished_from_the_operators() -> None:
-    one = Restlessness(TICK_S)
-    # Full speed and back, twice: a path of 4; the operator's is as long: up to 7 is calm.
-    path = [1.0, 0.0, -1.0, 0.0]
-    assert not any(one.add(value, value) for value in path)
-    assert not any(one.add(0.5 * (-1.0) ** k, 0.0) for k in range(3))
-    assert not one.add(0.9, 0.0)
-    assert one.add(0.7, 0.0)
-
-
 def test_it_is_restless_beyond_one_and_a_half_paths_and_full_speed_not_at_it() -> None:
     for command, path in ((0.0, 1.0), (0.5, 1.75), (1.0, 2.5)):
         assert not Restlessness(TICK_S).add(path, command)
