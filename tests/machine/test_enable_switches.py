@@ -134,3 +134,36 @@ def test_the_joystick_whose_switches_count_has_some(switched: Machine, of: str) 
         f"joysticks.third.enable_of: expected a joystick with enable, got '{of}';"
         " there are left, right"
     ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("door]", "seet]", "expected a signal of JoystickLeft, got 'seet'"),
+        ("right.Enable", "right.Lift", "expected a free signal, got 'Lift', which is enable"),
+        ("message: Seat, signal: Door", "message: JoystickLeft, signal: Door", "is used already"),
+        (ENABLE, "enable: []", "enable: expected 1 or more entries"),
+        (ENABLE, f"enable_of: right\n    {ENABLE}", "enable and enable_of, got both"),
+        (f"    {ENABLE}\n", "", "enable_of, got neither"),
+        (ENABLE, "enable_of: left", "enable_of: expected a joystick with enable, got 'left'"),
+        ("signal: Seated,", "signal: Seated, cycle_ms: 200,", "timeout_ms: expected 400 ms"),
+    ],
+)
+def test_switches_that_cannot_be(switched: Machine, old: str, new: str, says: str) -> None:
+    switched.in_yaml(old, new)
+    assert any(says in problem for problem in switched.problems()), switched.problems()
+
+
+def test_a_message_without_a_cycle_is_no_switch(switched: Machine) -> None:
+    switched.in_dbc('BA_ "GenMsgCycleTime" BO_ 288 20;\n', "")
+    line = switched.in_dbc("BO_ 288", "BO_ 288")
+    says = f"machine.dbc:{line}: Seat: has no GenMsgCycleTime; cycle_ms may say it"
+    assert says in switched.problems()
+
+
+def test_the_way_to_stop_counts_the_slowest_switch(switched: Machine) -> None:
+    shortest_m = 4.8 * (0.2 + 0.04 + 0.1)  # timeout, two periods, the fall
+    switched.in_yaml("stop_distance_m: 200", f"stop_distance_m: {shortest_m + 0.01:.2f}")
+    switched.load()
+    switched.yaml = switched.yaml.replace("timeout_ms: 200 }", "timeout_ms: 300 }")
+    assert "axes.slew.limits.stop_distance_m: expected" in switched.problems()[0]
