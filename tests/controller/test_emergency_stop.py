@@ -35,16 +35,6 @@ def test_anything_but_free_is_neutral_in_the_same_tick(machine: Machine, code: i
     assert sent["SlewStatus"]["Reason"] == 68
 
 
-def test_it_is_latched(machine: Machine) -> None:
-    machine.moving()
-    machine.run(1, 1, Slew=1000, Lift=1000)
-    for _ in range(100):
-        assert still(machine.run(1, Slew=1000, Lift=1000))
-    for _ in range(100):
-        assert still(machine.run(1))
-    assert machine.states() == PRESSED
-
-
 @pytest.mark.parametrize("way", ["reset", "enable"])
 def test_the_way_back_is_free_neutral_and_then_a_reset(machine: Machine, way: str) -> None:
     machine.moving()
@@ -87,27 +77,6 @@ def test_a_shaped_stop_becomes_neutral_at_once(machine: Machine, raw: dict[str, 
     assert sent["SlewCommand"]["Velocity"] > 0
     machine.rig.receive(machine.stop(1))
     assert still(machine.rig.tick())
-    assert machine.states() == PRESSED
-
-
-def test_bypass_does_not_pass_it_by(machine: Machine) -> None:
-    machine.moving(AntiSwayOff=1)
-    assert machine.rig.state() is State.BYPASS_ON
-    assert still(machine.run(1, 1, Slew=1000, Lift=1000, AntiSwayOff=1))
-    assert machine.states() == PRESSED
-
-
-def test_an_axis_that_moves_with_another_stops_too(changed_rig: Make) -> None:
-    motion = "motion: { crane: { slew: slew, near_far: near_far, radius_m: 3.0 } }"
-    machine = Machine(changed_rig, yaml={"axes:\n": f"{motion}\naxes:\n"})
-    machine.moving()
-    moved = False
-    for _ in range(100):
-        moved |= machine.run(1, Slew=1000)["NearFarCommand"]["Velocity"] != 0
-    assert moved
-    assert machine.rig.reason("near_far") == "COMPENSATING"
-    for _ in range(20):
-        assert still(machine.run(1, 1, Slew=1000))
     assert machine.states() == PRESSED
 
 
@@ -194,12 +163,3 @@ def test_a_short_press_just_before_a_reload_is_one_behind_it(machine: Machine) -
     rig.controller.carry_over(before)
     machine.run(3)
     assert machine.states() == PRESSED
-
-
-def test_without_a_press_a_reload_trips_nothing(machine: Machine) -> None:
-    rig = machine.rig
-    machine.run(3)
-    before, rig.controller = rig.controller, Controller(rig.deployment)
-    rig.controller.carry_over(before)
-    machine.run(3)
-    assert machine.states() == READY

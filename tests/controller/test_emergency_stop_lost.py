@@ -56,18 +56,6 @@ def test_lost_and_found_is_latched_for_what_moved_only(machine: Machine) -> None
     assert machine.states() == READY
 
 
-def test_a_reset_counts_only_once_it_is_back(machine: Machine) -> None:
-    machine.moving()
-    machine.rig.run(10)
-    machine.rig.run(2, Reset=1)
-    machine.rig.run(2)
-    machine.run(2)
-    assert machine.rig.state() is State.TRIPPED
-    machine.run(1, Reset=1)
-    machine.run(1)
-    assert machine.states() == READY
-
-
 def test_a_reset_that_is_held_meanwhile_is_no_press(machine: Machine) -> None:
     """A switch that is stuck must not set anything going by itself."""
     machine.moving()

@@ -102,11 +102,6 @@ def test_an_axis_that_nothing_moves_damps_no_swing_of_another() -> None:
     assert [one.damps for one in seen] == [False]
 
 
-def test_while_the_crane_slews_it_does() -> None:
-    drive = Slewing().until_it_damps()
-    assert drive.step().damps is True
-
-
 def test_and_its_filter_is_carried_out_for_that(monkeypatch: pytest.MonkeyPatch) -> None:
     drive = Slewing().until_it_damps()
     act, carried = ShapedAxis.act, []

@@ -15,14 +15,6 @@ from tests.controller.motion_rig import (
 )
 
 
-def test_bypass_switches_it_off(changed_rig: Make) -> None:
-    rig = moving_as_one(changed_rig)
-    rig.run(3, AntiSwayOff=1)
-    assert set(near_far(rig, 200, Slew=1000, AntiSwayOff=1)) == {0.0}
-    assert rig.state("near_far") is State.READY
-    assert rig.state() is State.BYPASS_ON
-
-
 def test_a_slew_whose_anti_sway_is_off_asks_nothing_of_another_joystick(changed_rig: Make) -> None:
     rig = by_two_joysticks(changed_rig)
     for i in range(200):
@@ -83,17 +75,6 @@ def test_a_lost_joystick_of_near_far_stops_the_compensation(changed_rig: Make) -
     # five ticks of timeout, then at the fall rate to neutral
     assert not any(after[5 + math.ceil(0.25 / 0.1) :])
     assert rig.state("near_far") is State.NEUTRAL_WAIT
-
-
-def test_enable_released_is_neutral_for_both_in_the_same_tick(changed_rig: Make) -> None:
-    rig = moving_as_one(changed_rig)
-    rig.run(3)
-    assert near_far(rig, 40, Slew=1000)[-1] < -0.05
-    sent = rig.run(1, Slew=1000, Enable=0)
-    assert sent["SlewCommand"]["Velocity"] == sent["NearFarCommand"]["Velocity"] == 0
-    assert (rig.state(), rig.state("near_far")) == (State.TRIPPED, State.TRIPPED)
-    rig.run(50, Enable=0)
-    assert set(near_far(rig, 100, Slew=1000)) == {0.0}  # and it takes a neutral joystick to go on
 
 
 def test_a_released_enable_of_slew_alone_ends_it_in_the_same_tick(changed_rig: Make) -> None:
@@ -160,12 +141,3 @@ def test_near_far_that_becomes_ready_while_slew_moves_does_not_twitch(
     assert max(abs(b - a) for a, b in itertools.pairwise(begin)) < 0.05
     signs = [s > 0 for s in begin if s]
     assert sum(a != b for a, b in itertools.pairwise(signs)) <= 1
-
-
-def test_a_stalled_loop_trips_both(changed_rig: Make) -> None:
-    rig = moving_as_one(changed_rig)
-    rig.run(3)
-    near_far(rig, 40, Slew=1000)
-    rig.controller.stalled()
-    assert not any(near_far(rig, 1, Slew=1000))
-    assert (rig.reason(), rig.reason("near_far")) == ("LOOP_STALLED", "LOOP_STALLED")

@@ -47,12 +47,6 @@ def test_periods_that_were_missed_are_held_and_the_next_is_awaited(
     assert one.moving.ahead_s == pytest.approx(ahead_s)
 
 
-def test_both_are_bounded_as_the_file_says(changed_rig: Make) -> None:
-    controller = moving_as_one(changed_rig).controller
-    assert member(controller).moving.largest == 0.25
-    assert {controller.axes[n].axis._stage.largest_added for n in ("slew", "near_far")} == {0.25}
-
-
 @pytest.mark.parametrize("use", ["damp", "watch"])
 def test_with_a_sensor_that_damps_it_may_go_as_far_again(use: str, tmp_path: Any) -> None:
     text = (shipped.CONFIG / "forwarder-sensor.yaml").read_text()

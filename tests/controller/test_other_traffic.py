@@ -35,17 +35,6 @@ def test_traffic_that_the_dbc_knows_is_no_fault(rig: Rig, data: bytes) -> None:
     assert rig.state() is State.ACTIVE
 
 
-@pytest.mark.parametrize(("can_id", "extended"), [(TIP_ID, True), (0x7FF, False)])
-def test_an_id_that_no_dbc_has_is_counted_and_moves_nothing(
-    rig: Rig, can_id: int, extended: bool
-) -> None:
-    rig.run(3)
-    rig.receive(*[Frame("crane", can_id, extended, bytes(8))] * 3)
-    assert (rig.count("UnknownId"), last_fault(rig)) == (3, FrameFault.UNKNOWN_ID)
-    assert rig.run(1)["SlewCommand"]["Velocity"] == 0
-    assert rig.state() is State.READY
-
-
 def test_a_radius_of_the_wrong_length_is_counted_as_such(changed_rig: Make) -> None:
     rig = changed_rig({"axes:\n": f"{MOTION}axes:\n"})
     rig.receive(Frame("crane", TIP_ID, False, bytes(5)), Frame("crane", TIP_ID, False, bytes(7)))

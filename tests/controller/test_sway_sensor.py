@@ -186,14 +186,6 @@ def test_without_frames_it_is_the_machine_without_a_sensor(tmp_path: Path) -> No
     )
 
 
-def test_a_rate_by_a_gyro(tmp_path: Path) -> None:
-    gyro = changed(
-        tmp_path, ("message: SwayAngle", "message: SwayRate"), ("kind: angle", "kind: rate")
-    )
-    run = Run(gyro, PULSE, crane(noise_deg=0.3))
-    assert run.trust("near_far") == ["UNPROVED", "TRUSTED"]
-
-
 def test_axes_whose_sensors_have_messages_of_their_own_read_their_own(tmp_path: Path) -> None:
     """Slew an angle, near-far a gyro."""
     along = "message: SwayAngle, signal: Along, kind: angle"
