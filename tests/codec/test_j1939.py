@@ -1,7 +1,6 @@
 """Identifiers of J1939, and what a deployment may say of them."""
 
 import re
-from pathlib import Path
 
 import pytest
 from hypothesis import example, given
@@ -24,54 +23,18 @@ from canshaper.codec.identifier import (
     with_source,
 )
 from canshaper.config.bus import J1939Name
-from canshaper.errors import ConfigError
-from canshaper.machine.binding import load_deployment
-from canshaper.machine.deployment import Deployment
+from tests.rigs.files import Machine
 from tests.rigs.sent import command_frame
 
-ROOT = Path(__file__).parents[2]
-CONFIG = ROOT / "config" / "j1939-forwarder.yaml"
-DBC = ROOT / "dbc" / "j1939-bjm-avc.dbc"
 BJM1 = "2365445886"
 OWN = 0x9C
 BYTE = st.integers(0, 255)
 
 
-class Machine:
-    """The J1939 machine with changes, on disk."""
-
-    def __init__(self, directory: Path) -> None:
-        self.directory = directory
-        self.yaml = CONFIG.read_text().replace("../dbc/j1939-bjm-avc.dbc", "machine.dbc")
-        self.dbc = DBC.read_text(encoding="cp1252")
-
-    def in_yaml(self, old: str, new: str) -> int:
-        """Replace the first ``old``; its line."""
-        assert old in self.yaml, old
-        line = self.yaml[: self.yaml.index(old)].count("\n") + 1
-        self.yaml = self.yaml.replace(old, new, 1)
-        return line
-
-    def in_dbc(self, old: str, new: str) -> int:
-        assert old in self.dbc, old
-        line = self.dbc[: self.dbc.index(old)].count("\n") + 1
-        self.dbc = self.dbc.replace(old, new, 1)
-        return line
-
-    def load(self) -> Deployment:
-        (self.directory / "machine.yaml").write_text(self.yaml)
-        (self.directory / "machine.dbc").write_text(self.dbc, encoding="cp1252")
-        return load_deployment(self.directory / "machine.yaml")
-
-    def problems(self) -> list[str]:
-        with pytest.raises(ConfigError) as caught:
-            self.load()
-        return [str(p).replace(f"{self.directory}/", "") for p in caught.value.problems]
-
-
 @pytest.fixture
-def machine(tmp_path: Path) -> Machine:
-    return Machine(tmp_path)
+def machine(machine: Machine) -> Machine:
+    machine.become("j1939-forwarder.yaml", "j1939-bjm-avc.dbc")
+    return machine
 
 
 # -- identifiers -----------------------------------------------------------------------------------
@@ -160,39 +123,6 @@ def test_a_valve_on_a_bus_without_our_address(machine: Machine) -> None:
     assert f"machine.yaml:{line}: axes.slew.valve.bus: {text}" in machine.problems()
 
 
-@pytest.mark.parametrize("number", [int(BJM1) - 0x80000000, 272])
-def test_a_dbc_id_of_29_bits_without_bit_31(machine: Machine, number: int) -> None:
-    line = machine.in_dbc(f"BO_ {BJM1} BJM1", f"BO_ {number} BJM1")
-    machine.dbc = machine.dbc.replace(BJM1, str(number))
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: ")
-    assert "BJM1" in problem
-    assert "an id of 29 bits stands in a DBC file with bit 31 set: 0x80000000 more" in problem
-
-
-def test_signals_that_overlap(machine: Machine) -> None:
-    machine.in_dbc("State : 16|4@1+", "State : 7|4@1+")
-    line = machine.dbc[: machine.dbc.index("BO_ 2365468926")].count("\n") + 1
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: ")
-    assert "are overlapping in message AVC0" in problem
-
-
-def test_a_factor_with_which_full_flow_cannot_be_reached(machine: Machine) -> None:
-    machine.in_dbc("PortFlow : 0|8@1+ (0.4,0)", "PortFlow : 0|8@1+ (0.2,0)")
-    line = machine.dbc[: machine.dbc.index("BO_ 2365468926")].count("\n") + 1
-    (problem,) = machine.problems()
-    text = "PortFlow cannot reach its range [0|100] with 8 bits at 0.2 per bit"
-    assert problem == f"machine.dbc:{line}: AVC0: {text}"
-
-
-def test_our_address_is_no_joysticks(machine: Machine) -> None:
-    machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x9C\n")
-    line = machine.yaml[: machine.yaml.index("source: 0x9C")].count("\n") + 1
-    text = "BJM1 comes from address 156, which is ours on bus crane"
-    assert machine.problems() == [f"machine.yaml:{line}: joysticks.left.source: {text}"]
-
-
 def second_bus(machine: Machine, name: str) -> int:
     """A second bus of J1939; the line of its NAME."""
     node = f"j1939: {{ address: 0x9D, name: {name} }}"
@@ -214,15 +144,6 @@ def test_two_names_on_two_buses(machine: Machine) -> None:
     assert set(machine.load().config.buses) == {"crane", "other"}
 
 
-def test_numbers_of_faults_that_do_not_end_in_the_range(machine: Machine) -> None:
-    line = machine.in_yaml("      address: 0x9C", "      first_spn: 524286\n      address: 0x9C")
-    (problem,) = machine.problems()
-    assert problem == (
-        f"machine.yaml:{line}: buses.crane.j1939.first_spn: expected the last SPN up to 524287, got"
-        " 524291 from 524286 on"
-    )
-
-
 def test_a_source_for_a_message_that_is_none_of_j1939(machine: Machine) -> None:
     machine.in_dbc(f'BA_ "VFrameFormat" BO_ {BJM1} 3;\n', "")
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
@@ -238,30 +159,6 @@ def test_a_message_to_one_node_needs_its_sender(machine: Machine) -> None:
     assert f"joysticks.left.source: {says}" in problem
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
     assert (0x18EF9C33, True) in machine.load().routing.buses["crane"].received
-
-
-@pytest.mark.parametrize("source", ["", "source: 0x80, "])
-def test_what_commands_a_valve_is_no_input(machine: Machine, source: str) -> None:
-    """From another address it has to count as a second controller."""
-    given = "feedback: { bus: crane, message: AVEF0, signal: ExtendFlow,"
-    line = machine.in_yaml(
-        given, f"feedback: {{ bus: crane, message: AVC0, {source}signal: PortFlow,"
-    )
-    (problem, *_) = [p for p in machine.problems() if "commands no valve" in p]
-    assert problem == (
-        f"machine.yaml:{line}: axes.slew.feedback.message: AVC0: expected a group that commands no"
-        " valve, got that of axes.slew.valve"
-    )
-
-
-def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
-    stop = "emergency_stop: { bus: crane, message: BJM3, signal: Button1, timeout_ms: 200 }\n"
-    machine.yaml += stop
-    line = machine.yaml.count("\n")
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.yaml:{line}: emergency_stop.source: missing: in the DBC")
-    machine.yaml = machine.yaml.replace("message: BJM3,", "message: BJM3, source: 0x40,")
-    assert machine.load().emergency_stop is not None
 
 
 def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:

@@ -77,12 +77,6 @@ def test_without_a_counter_every_frame_is_new() -> None:
     assert checker.qualified
 
 
-def test_two_senders_with_counters_of_their_own_are_never_trusted() -> None:
-    checker = made()
-    counts = [c % 256 for i in range(50) for c in (i, i + 100)]
-    assert faults(checker, *counts) == [GOOD] + [JUMP] * 99
-
-
 def test_a_frozen_counter_is_never_new_however_often_its_sender_was_silent() -> None:
     checker = made()
     faults(checker, 7)
@@ -101,14 +95,6 @@ def test_after_silence_any_counter_but_the_last_begins_again_once() -> None:
         assert first is (REPEATED if restart == 100 else GOOD)
         # what was repeated has not begun again yet
         assert second is (GOOD if restart == 100 else JUMP)
-
-
-def test_a_restart_on_the_last_counter_loses_one_frame_only() -> None:
-    checker = made()
-    faults(checker, 100)
-    checker.resync()
-    assert faults(checker, 100, 101, 102) == [REPEATED, GOOD, GOOD]
-    assert checker.qualified
 
 
 def test_a_wrong_checksum_says_nothing_about_the_sequence() -> None:
@@ -132,10 +118,6 @@ def qualified(checker: SequenceChecker, counts: list[int]) -> list[bool]:
     return [checker.check(b"", count) is GOOD and checker.qualified for count in counts]
 
 
-def test_one_good_frame_is_enough_by_default() -> None:
-    assert qualified(made(), [1, 9, 10]) == [True, False, True]
-
-
 @pytest.mark.parametrize("qualify", [2, 5, 20])
 def test_so_many_good_frames_in_a_row_at_the_start_and_after_a_wrong_one(qualify: int) -> None:
     checker = made(qualify=qualify)
@@ -145,14 +127,6 @@ def test_so_many_good_frames_in_a_row_at_the_start_and_after_a_wrong_one(qualify
     jump = [counts[-1] + 50]
     assert qualified(checker, jump) == [False]
     assert qualified(checker, [jump[0] + 1 + i for i in counts]) == expected
-
-
-def test_silence_begins_the_count_again() -> None:
-    checker = made(qualify=3)
-    assert qualified(checker, [0, 1, 2]) == [False, False, True]
-    checker.resync()
-    assert not checker.qualified
-    assert qualified(checker, [3, 4, 5]) == [False, False, True]
 
 
 def test_a_repeated_frame_neither_counts_as_good_nor_breaks_the_row() -> None:

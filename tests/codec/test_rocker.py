@@ -14,9 +14,8 @@ from canshaper.codec.flags import RockerVelocity
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import VelocitySignal
 from canshaper.codec.valve import FlagsCodec, ValveCodec
-from canshaper.errors import ConfigError
-from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
+from tests.rigs.files import Machine
 from tests.rigs.sent import command_raw
 
 ROOT = Path(__file__).parents[2]
@@ -122,44 +121,7 @@ def test_flags_of_a_direction(flags: tuple[int, int, int], steps: int | None) ->
     assert codec.read({**raw, "RotateLeft": 40, "N": 1, "P": 0, "M": 0}) == 0
 
 
-def problems(folder: Path, *changes: tuple[str, str]) -> str:
-    text = (ROOT / "config" / "two-cranes.yaml").read_text().replace("../dbc", str(ROOT / "dbc"))
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    file = folder / "machine.yaml"
-    file.write_text(text)
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(file)
-    return "\n".join(map(str, caught.value.problems))
-
-
-@pytest.mark.parametrize(
-    ("new", "expected"),
-    [
-        (
-            "signal: RotateLeft, negative: RotateLeft",
-            "which is the joystick of front_rotator already",
-        ),
-        ("signal: RotateLeft, negative: Enable", "which is enable already"),
-        ("signal: Enable, negative: RotateRight", "which is enable already"),
-        (
-            "signal: RotateLeft, negative: Nothing",
-            "expected a signal of RotatorRocker, got 'Nothing'",
-        ),
-        (
-            "signal: Nothing, negative: RotateRight",
-            "expected a signal of RotatorRocker, got 'Nothing'",
-        ),
-        ("signal: RotateLeft, negative: RotateRight, flags: { neutral: A, negative: B, "
-         "positive: C }", "expected one of flags and negative, got both"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_is_reported(tmp_path: Path, new: str, expected: str) -> None:
-    assert expected in problems(tmp_path, ("signal: RotateLeft, negative: RotateRight", new))
-
-
-def test_a_signal_with_a_sign_is_none_of_a_rocker(tmp_path: Path) -> None:
-    sign = ("joystick: front_rocker, signal: RotateLeft, negative: RotateRight",
-            "joystick: front_right, signal: Lift, negative: Rotate")  # fmt: skip
-    assert "expected a range from 0, as it is a magnitude" in problems(tmp_path, sign)
+def test_it_has_flags_or_another_signal(machine: Machine) -> None:
+    flags = "flags: { neutral: A, negative: B, positive: C }"
+    machine.in_yaml("signal: Slew,", f"signal: Slew, negative: Reset, {flags},")
+    assert any("expected one of flags and negative, got both" in p for p in machine.problems())

@@ -177,13 +177,6 @@ def problem_of(machine: Machine, old: str, new: str) -> str:
     return problem
 
 
-def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Machine) -> None:
-    problem = problem_of(machine, "0|8@1+ (0.4,0)", "0|8@1+ (0.1,0)")
-    assert problem == (
-        "valves.dbc:5: AVC0: PortFlow cannot reach its range [0|100] with 8 bits at 0.1 per bit"
-    )
-
-
 def test_the_largest_code_of_the_bits_is_a_direction(machine: Machine) -> None:
     codes = CODES.replace("negative: 2", "negative: 15")
     valve = f"message: AVC0, signal: PortFlow, timeout_ms: 200, {codes}"

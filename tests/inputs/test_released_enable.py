@@ -42,23 +42,6 @@ def test_of_a_joystick_that_is_silent_since_then_silence_is_reported(
     assert rig.reason() == "JOYSTICK_TIMEOUT"
 
 
-def test_a_reset_counts_with_the_enable_released(rig: Rig) -> None:
-    rig.run(3)
-    rig.run(10, Slew=1000)
-    rig.run(2, Enable=0)
-    assert rig.state() is State.TRIPPED
-    rig.run(1, Enable=0, Reset=1)
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
-
-
-def test_a_reset_needs_the_joystick_in_neutral_with_the_enable_released_too(rig: Rig) -> None:
-    rig.run(3)
-    rig.run(10, Slew=1000)
-    rig.run(2, Enable=0, Slew=1000)
-    rig.run(1, Enable=0, Slew=1000, Reset=1)
-    assert rig.state() is State.TRIPPED
-
-
 def test_with_a_broken_joystick_and_the_enable_released_a_trip_is_still_reported(rig: Rig) -> None:
     rig.run(3)
     rig.receive(Frame("crane", 0x200, False, bytes(2)))
