@@ -101,6 +101,18 @@ def sent_ids(rig: j1939.Rig, ticks: int, **left: float) -> list[int]:
     return [i for sent in rig.run(ticks, **left) for i in j1939.ids(sent)]
 
 
+def test_the_address_is_asked_for_before_it_is_claimed() -> None:
+    rig = guest()
+    assert sent_ids(rig, 1) == [j1939.WHO_HAS_IT]
+    rig.receive(j1939.request(0xEE00))  # somebody else asks too
+    assert sent_ids(rig, 12) == []
+    assert sent_ids(rig, 1) == [j1939.CLAIM]
+    assert sent_ids(rig, 12) == []
+    ids = set(sent_ids(rig, 100, X=100.0))
+    assert ids & {i for i, _ in rig.deployment.routing.buses["crane"].sent}  # status
+    assert j1939.DM1 not in ids
+
+
 @pytest.mark.parametrize("difference", [-1, 1])
 @pytest.mark.parametrize("when", [1, 20, 100])
 def test_the_node_that_has_the_address_keeps_it(difference: int, when: int) -> None:
@@ -110,3 +122,20 @@ def test_the_node_that_has_the_address_keeps_it(difference: int, when: int) -> N
     assert set(sent_ids(rig, 50)) <= {j1939.NO_CLAIM}
     assert sent_ids(rig, 50, X=100.0) == []
     assert rig.state() is State.ACTIVE  # it computes all the same, for the log
+
+
+def test_after_an_outage_it_is_asked_for_again() -> None:
+    rig = guest()
+    rig.run(100)
+    rig.controller.on_bus_off("crane")
+    assert sent_ids(rig, 3)[0] == j1939.WHO_HAS_IT
+    rig.receive(rig.claim(1))
+    assert set(sent_ids(rig, 50)) <= {j1939.NO_CLAIM}
+
+
+def test_no_fault_is_reported_and_no_request_refused() -> None:
+    rig = guest()
+    rig.run(100)
+    rig.receive(j1939.request(0xFECA), j1939.request(0xFEDA, to=j1939.OWN))
+    ids = {i for _ in range(100) for i in j1939.ids(rig.tick())}  # the joysticks are silent
+    assert not ids & {j1939.DM1, j1939.BROADCAST, j1939.NACK, 0x18E8FF9C}
