@@ -1,5 +1,5 @@
 # make demo   the crane, driven with anti-sway off and on
-# make test   style, all quick tests, a drive on real SocketCAN and in a browser: seven minutes on two cores
+# make test   style, all quick tests, a drive on real SocketCAN and in a browser: six minutes on two cores
 
 # make test-all   everything: types, coverage, mutants, slow tests, all lanes, studies; some hours
 # make test-PART  one part of it: tools/suite.py --list

@@ -76,6 +76,16 @@ def test_a_released_enable_is_more_than_a_lost_frame(drive: Drive) -> None:
     assert drive.axis.raw == 0
 
 
+@pytest.mark.parametrize("command", [0.02, -0.02])
+def test_the_end_of_the_neutral_band_is_neutral(drive: Drive, command: float) -> None:
+    """At rest, and in motion, which it does not prolong."""
+    drive.to_ready()
+    assert drive.run(CommandInput(command), 1.0) == []
+    drive.moving(1.0)
+    drive.tick(CommandInput(command))
+    assert drive.axis.command == 0.0
+
+
 def test_enable_released_as_a_stop_ends_is_latched_all_the_same(drive_with: DriveWith) -> None:
     drive = drive_with(stop_s=0.1).moving()
     assert drive.run(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), 0.1) == [
