@@ -49,7 +49,7 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     assert rows["joystick lost"] == ["4.11", "m", "25", "deg", "0.84", "m", "0.21", "s"]
     assert rows["in the old direction"] == ["0.18", "s", "0.18", "s", "0.18", "s"]
     assert rows["its filter needs"] == ["4.21", "m", "25", "deg", "0.87", "m", "0.23", "s"]
-    assert rows["limits allow"] == ["4.70", "m", "28", "deg", "1.00", "m", "0.63", "s"]
+    assert rows["limits allow"] == ["4.70", "m", "28", "deg", "1.00", "m", "0.33", "s"]
     assert rows["stop_distance_m"] == ["4.7", "m", "1", "m", "-"]
     assert "WARNING" not in "".join(lines)
     assert "lift: in seconds of full speed" in "".join(lines)

@@ -14,7 +14,7 @@ def test_the_digest_of_what_runs_is_sent_once_a_second_and_logged_at_every_chang
     def script(number: int) -> None:
         if number == 110:
             digests.append(load_deployment(bench.file).identity.digest)
-            bench.reload("tail_s: 0.5", "tail_s: 0.4")
+            bench.reload("tail_s: 0.2", "tail_s: 0.4")
         elif number == 220:
             digests.append(load_deployment(bench.file).identity.digest)
             bench.stop()

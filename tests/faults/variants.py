@@ -18,7 +18,7 @@ LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, 
 ROBUST_LIMITS = LIMITS.replace(
     "tail_s: 2.0, stop_s: 2.0", "reversal: brake_shaped, tail_s: 2.2, stop_s: 2.2"
 )
-LIFT_LIMITS = LIMITS.replace("2.0", "0.5")
+LIFT_LIMITS = LIMITS.replace("2.0", "0.2")
 SLEW_FILTER = "filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 NEAR_FAR_FILTER = "filter: { kind: gff, a1: 0.708, a2: 0.12 } # near-far"
 LIFT_FILTER = "filter: { kind: off }"

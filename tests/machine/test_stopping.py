@@ -96,7 +96,7 @@ def test_everything_that_lengthens_a_stop_is_seen(machine: Machine, old: str, ne
 
 
 def test_a_distance_of_an_axis_without_a_speed_says_nothing(machine: Machine) -> None:
-    line = machine.in_yaml("stop_s: 0.5", "stop_s: 0.5, stop_distance_m: 2")
+    line = machine.in_yaml("stop_s: 0.2", "stop_s: 0.2, stop_distance_m: 2")
     assert machine.problems() == [
         f"machine.yaml:{line}: axes.lift.limits.stop_distance_m: expected the section sway or"
         " slewing with it, got 2 m without"
