@@ -2,8 +2,8 @@
 
 Two booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
 (slew angle theta1, radius x, height z), one valve a coordinate; `JointBoom` moves the joints, and
-the tip by their kinematics. Both follow their valves exactly: pump pressure is left out, and by
-default that a boom bends, as in the paper.
+the tip by their kinematics. Both follow their valves exactly. By default the pump delivers what all
+valves ask for and no boom bends, as in the paper.
 """
 
 import math
@@ -19,6 +19,7 @@ from canshaper_sim.contact import ContactParameters
 from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
+from canshaper_sim.pump import Pump, PumpParameters
 from canshaper_sim.ranges import check_ranges
 from canshaper_sim.sway_sensor import SwaySensorParameters
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
@@ -52,6 +53,7 @@ _ALLOWED = {
     "height_min_m": (-20.0, 30.0),
     "height_max_m": (-20.0, 30.0),
     "start_theta1_rad": (-1000.0, 1000.0),
+    "pump_flow": (0.1, math.inf),
 }
 
 
@@ -59,7 +61,7 @@ _ALLOWED = {
 class CraneParameters:
     """Grapple, valves, full speeds, end stops, start pose and sway sensors of one crane.
 
-    And how the boom bends, what the grapple meets, and what it grips.
+    And how the boom bends, what the grapple meets, what it grips, and what the pump delivers.
 
     Full speed is the speed of the tip (slew: of theta1) when the valve lets full flow through.
     """
@@ -85,6 +87,8 @@ class CraneParameters:
     boom: BendParameters = field(default_factory=BendParameters)
     contact: ContactParameters = field(default_factory=ContactParameters)
     log: LogParameters = field(default_factory=LogParameters)
+    pump_flow: float = math.inf  # most that the pump delivers, full axis flows
+    pump: PumpParameters = field(default_factory=PumpParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -140,6 +144,7 @@ class Crane:
         "_accelerations",
         "_axes",
         "_bend",
+        "_pump",
         "_second",
         "_sway",
         "_time_s",
@@ -165,6 +170,7 @@ class Crane:
         self.boom = boom or p.tip_boom()
         self._axes = self.boom.axes
         self._bend = Bend(p.boom) if p.boom.frequency_hz else None
+        self._pump = Pump(p.pump_flow, p.pump, self._axes) if p.pump_flow < math.inf else None
         grounded = p.contact.ground_m > -math.inf
         self._accelerations = self._pulled if grounded else accelerations
         self._sway = sway or Sway()
@@ -228,6 +234,8 @@ class Crane:
         count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)
         step_s = dt_s / count
         for _ in range(count):
+            if self._pump:
+                self._pump.advance(step_s)
             tips = self.boom.advance(step_s)
             if self._bend:
                 tips = self._bend.advance(step_s, tips)

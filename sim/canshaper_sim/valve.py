@@ -62,7 +62,10 @@ class ValveParameters:
 
 
 class Valve:
-    """A valve in motion: `set_command`, then `advance` in steps, read `speed`."""
+    """A valve in motion: `set_command`, then `advance` in steps, read `speed`.
+
+    `supply` is the part of the oil that it asks for which it gets in the next step; 1 by itself.
+    """
 
     __slots__ = (
         "_command",
@@ -73,21 +76,23 @@ class Valve:
         "_played",
         "_ramp_1_s",
         "_requested",
-        "_spool",
         "_target",
         "_time_s",
         "parameters",
         "speed",
+        "spool",
+        "supply",
     )
 
     def __init__(self, parameters: ValveParameters | None = None) -> None:
         self.parameters = parameters or ValveParameters()
         self.speed = 0.0  # achieved speed, fraction of full speed
+        self.supply = 1.0
         self._lag_s = self.parameters.lag_s
         self._ramp_1_s = self.parameters.rate_limit_1_s
         self._command = 0.0  # the last one
         self._played = 0.0  # command that the spool has followed, behind its play
-        self._spool = 0.0  # flow after the rate limit, before the lag
+        self.spool = 0.0  # flow after the rate limit, before the lag
         self._target = 0.0  # flow the spool moves to
         self._requested = 0.0  # flow of the last command, still in the dead time
         self._pending: deque[tuple[float, float]] = deque()  # (due time, flow)
@@ -123,19 +128,20 @@ class Valve:
             Derivative of ``speed`` just after the start, full speeds per second; ``speed`` in the
             middle; ``speed`` at the end, and its derivative there.
         """
-        speed, spool, half_s, lag_s = self.speed, self._spool, 0.5 * step_s, self._lag_s
-        start_rate = (spool - speed) / lag_s
+        speed, spool, half_s, lag_s = self.speed, self.spool, 0.5 * step_s, self._lag_s
+        flow = spool * self.supply
+        start_rate = (flow - speed) / lag_s
         if spool == self._target and not self._pending:  # nearly always: the lag alone is left
             decay = self._decay_over(half_s)
-            middle = spool + (speed - spool) * decay
-            self.speed = speed = spool + (middle - spool) * decay
+            middle = flow + (speed - flow) * decay
+            self.speed = speed = flow + (middle - flow) * decay
             self._time_s = self._time_s + half_s + half_s
-            return start_rate, middle, speed, (spool - speed) / lag_s
+            return start_rate, middle, speed, (flow - speed) / lag_s
         self._pass(half_s)
         middle = self.speed
         self._pass(half_s)
         speed = self.speed
-        return start_rate, middle, speed, (self._spool - speed) / lag_s
+        return start_rate, middle, speed, (self.spool * self.supply - speed) / lag_s
 
     def _pass(self, step_s: float) -> None:
         """Let step_s seconds pass."""
@@ -159,28 +165,30 @@ class Valve:
     def _move_to(self, flow: float) -> None:
         self._target = flow
         if self._ramp_1_s == math.inf:
-            self._spool = flow
+            self.spool = flow
 
     def _follow(self, step_s: float) -> None:
-        """Spool on a straight line to its target, speed behind it: tau v' = spool - v, exactly."""
-        spool = self._spool
+        """Spool on a straight line to its target, speed behind it: tau v' = flow - v, exactly."""
+        spool, supply = self.spool, self.supply
         gap = self._target - spool
         if gap == 0.0:
-            self.speed = spool + (self.speed - spool) * self._decay_over(step_s)
+            flow = supply * spool
+            self.speed = flow + (self.speed - flow) * self._decay_over(step_s)
             return
         ramp = math.copysign(self._ramp_1_s, gap)
         arrival_s = gap / ramp
         # The lag answers a ramp, once settled, with the same ramp one time constant late.
-        late = ramp * self._lag_s
-        offset = self.speed - spool + late
+        late = supply * ramp * self._lag_s
+        offset = self.speed - supply * spool + late
         if arrival_s > step_s:
-            self._spool = spool + ramp * step_s
-            self.speed = self._spool - late + offset * self._decay_over(step_s)
+            self.spool = spool + ramp * step_s
+            self.speed = supply * self.spool - late + offset * self._decay_over(step_s)
             return
-        self._spool = self._target
-        at_arrival = self._target - late + offset * math.exp(-arrival_s / self._lag_s)
+        self.spool = self._target
+        flow = supply * self._target
+        at_arrival = flow - late + offset * math.exp(-arrival_s / self._lag_s)
         rest_decay = math.exp((arrival_s - step_s) / self._lag_s)
-        self.speed = self._target + (at_arrival - self._target) * rest_decay
+        self.speed = flow + (at_arrival - flow) * rest_decay
 
     def _decay_over(self, step_s: float) -> float:
         if step_s != self._decay_step_s:  # steps are nearly always equally long
