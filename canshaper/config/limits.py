@@ -161,6 +161,25 @@ class Motion(Section):
         return self
 
 
+class Hydraulics(Section):
+    """Oil that the pump delivers; see ``FlowBudget``."""
+
+    flow: Annotated[float, number(0.1, 100, "full axis flows", "most that the pump delivers")]
+    """Most that the pump delivers, in flows of one axis at full speed."""
+    others: Annotated[
+        float, number(0, 100, "full axis flows", "what functions take that are not ours")
+    ] = 0.0
+    shares: dict[str, Annotated[float, number(0, 100, "full axis flows", "of an axis")]] = Field(
+        {}, description="what an axis takes at full speed, by name; without an entry 1"
+    )
+
+    @model_validator(mode="after")
+    def _some_left(self) -> Self:
+        if self.others >= self.flow:
+            raise ValueError(f"others: expected less than the flow, got {self.others:g}")
+        return self
+
+
 class Sway(Section):
     """Swing of the tool on one axis.
 

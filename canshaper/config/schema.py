@@ -20,7 +20,7 @@ from canshaper.config.inputs import (
     SwitchNames,
     SwitchSection,
 )
-from canshaper.config.limits import Limits, Motion, Slewing, Sway
+from canshaper.config.limits import Hydraulics, Limits, Motion, Slewing, Sway
 from canshaper.config.protection import Protected
 from canshaper.config.section import VERSION, Section, number
 from canshaper.config.uncertainty import Accept, Uncertainty
@@ -266,6 +266,9 @@ class DeploymentConfig(Section):
     motion: dict[str, Motion] = Field(
         {}, description="slew and near-far of a crane as one motion, by name"
     )
+    hydraulics: Hydraulics | None = None
+    """Oil that the pump delivers: the commands of all axes are scaled so that they ask for no
+    more."""
     gateway: Gateway | None = None
     """The two buses between which we stand, where the machine's own ECU moves the valves."""
     emergency_stop: EmergencyStop | None = None

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.events import FeedbackEvent, StateEvent
+from canshaper.controller.hydraulics import SharedFlow
 from canshaper.controller.motion import motion_runners
 from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
@@ -176,7 +177,8 @@ class Controller:
             self._stood_still = False
             self._invalidate()
         overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
-        changed = self._before_axes(now_ns, last, now) if missed or self.motions else []
+        together = missed or self.motions or self._flow
+        changed = self._before_axes(now_ns, last, now) if together else []
         silent = self.silent_buses if self._protocols else NOWHERE
         for name, runner, message, rule in self._turns:
             period = runner.period_ticks
@@ -217,7 +219,7 @@ class Controller:
             self.events += protocol.changes()
 
     def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisControl]:
-        """Count missed ticks for every axis, then let the motions add to theirs.
+        """Count missed ticks for every axis, let the motions add to theirs, share the oil.
 
         Returns:
             The axes whose state has changed: their filters failed in a missed tick.
@@ -232,6 +234,8 @@ class Controller:
         for motion in self.motions:
             if (event := motion.step(now_ns, last, now)) is not None:
                 self.events.append(event)
+        if self._flow and (shared := self._flow.step(now - last)) is not None:
+            self.events.append(shared)
         return changed
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
@@ -245,6 +249,8 @@ class Controller:
             self.axes[name].add_sway_sensor(message)
             self._sensors[name] = SensorReport(name, self.axes[name])
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
+        oil = self.deployment.config.hydraulics
+        self._flow = SharedFlow(oil, self.axes, inputs.joysticks, tick_s) if oil else None
 
     def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
         """Report changes of the valve's feedback and of the sway sensor."""

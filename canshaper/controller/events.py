@@ -75,6 +75,24 @@ class MotionEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class FlowEvent:
+    """The pump no longer delivers what all axes ask for, or does again.
+
+    Attributes:
+        scale: factor of all demands.
+    """
+
+    scale: float
+
+    @property
+    def text(self) -> str:
+        """Line for the log."""
+        if self.scale == 1.0:
+            return "hydraulics=enough"
+        return f"hydraulics=scaled speed_pct={100.0 * self.scale:.0f}"
+
+
+@dataclass(frozen=True, slots=True)
 class SwaySensorEvent:
     """Change of the trust state of a sway sensor."""
 

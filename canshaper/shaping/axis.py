@@ -52,10 +52,11 @@ class ShapedAxis:
         grid_steps: steps of the valve frame from zero to full command.
 
     Attributes:
-        command: what the operator demanded in the last tick, [-1, 1].
+        command: what the operator demanded in the last tick, [-1, 1], scaled.
         output: what the axis sends, with its parts: one object, which every tick overwrites.
         sway: the sway model.
         sensed: what a sway sensor adds to the model, where there is a sensor.
+        scale: factor of the operator's demand in front of the filter, 0 to 1.
         error: how the filter has failed, see ``Transition``; empty unless it has while the axis
             entered TRIPPED or was in it.
     """
@@ -74,6 +75,7 @@ class ShapedAxis:
         self.command = 0.0
         self.sway = sway
         self.sensed: SensedSway | None = None
+        self.scale = 1.0
         self.error = ""
         self._tick_s = tick_s
         self._neutral_band = neutral_band
@@ -165,7 +167,8 @@ class ShapedAxis:
             if state is ACTIVE or state is BYPASS_ON:
                 size = abs(joystick.command)
                 if size > self._neutral_band:
-                    demand = joystick.command
+                    # In bypass the crane is as it is.
+                    demand = joystick.command * (self.scale if state is ACTIVE else 1.0)
                 if not size < math.inf:  # it would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
             elif state is STOPPING and abs(joystick.command) > self._neutral_band:

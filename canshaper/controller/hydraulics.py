@@ -1,0 +1,64 @@
+"""The oil of one pump, shared by the demands of all axes."""
+
+from collections.abc import Mapping
+
+from canshaper.config.limits import Hydraulics
+from canshaper.controller.events import FlowEvent
+from canshaper.controller.runner import AxisControl
+from canshaper.inputs.joystick import JoystickInput
+from canshaper.shaping.flow_budget import FlowBudget
+from canshaper.shaping.states import Reason, State
+
+# States in which a deflected joystick moves the axis, in this tick or already.
+DRIVEN = (State.READY, State.ACTIVE, State.BYPASS_ON)
+# So long there was enough oil before that is reported.
+ENOUGH_S = 5.0
+
+
+class SharedFlow:
+    """Scales the demands of all axes before any of them acts.
+
+    Args:
+        config: the oil, and what each axis takes of it.
+        axes: the axes by name.
+        joysticks: the joysticks by name.
+        tick_s: time between two ticks of the controller.
+    """
+
+    def __init__(
+        self,
+        config: Hydraulics,
+        axes: Mapping[str, AxisControl],
+        joysticks: Mapping[str, JoystickInput],
+        tick_s: float,
+    ) -> None:
+        self._axes = [
+            (one, joysticks[one.bound.config.command.joystick].commands) for one in axes.values()
+        ]
+        shares = [config.shares.get(name, 1.0) for name in axes]
+        self._budget = FlowBudget(config.flow - config.others, shares, tick_s)
+        self._enough = round(ENOUGH_S / tick_s)
+        self._ticks = self._enough  # since it was scaled last
+
+    def step(self, ticks: int) -> FlowEvent | None:
+        """Scale the demands of this tick; the event where that is to be reported.
+
+        Args:
+            ticks: that have passed; more than 1 where deadlines were missed.
+        """
+        demands, outputs = [], []
+        for runner, commands in self._axes:
+            command = runner.bound.config.command
+            demand = commands.get(command.signal, 0.0)
+            if isinstance(demand, Reason) or runner.axis.state not in DRIVEN:
+                demand = 0.0
+            demands.append(demand if abs(demand) > command.neutral_pct / 100.0 else 0.0)
+            outputs.append(runner.axis.sent)
+        scale = self._budget.step(demands, outputs, ticks)
+        for runner, _ in self._axes:
+            runner.axis.scale = scale
+        before = self._ticks
+        self._ticks = 0 if scale < 1.0 else before + ticks
+        if before >= self._enough > self._ticks or before < self._enough <= self._ticks:
+            return FlowEvent(scale)
+        return None

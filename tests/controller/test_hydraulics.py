@@ -1,0 +1,140 @@
+"""Together the axes ask for no more oil than the pump delivers."""
+
+from collections.abc import Callable
+
+import pytest
+
+from canshaper.config.load import load_config
+from canshaper.controller.guarded import Guarded
+from canshaper.errors import ConfigError
+from canshaper.machine.binding import load_deployment
+from canshaper.shaping.states import State
+from tests.rigs.forwarder import ROOT, Rig
+
+Make = Callable[..., Rig]
+FULL = {"Slew": 1000, "NearFar": 1000}
+
+
+@pytest.fixture
+def pump() -> Rig:
+    return Rig(ROOT / "config" / "forwarder-pump.yaml")
+
+
+def commands(rig: Rig) -> list[float]:
+    return [runner.axis.command for runner in rig.controller.axes.values()]
+
+
+def news(rig: Rig) -> list[str]:
+    return [event.text for event in rig.controller.events if "hydraulics" in event.text]
+
+
+def test_from_the_first_tick_on_both_are_slower_by_one_factor(pump: Rig) -> None:
+    pump.run(3)
+    pump.run(1, Slew=1000, NearFar=500)
+    assert commands(pump) == pytest.approx([0.8, 0.4, 0.0])
+    pump.run(1, **FULL)
+    assert commands(pump) == pytest.approx([0.6, 0.6, 0.0])
+    assert news(pump) == ["hydraulics=scaled speed_pct=80"]
+
+
+def test_one_axis_has_all_it_asks_for(pump: Rig) -> None:
+    pump.run(3)
+    pump.run(50, Slew=1000)
+    assert commands(pump) == [1.0, 0.0, 0.0]
+    assert news(pump) == []
+
+
+def test_what_runs_on_still_takes_its_oil(pump: Rig) -> None:
+    pump.run(3)
+    pump.run(150, **FULL)
+    pump.run(1, Slew=1000)
+    assert pump.controller.axes["near_far"].axis.sent > 0.4
+    assert commands(pump)[0] < 0.65
+    pump.run(250, Slew=1000)
+    assert commands(pump)[0] == 1.0
+
+
+def test_that_there_is_enough_again_is_reported_after_five_seconds(pump: Rig) -> None:
+    pump.run(3)
+    for _ in range(3):  # a line for all of it
+        pump.run(50, **FULL)
+        pump.run(100)
+    assert len(news(pump)) == 1
+    pump.run(260)
+    assert news(pump)[1:] == ["hydraulics=enough"]
+
+
+def test_in_bypass_the_crane_is_as_it_is(pump: Rig) -> None:
+    pump.run(3, AntiSwayOff=1)
+    pump.run(20, **FULL, AntiSwayOff=1)
+    assert commands(pump)[:2] == [1.0, 1.0]
+
+
+def test_a_little_that_is_scaled_is_no_neutral(pump: Rig) -> None:
+    """Nothing is armed by a joystick that is held, however little of it is left."""
+    rig = pump
+    rig.run(10, Slew=1000, NearFar=25, Lift=1000)
+    assert rig.state("near_far") is State.NEUTRAL_WAIT
+    assert rig.reason("near_far") == "JOYSTICK_NOT_NEUTRAL"
+    rig.run(3)
+    rig.run(5, Slew=1000, NearFar=25, Lift=1000)
+    assert rig.state("near_far") is State.ACTIVE
+
+
+def test_a_joystick_that_is_lost_asks_for_nothing_more(pump: Rig) -> None:
+    pump.run(3)
+    pump.run(50, Slew=600, Lift=1000)
+    for _ in range(200):  # the left joystick, which has slew and near-far, is silent
+        pump.receive(pump.joystick("JoystickRight", Lift=1000))
+        pump.tick()
+    assert pump.state("slew") is State.NEUTRAL_WAIT
+    assert commands(pump) == [0.0, 0.0, 1.0]
+
+
+def test_shares_and_others_count(changed_rig: Make) -> None:
+    oil = "hydraulics: { flow: 1.5, others: 0.3, shares: { near_far: 2 } }"
+    rig = changed_rig({"axes:\n": f"{oil}\naxes:\n"})
+    rig.run(3)
+    rig.run(1, **FULL)
+    assert commands(rig) == pytest.approx([0.4, 0.4, 0.0])
+
+
+def test_the_gate_passes_whatever_third_lever_joins(pump: Rig) -> None:
+    guarded = Guarded(pump.controller)
+    levers = [{}, {"Slew": 1000}, FULL, {**FULL, "Lift": 1000}, {"Lift": -1000}, FULL, {}]
+    for raw in levers:
+        for _ in range(60):
+            left = {k: v for k, v in raw.items() if k != "Lift"}
+            right = {k: v for k, v in raw.items() if k == "Lift"}
+            for frame in (
+                pump.joystick("JoystickLeft", **left),
+                pump.joystick("JoystickRight", **right),
+            ):
+                guarded.receive(frame, pump.now_ns)
+            list(guarded.tick(pump.now_ns))
+            pump.now_ns += 20_000_000
+    assert not any("refused" in event.text for event in pump.controller.events)
+
+
+@pytest.mark.parametrize(
+    ("oil", "why"),
+    [
+        ("{ flow: 1.2, shares: { boom: 1 } }", "shares.boom: expected an axis, one of slew,"),
+        ("{ flow: 1.2, others: 1.2 }", "others: expected less than the flow, got 1.2"),
+        ("{ flow: 0 }", "hydraulics.flow: expected 0.1 to 100 full axis flows, got 0"),
+        ("{ shares: { slew: 1 } }", "hydraulics.flow: missing"),
+    ],
+)
+def test_what_cannot_be_is_refused(changed_rig: Make, oil: str, why: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        changed_rig({"axes:\n": f"hydraulics: {oil}\naxes:\n"})
+    assert why in str(refused.value)
+
+
+def test_the_shipped_file_differs_in_the_oil_only() -> None:
+    files = [load_config(ROOT / "config" / f"forwarder-{name}.yaml") for name in ("pump", "robust")]
+    pumped, robust = (file[0] if isinstance(file, tuple) else file for file in files)
+    assert pumped.model_copy(update={"hydraulics": None}) == robust
+    oil = load_deployment(ROOT / "config" / "forwarder-pump.yaml").config.hydraulics
+    assert oil is not None
+    assert oil.flow == 1.2
