@@ -76,6 +76,17 @@ def test_a_released_enable_is_more_than_a_lost_frame(drive: Drive) -> None:
     assert drive.axis.raw == 0
 
 
+def test_a_demand_is_scaled_but_not_in_bypass(drive: Drive) -> None:
+    drive.to_ready()
+    drive.tick(CommandInput(0.8))
+    assert drive.axis.command == 0.8
+    drive.axis.scale = 0.5
+    drive.tick(CommandInput(0.8))
+    assert drive.axis.command == 0.4
+    drive.tick(CommandInput(0.8, bypass=True))
+    assert drive.axis.command == 0.8
+
+
 @pytest.mark.parametrize("command", [0.02, -0.02])
 def test_the_end_of_the_neutral_band_is_neutral(drive: Drive, command: float) -> None:
     """At rest, and in motion, which it does not prolong."""
