@@ -50,7 +50,7 @@ def test_the_demo_leaves_little_swing(flow: float) -> None:
 
 @pytest.mark.slow
 def test_without_a_budget_it_leaves_much() -> None:
-    assert left_deg(shipped("forwarder-robust"), [SCRIPTS["demo"]], "pump_flow=1.2")[1] > 5.0
+    assert left_deg(shipped("forwarder-robust"), [SCRIPTS["demo"]], "pump_flow=1.2")[1] > 2.0
 
 
 @pytest.mark.slow
