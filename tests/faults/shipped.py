@@ -31,6 +31,7 @@ NAMES = (
     "moog-forwarder",
     "cia402-forwarder",
     "remote-forwarder",
+    "forwarder-pump",
 )
 
 
