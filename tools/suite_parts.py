@@ -17,8 +17,7 @@ from tests.lane.packages import cache_lock, install, missing  # noqa: E402
 
 BIN = Path(sys.executable).parent
 JOBS = os.environ.get("JOBS") or str(len(os.sched_getaffinity(0)))
-# One more: now and then a test waits for a clock or a process.
-SPREAD = ("-n", str(int(JOBS) + 1), "--dist", "loadfile")
+SPREAD = ("-n", JOBS, "--dist", "loadfile")
 # Rooms of what decides whether a valve moves.
 GATE = "codec machine shaping inputs gate promises bus protocols controller daemon"
 COUNTED = re.compile(r"(\d+) (passed|failed|skipped|error)")
