@@ -106,9 +106,8 @@ def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None
     check_following(diagnostics, config, joysticks)
     check_profiles(diagnostics, config)
     check_control(diagnostics, config)
-    for name in config.hydraulics.shares.keys() - config.axes.keys() if config.hydraulics else ():
-        place: Place = ("hydraulics", "shares", name)
-        diagnostics.add(place, f"expected an axis, one of {', '.join(config.axes)}, got another")
+    for name in config.hydraulics.shares if config.hydraulics else ():
+        diagnostics.check_axis(("hydraulics", "shares", name), name, config.axes)
 
 
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:

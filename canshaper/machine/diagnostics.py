@@ -1,6 +1,6 @@
 """The problems of a deployment's files: all of them are collected, each with its place."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from canshaper.config.section import Section
 from canshaper.config.source import Place, Source
@@ -24,6 +24,12 @@ class Diagnostics:
     def add(self, place: Place, text: str) -> None:
         """Note a problem at a place of the deployment file."""
         self.problems.append(self._source.problem(place, text))
+
+    def check_axis(self, place: Place, name: str, axes: Collection[str]) -> bool:
+        """Whether an axis has this name; a problem where none has."""
+        if name not in axes:
+            self.add(place, f"expected an axis, got {name!r}; there are {', '.join(axes)}")
+        return name in axes
 
     def check_same(
         self, place: Place, section: Section, keys: Iterable[str], other: Section, text: str

@@ -108,9 +108,7 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         key = Key.parsed(text)
         if key is None:
             add(place, "expected axes.AXIS.SECTION.NAME, got no key of an axis")
-        elif key.axis not in config.axes:
-            add(place, f"expected an axis, got {key.axis!r}; there are {', '.join(config.axes)}")
-        else:
+        elif diagnostics.check_axis(place, key.axis, config.axes):
             for fault in faults(key, config.axes[key.axis], low, high):
                 add(place, fault)
 

@@ -41,8 +41,7 @@ def _check_axis(
         return
     add, axes = lookup.diagnostics.add, lookup.config.axes
     at = ".".join(str(part) for part in place)
-    if name not in axes:
-        add(place, f"expected an axis, got {name!r}; there are {', '.join(axes)}")
+    if not lookup.diagnostics.check_axis(place, name, axes):
         return
     if name in moved:
         add(place, f"expected an axis that is in no other motion, got {name!r} of {moved[name]}")

@@ -4,7 +4,6 @@
 of total tilt.
 """
 
-import math
 import statistics
 from collections.abc import Iterable
 
@@ -15,6 +14,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script
+from tests.closed_loop.test_motion import tilt_deg
 from tests.closed_loop.test_twin import OPERATORS, ROOT, TIMINGS
 from tests.rigs.files import read
 
@@ -30,13 +30,8 @@ def left_deg(
 ) -> tuple[float, float]:
     """Swing left in the last three seconds of each drive: mean and worst."""
     crane = changed_parameters(["radius_max_m=12", *changes])
-    residuals = []
-    for script in scripts:
-        axes = drive(deployment, script, parameters=crane).axes
-        slew, near_far = axes["slew"].sway_deg, axes["near_far"].sway_deg
-        assert slew is not None
-        assert near_far is not None
-        residuals.append(max(map(math.hypot, slew[-150:], near_far[-150:])))
+    drives = (drive(deployment, script, parameters=crane) for script in scripts)
+    residuals = [max(tilt_deg(recording)[-150:]) for recording in drives]
     mean, worst = statistics.mean(residuals), max(residuals)
     print(f"{deployment.path.stem} {' '.join(changes)}: {mean:.2f} in the mean, {worst:.2f} worst")
     return mean, worst
