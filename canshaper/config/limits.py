@@ -21,6 +21,39 @@ class Slewing(Section):
     ]
 
 
+class Position(NamedCodes, InputSection):
+    """A measured position; several sections may read one message."""
+
+    signal: str
+    timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
+
+
+class Ends(Position):
+    """End stops of an axis by a measured position, in the unit of its signal; see ``EndStops``."""
+
+    signal: str = Field(description="signal with the position: a radius, an angle or a length")
+    lowest: Annotated[float, number(-1e6, 1e6, "units", "position of the one end stop")]
+    highest: Annotated[float, number(-1e6, 1e6, "units", "position of the other one, above it")]
+    margin: Annotated[float, number(0, 1000, "units", "how far ahead of an end stop it stops")]
+    """How far ahead of an end stop the axis stops: error of the signal, and the way of its age."""
+    full_speed: Annotated[
+        float, number(-1000, 1000, "units per s", "speed of the position at full positive command")
+    ]
+    """Speed of the position at full positive command; negative where the position then falls."""
+    lag_ms: Annotated[
+        float, number(0, 1000, "ms", "lag of the valve and age of the position, together")
+    ] = 150.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.lowest + 2.0 * self.margin < self.highest:
+            text = f"expected more than lowest and twice the margin, got {self.highest:g}"
+            raise ValueError(f"highest: {text}")
+        if self.full_speed == 0.0:
+            raise ValueError("full_speed: expected a speed, got 0")
+        return self
+
+
 class Limits(Section):
     """Output limits of an axis; see ``OutputLimits``."""
 
@@ -60,6 +93,8 @@ class Limits(Section):
         Annotated[float, number(0.05, 200, "m", "farthest that the tip may travel when it stops")]
         | None
     ) = None
+    ends: Ends | None = None
+    """End stops ahead of which the axis is slowed down, so that it does not hit them."""
     allow_faster: bool = False
     """The output may exceed what the operator commands."""
     allow_reverse: bool = Field(False, description="the output may go against the joystick")
@@ -115,7 +150,7 @@ class Limits(Section):
         )
 
 
-class Radius(NamedCodes, InputSection):
+class Radius(Position):
     """Radius of the tip, measured."""
 
     signal: str = Field(description="signal with the radius in m")

@@ -6,6 +6,7 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.ends import AxisEnds
 from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.hydraulics import SharedFlow
 from canshaper.controller.motion import motion_runners
@@ -177,7 +178,7 @@ class Controller:
             self._stood_still = False
             self._invalidate()
         overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
-        together = missed or self.motions or self._flow
+        together = missed or self.motions or self._flow or self._ends
         changed = self._before_axes(now_ns, last, now) if together else []
         silent = self.silent_buses if self._protocols else NOWHERE
         for name, runner, message, rule in self._turns:
@@ -219,7 +220,7 @@ class Controller:
             self.events += protocol.changes()
 
     def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisControl]:
-        """Count missed ticks for every axis, let the motions add to theirs, share the oil.
+        """Count missed ticks for every axis, look for its ends, add the motions, share the oil.
 
         Returns:
             The axes whose state has changed: their filters failed in a missed tick.
@@ -231,6 +232,9 @@ class Controller:
                 if (transition := runner.hold(last, now)) is not None:
                     self._changed(name, runner, transition)
                     changed.append(runner)
+        for end in self._ends:
+            if (change := end.step(now_ns, last, now)) is not None:
+                self.events.append(change)
         for motion in self.motions:
             if (event := motion.step(now_ns, last, now)) is not None:
                 self.events.append(event)
@@ -239,7 +243,7 @@ class Controller:
         return changed
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
-        """Connect load state, profile, sway sensors and two-axis motions to the axes."""
+        """Connect load state, profile, sway sensors, ends and two-axis motions to the axes."""
         for runner in self.axes.values():
             if switches := inputs.gates.get(runner.bound.config.command.joystick):
                 runner.add_interlock(EnableGate(switches))
@@ -248,6 +252,7 @@ class Controller:
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
             self._sensors[name] = SensorReport(name, self.axes[name])
+        self._ends = [AxisEnds(self.axes[name], one) for name, one in inputs.positions.items()]
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
         oil = self.deployment.config.hydraulics
         self._flow = SharedFlow(oil, self.axes, inputs.joysticks, tick_s) if oil else None

@@ -93,6 +93,19 @@ class FlowEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class EndsEvent:
+    """The position by which an axis is stopped ahead of its end stops is lost, or known again."""
+
+    axis: str
+    known: bool
+
+    @property
+    def text(self) -> str:
+        """Line for the log."""
+        return f"axis={self.axis} ends={'known' if self.known else 'lost'}"
+
+
+@dataclass(frozen=True, slots=True)
 class SwaySensorEvent:
     """Change of the trust state of a sway sensor."""
 

@@ -7,6 +7,7 @@ from canshaper.controller.events import FlowEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.shaping.flow_budget import FlowBudget
+from canshaper.shaping.limits import within
 from canshaper.shaping.states import Reason, State
 
 # States in which a deflected joystick moves the axis, in this tick or already.
@@ -52,6 +53,8 @@ class SharedFlow:
             demand = commands.get(command.signal, 0.0)
             if isinstance(demand, Reason) or runner.axis.state not in DRIVEN:
                 demand = 0.0
+            if runner.axis.state is not State.BYPASS_ON:
+                demand = within(demand, *runner.axis.bounds, 0.0)
             demands.append(demand if abs(demand) > command.neutral_pct / 100.0 else 0.0)
             outputs.append(runner.axis.sent)
         scale = self._budget.step(demands, outputs, ticks)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from canshaper.config.limits import Motion
 from canshaper.controller.events import MotionEvent
 from canshaper.controller.runner import AxisControl
-from canshaper.inputs.value import ValueInput
+from canshaper.inputs.value import Value
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.motion import TwoAxisMotion, farthest_m
 from canshaper.shaping.moving_axis import MovingAxis
@@ -47,6 +47,8 @@ class _Member:
         if axis.sway is not moving.sway:  # changed while it runs
             assert axis.sway is not None
             moving.follow(axis.sway)
+        full, (back, ahead) = moving.full_speed, runner.room
+        moving.room_m = full * back, full * ahead
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
         moving.commanded, moving.able = axis.commanded, axis.state in ABLE
         moving.unattended = axis.unattended
@@ -70,7 +72,7 @@ class MotionRunner:
         config: Motion,
         slew: AxisControl,
         near_far: AxisControl | None,
-        radius: ValueInput | None,
+        radius: Value | None,
         *,
         tick_s: float,
     ) -> None:
@@ -123,9 +125,11 @@ class MotionRunner:
         tip_m = self._radius.fresh(now_ns) if self._radius else None
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
-            member.runner.add_velocity(member.moving.added, damps=member.moving.damps)
+            moving, runner = member.moving, member.runner
+            runner.add_velocity(moving.added, damps=moving.damps)
+            runner.displaced = moving.reached / moving.full_speed
             if self._motion.unattended:
-                member.runner.axis.renew_added_time()
+                runner.axis.renew_added_time()
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
         return None if apart == self._apart else self._changed(apart)
@@ -158,7 +162,7 @@ def _full_speed_m_s(near_far: AxisControl) -> float:
 def motion_runners(
     deployment: Deployment,
     axes: Mapping[str, AxisControl],
-    radii: Mapping[str, ValueInput],
+    radii: Mapping[str, Value],
     tick_s: float,
 ) -> list[MotionRunner]:
     """Motions of a deployment.

@@ -4,16 +4,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.sent import Sender
+from canshaper.config.limits import Ends, Radius
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import (
+    PositionInput,
     ProfileButtons,
     ProfileChoice,
     ProfileSwitch,
+    Value,
     ValueInput,
     profile_names,
-    radius_input,
 )
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundValue, Choosing
@@ -35,6 +37,7 @@ class MachineInputs:
         profile: the operator's choice, where there is one.
         sway_sensors: measurements of sway, by the name of each axis that reads them.
         radii: measured radius of the tip, by the name of its two-axis motion.
+        positions: measured position, by the name of the axis that has ends.
         gates: switches that enable a joystick, but for the one that is pressed, by its name.
         bound: all of them that receive frames, with their messages.
     """
@@ -51,12 +54,10 @@ class MachineInputs:
             self.bound.append((stop, self.stop))
         self.load_state = self._switch(deployment.load_state)
         self.profile = self._profile(deployment)
-        self.radii: dict[str, ValueInput] = {}
-        for name, motion in deployment.motions.items():
-            if motion.radius is not None:
-                self.radii[name] = radius_input(motion.radius)
-                self.bound.append((motion.radius, self.radii[name]))
-
+        self._positions: dict[MessageKey, PositionInput] = {}
+        motions, axes = deployment.motions.items(), deployment.axes.items()
+        self.radii = {n: self._position(one.radius) for n, one in motions if one.radius}
+        self.positions = {name: self._position(one.ends) for name, one in axes if one.ends}
         self.sway_sensors = self._sway_sensors(deployment)
 
     def _sway_sensors(self, deployment: Deployment) -> dict[str, "SwaySensorInput"]:
@@ -98,6 +99,12 @@ class MachineInputs:
             return ProfileSwitch(value, config.profile.codes)
         having = [self.joysticks[n] for n, one in config.joysticks.items() if one.next_profile]
         return ProfileButtons(having, profile_names(config)) if having else None
+
+    def _position(self, bound: BoundValue[Radius] | BoundValue[Ends]) -> Value:
+        if (message := self._positions.get(bound.key)) is None:
+            message = self._positions[bound.key] = PositionInput(bound)
+            self.bound.append((bound, message))
+        return message.read(bound)
 
     def _switch(self, bound: BoundValue[Choosing] | None) -> ValueInput | None:
         if bound is None:

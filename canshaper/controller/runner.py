@@ -12,7 +12,7 @@ from canshaper.controller.parameter_sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
-from canshaper.inputs.value import ProfileChoice, ValueInput
+from canshaper.inputs.value import ProfileChoice, Value, ValueInput
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
@@ -48,6 +48,9 @@ class AxisControl:
         bound: the axis with its codecs, and with the configuration that is in force.
         valve: sends the message of its valve.
         period_ticks, period_s: time between two commands to its valve.
+        room: how far it may still move in both directions ahead of its end stops, full speed times
+            seconds.
+        displaced: how far the motion has moved it from where its own commands lead, likewise.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.
@@ -72,12 +75,12 @@ class AxisControl:
         self._neutral_band = config.command.neutral_pct / 100.0
         self.period_ticks = bound.period_ticks
         self.period_s = period_s = tick_s * bound.period_ticks
-        sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
+        shaper, sway = self.new_filter()
         self.axis = ShapedAxis(
             period_s,
             self.limits(config),
             sway=sway,
-            shaper=_shaper(config, period_s, sway),
+            shaper=shaper,
             neutral_band=self._neutral_band,
             stop_s=config.limits.stop_s,
             grid_steps=bound.valve.steps,
@@ -87,10 +90,12 @@ class AxisControl:
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.add_velocity(0.0, damps=False)
+        self.room = -math.inf, math.inf
+        self.displaced = 0.0
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
-        self._radius: ValueInput | None = None
+        self._radius: Value | None = None
         self._sway_signal: SwaySignal | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
@@ -135,6 +140,12 @@ class AxisControl:
         self.add_velocity(0.0, damps=False)
         self.axis.drop_added()
 
+    def new_filter(self) -> tuple[Shaper, SwayModel | None]:
+        """Return another filter like that of the file, with a sway model of its own."""
+        config, period_s = self.bound.config, self.period_s
+        sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
+        return _shaper(config, period_s, sway), sway
+
     def add_interlock(self, interlock: Interlock) -> None:
         """Add an interlock: it has to agree before the axis may move."""
         self._interlocks.append(interlock)
@@ -155,7 +166,7 @@ class AxisControl:
         damps = bound.config.use == "damp"
         self.axis.sensed = SensedSway(sway, bound.timing, bound.limits, bound.gains, damps=damps)
 
-    def add_radius(self, radius: ValueInput | None) -> None:
+    def add_radius(self, radius: Value | None) -> None:
         """Take the measured radius of a slewing axis, by which the speed of its tip is computed."""
         self._radius = radius
 

@@ -8,7 +8,7 @@ from cantools.database.can import Signal
 
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.signals import special_codes
-from canshaper.config.limits import Radius
+from canshaper.config.limits import Position
 from canshaper.config.schema import DeploymentConfig
 from canshaper.inputs.input import GOOD, Input, Raw
 from canshaper.inputs.joystick import JoystickInput
@@ -43,30 +43,28 @@ class MeasuredSignal:
         return value if code not in self._special and self._low <= value <= self._high else None
 
 
-class ValueInput(Input):
-    """The value of one signal.
+class Value:
+    """The value of one signal of a message that arrives with others.
 
     Args:
-        bound: its message.
         signal: the signal.
-        low: smallest value that is one; by default every number.
+        low: smallest value that is one.
         high: largest.
+        timeout_ms: age at which it is no longer known.
 
     Attributes:
         value: the last one that counted, in the unit of the DBC.
         measured_ns: when it arrived; None when there is none.
     """
 
-    def __init__(
-        self, bound: BoundInput, signal: Signal, low: float = -LARGEST, high: float = LARGEST
-    ) -> None:
-        super().__init__(bound)
+    def __init__(self, signal: Signal, low: float, high: float, timeout_ms: int) -> None:
         self._signal = MeasuredSignal(signal, low, high)
+        self._timeout_ns = timeout_ms * 1_000_000
         self.value = 0.0
         self.measured_ns: int | None = None
 
-    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take the value; a code that is no value is a fault."""
+    def take(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
+        """Take the value of a frame; a code that is no value is a fault."""
         value = self._signal.value(raw)
         if value is None:
             return FrameFault.INVALID_SIGNAL
@@ -79,6 +77,58 @@ class ValueInput(Input):
         if self.measured_ns is None or now_ns - self.measured_ns > self._timeout_ns:
             return None
         return self.value
+
+
+class PositionInput(Input):
+    """A message with measured positions, of which several parts of a machine may read one each.
+
+    Args:
+        bound: its message.
+    """
+
+    def __init__(self, bound: BoundInput) -> None:
+        super().__init__(bound)
+        self._values: list[Value] = []
+
+    def read(self, bound: BoundValue[Position]) -> Value:
+        """Return a position that is read from now on; outside its DBC range it does not count."""
+        low, high = bound.signal.minimum, bound.signal.maximum
+        assert low is not None and high is not None  # checked with the deployment
+        value = Value(bound.signal, low, high, bound.config.timeout_ms)
+        self._values.append(value)
+        return value
+
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
+        """Take every value; a code that is no value is a fault, and the others count."""
+        faults = [value.take(raw, arrived_ns, accepted) for value in self._values]
+        return next(filter(None, faults), GOOD)
+
+    def invalidate(self) -> None:
+        """Invalidate everything received so far."""
+        super().invalidate()
+        for value in self._values:
+            value.measured_ns = None
+
+
+class ValueInput(Value, Input):
+    """A message of which one signal is read.
+
+    Args:
+        bound: its message.
+        signal: the signal.
+        low: smallest value that is one; by default every number.
+        high: largest.
+    """
+
+    def __init__(
+        self, bound: BoundInput, signal: Signal, low: float = -LARGEST, high: float = LARGEST
+    ) -> None:
+        Input.__init__(self, bound)
+        Value.__init__(self, signal, low, high, bound.config.timeout_ms)
+
+    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
+        """Take the value; a code that is no value is a fault."""
+        return self.take(raw, arrived_ns, accepted)
 
     def invalidate(self) -> None:
         """Invalidate everything received so far."""
@@ -144,10 +194,3 @@ class ProfileButtons:
 def profile_names(config: DeploymentConfig) -> list[str]:
     """Return every profile, in the order of the file, after "", the axes' own filters."""
     return ["", *dict.fromkeys(name for axis in config.axes.values() for name in axis.profiles)]
-
-
-def radius_input(bound: BoundValue[Radius]) -> ValueInput:
-    """Return the input of a radius; values outside its DBC range do not count."""
-    low, high = bound.signal.minimum, bound.signal.maximum
-    assert low is not None and high is not None
-    return ValueInput(bound, bound.signal, low, high)

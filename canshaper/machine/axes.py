@@ -9,7 +9,7 @@ from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.machine.filters import check_filters
 from canshaper.machine.identity import bind_status
-from canshaper.machine.inputs import bind_feedback, bind_status_word
+from canshaper.machine.inputs import bind_ends, bind_feedback, bind_status_word
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.stopping import stated_fault
 from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
@@ -65,7 +65,7 @@ def _bind_axis(
         add((*place, "limits", "stop_distance_m"), fault)
     if len(problems) > before:
         return None
-    cia408 = axis.valve.cia408
+    cia408, ends = axis.valve.cia408, axis.limits.ends
     at: Place = (*place, "valve", "cia408", "status")
     return BoundAxis(
         name,
@@ -77,4 +77,5 @@ def _bind_axis(
         *status,
         bind_feedback(lookup, (*place, "feedback"), axis.feedback) if axis.feedback else None,
         bind_status_word(lookup, at, cia408.status) if cia408 else None,
+        bind_ends(lookup, (*place, "limits", "ends"), ends) if ends else None,
     )

@@ -77,13 +77,21 @@ class Deployment:
         )
 
     def inputs(self) -> list[Bound[InputSection]]:
-        """Joysticks, switches, radii, sway sensors, feedback and status words of the valves."""
+        """Joysticks, switches, positions, sway sensors, feedback and status words of the valves."""
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
-        radii = [motion.radius for motion in self.motions.values()]
-        # Several axes may read one message.
+        # Several parts may read one message.
+        read = [*(motion.radius for motion in self.motions.values()), *(a.ends for a in axes)]
+        positions = {one.key: one for one in read if one}.values()
         sensors = {s.message.key: s.message for axis in axes if (s := axis.sway_sensor)}.values()
-        others = (self.emergency_stop, self.load_state, self.profile, *reports, *radii, *sensors)
+        others = (
+            self.emergency_stop,
+            self.load_state,
+            self.profile,
+            *reports,
+            *positions,
+            *sensors,
+        )
         return [*self.joysticks.values(), *self.switches, *(i for i in others if i)]
 
     @property

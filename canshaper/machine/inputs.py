@@ -14,13 +14,13 @@ from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
-from canshaper.config.limits import Radius
+from canshaper.config.limits import Ends, Position, Radius
 from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.contraries import ENABLE, STOP
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
-from canshaper.machine.used_message import UsedMessage
+from canshaper.machine.used_message import UsedMessage, key_path
 from canshaper.shaping.states import Reason
 
 # Two frames may be lost in a row; more is no longer the noise of a bus.
@@ -130,6 +130,9 @@ class BoundValue(Bound[Section_co]):
 
 
 AnySection = TypeVar("AnySection", bound=InputSection)
+AnyPosition = TypeVar("AnyPosition", bound=Position)
+# What of a section is about its message: the same for every part that reads it.
+OF_MESSAGE = tuple(InputSection.model_fields)
 
 
 def bind_input(
@@ -154,7 +157,7 @@ def bind_input(
     used = lookup.message(place, config, received=True, source=config.source)
     if not used:
         return None
-    if used.message.cycle_time or isinstance(config, Radius):  # which may come on change only
+    if used.message.cycle_time or isinstance(config, Position):  # which may come on change only
         lookup.check_timeout(used, config.timeout_ms)
     else:
         used.add_fault("has no GenMsgCycleTime; cycle_ms may say it")
@@ -186,14 +189,50 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[Emergenc
 
 def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radius] | None:
     """Bind the measured radius of the tip."""
-    result = bind_input(lookup, place, config, value=config.signal)
-    if result is None:
+    if (result := _bind_position(lookup, place, config, "the radius")) is None:
         return None
     used, bound = result
-    if signal := used.find((*place, "signal"), config.signal):
-        used.add_fault(radius_range(signal))
-    check_source(used, "the radius")
-    return BoundValue(**vars(bound), signal=signal) if signal else None
+    used.add_fault(radius_range(bound.signal))
+    return bound
+
+
+def bind_ends(lookup: Lookup, place: Place, config: Ends) -> BoundValue[Ends] | None:
+    """Bind the position by which an axis is stopped ahead of its end stops."""
+    if (result := _bind_position(lookup, place, config, "a position")) is None:
+        return None
+    used, bound = result
+    signal = bound.signal
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high <= low:
+        used.add_fault(f"{signal.name} has no range in the DBC; what lies outside is no position")
+        return None
+    for key in ("lowest", "highest"):
+        if not low <= (value := getattr(config, key)) <= high:
+            text = f"expected a position within the range of {signal.name}, [{low:g}|{high:g}]"
+            lookup.diagnostics.add((*place, key), f"{text}, got {value:g}")
+    return bound
+
+
+def _bind_position(
+    lookup: Lookup, place: Place, config: AnyPosition, what: str
+) -> tuple[UsedMessage, BoundValue[AnyPosition]] | None:
+    """Bind a position in a message of its own, or in one that another section reads too."""
+    key = (config.bus, config.message)
+    first = lookup.positions.get(key)
+    if alone := first is None:
+        if (result := bind_input(lookup, place, config, value=config.signal)) is None:
+            return None
+        check_source(result[0], what)
+        first = lookup.positions[key] = result
+    used, bound = first
+    text = f"{key_path(used.place)}, which reads the message too"
+    lookup.diagnostics.check_same(place, config, OF_MESSAGE, bound.config, text)
+    signal = used.find((*place, "signal"), config.signal)
+    if signal is None:
+        return None
+    if not alone and used.uses.get(signal.name) != "signal":  # two parts may read one position
+        used.use((*place, "signal"), signal, "signal")
+    return used, BoundValue(**{**vars(bound), "config": config}, signal=signal)
 
 
 def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[StatusWord] | None:

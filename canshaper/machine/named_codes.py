@@ -68,10 +68,14 @@ def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
         if joystick:
             listing = Listing(place, signals, command.codes, moves=name)
             add(joystick.bus, joystick.message, listing)
-        for key, section in (("feedback", axis.feedback), ("sway_sensor", axis.sway_sensor)):
+        for key, section in (
+            (("feedback",), axis.feedback),
+            (("sway_sensor",), axis.sway_sensor),
+            (("limits", "ends"), axis.limits.ends),
+        ):
             if section:
-                listing = Listing(("axes", name, key, "codes"), (section.signal,), section.codes)
-                add(section.bus, section.message, listing)
+                place = ("axes", name, *key, "codes")
+                add(section.bus, section.message, Listing(place, (section.signal,), section.codes))
     for name, motion in config.motion.items():
         if one := motion.radius:
             listing = Listing(("motion", name, "radius", "codes"), (one.signal,), one.codes)

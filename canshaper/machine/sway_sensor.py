@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
-from canshaper.config.inputs import InputSection, SwaySensorSection
+from canshaper.config.inputs import SwaySensorSection
 from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
-from canshaper.machine.inputs import Bound, bind_input, check_source
+from canshaper.machine.inputs import OF_MESSAGE, Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
 from canshaper.shaping.free_swing import SensorGains, sensor_gains
@@ -34,8 +34,6 @@ LEAST_FUSION = 1.5
 MOST_SECOND = 0.5
 # A second swing of long logs is about as much damped; the first one's damping says little of it.
 SECOND_DAMPING = 0.04
-# What of a section is about its message: the same for every axis that reads it.
-_OF_MESSAGE = (*InputSection.model_fields, "node")
 
 
 @dataclass(frozen=True)
@@ -125,7 +123,9 @@ def _bind_message(
     config = sensors[first]
     for other in others:
         text = f"axes.{first}.sway_sensor, which reads the message too"
-        lookup.diagnostics.check_same(_place(other), sensors[other], _OF_MESSAGE, config, text)
+        lookup.diagnostics.check_same(
+            _place(other), sensors[other], (*OF_MESSAGE, "node"), config, text
+        )
     if (result := bind_input(lookup, _place(first), config)) is None:
         return {}
     used, bound = result

@@ -22,6 +22,7 @@ from canshaper.codec.signals import (
 from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
+from canshaper.config.limits import Ends
 from canshaper.config.schema import (
     AxisSection,
     Command,
@@ -287,6 +288,7 @@ class BoundAxis:
     status_ticks: int
     feedback: BoundValue[FeedbackSection] | None = None
     status_word: Bound[StatusWord] | None = None
+    ends: BoundValue[Ends] | None = None
     sway_sensor: "BoundSwaySensor | None" = None
 
     @property

@@ -57,6 +57,8 @@ class ShapedAxis:
         sway: the sway model.
         sensed: what a sway sensor adds to the model, where there is a sensor.
         scale: factor of the operator's demand in front of the filter, 0 to 1.
+        bounds: smallest and largest demand in front of the filter and of that factor, and of what
+            is added to damp a swing.
         error: how the filter has failed, see ``Transition``; empty unless it has while the axis
             entered TRIPPED or was in it.
     """
@@ -76,6 +78,7 @@ class ShapedAxis:
         self.sway = sway
         self.sensed: SensedSway | None = None
         self.scale = 1.0
+        self.bounds = -1.0, 1.0
         self.error = ""
         self._tick_s = tick_s
         self._neutral_band = neutral_band
@@ -163,14 +166,15 @@ class ShapedAxis:
         if state is not old:
             self._entered(state, old)
         try:
-            demand = path = damping = 0.0
+            held = demand = path = damping = 0.0
             if state is ACTIVE or state is BYPASS_ON:
                 size = abs(joystick.command)
-                if size > self._neutral_band:
-                    # In bypass the crane is as it is.
-                    demand = joystick.command * (self.scale if state is ACTIVE else 1.0)
                 if not size < math.inf:  # it would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
+                if size > self._neutral_band:
+                    held, (low, high) = joystick.command, self.bounds
+                    # In bypass the crane is as it is.
+                    demand = self.scale * min(max(held, low), high) if state is ACTIVE else held
             elif state is STOPPING and abs(joystick.command) > self._neutral_band:
                 stage.stop_against(joystick.command)
             self.command = demand
@@ -179,11 +183,12 @@ class ShapedAxis:
             if adds:
                 path = added
             reference = self._transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
-            if adds and damps_now and not demand:
-                damping = within(reference, -stage.largest_added, stage.largest_added, 0.0)
+            if adds and damps_now and not held:
+                largest, (low, high) = stage.largest_added, self.bounds
+                damping = within(reference, max(low, -largest), min(high, largest), 0.0)
 
             if state in MOVING:
-                stage.drive(demand, reference, path, damping, sensor_damps)
+                stage.drive(held, demand, reference, path, damping, sensor_damps=sensor_damps)
             else:
                 stage.rest()
                 self._transfer.rest()

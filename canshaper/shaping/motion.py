@@ -197,7 +197,7 @@ def _psi(turn: GrapplePath, stiffness: float) -> float:
 
 
 def range_with_added(
-    demand: float, recent_low: float, recent_high: float, own: float, largest: float
+    held: float, recent_low: float, recent_high: float, own: float, largest: float
 ) -> tuple[float, float]:
     """Range of an axis' own velocity and the added one together.
 
@@ -206,7 +206,7 @@ def range_with_added(
     - In a direction that no one commanded, with the joystick released: no faster than ``largest``.
 
     Args:
-        demand: the operator's demand now, [-1, 1].
+        held: velocity at which the operator holds the joystick, [-1, 1].
         recent_low: smallest demand within the tail, 0 or negative.
         recent_high: largest demand within the tail, 0 or positive.
         own: the axis' own velocity, before the ramp.
@@ -216,9 +216,9 @@ def range_with_added(
         (low, high) with low <= 0 <= high and low <= own <= high.
     """
     low, high = recent_low, recent_high
-    if demand > 0.0:
+    if held > 0.0:
         low = 0.0
-    elif demand < 0.0:
+    elif held < 0.0:
         high = 0.0
     else:
         if low == 0.0:

@@ -26,6 +26,7 @@ class MovingAxis:
         commanded: the operator asked for motion within the tail.
         unattended: its joystick rested for longer than the tail, see ``ShapedAxis``.
         able: it may carry out what is added.
+        room_m: how far it may still move in both directions ahead of its end stops, rad or m.
         added: velocity to add now, [-1, 1]; the result.
         sent: velocity that its valve was given last, [-1, 1].
         farthest: how far this axis may be moved from where its operator left it, rad or m; see
@@ -53,6 +54,7 @@ class MovingAxis:
     farthest: float = math.inf
     largest: float = 1.0
     fall_per_s: float = 5.0
+    room_m: tuple[float, float] = (-math.inf, math.inf)
     added: float = 0.0
     damps: bool = False
     damped: float = 0.0
@@ -106,6 +108,8 @@ class MovingAxis:
             target: the position, rad or m.
             weight: 1, or less where the added part ends.
         """
+        back, ahead = self.room_m
+        target = min(max(target, self.reached + back), self.reached + ahead)
         if self.joins:
             self.joins, self.reached = False, target
         way = self.period_s * self.full_speed

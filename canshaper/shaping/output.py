@@ -137,12 +137,20 @@ class OutputStage:
         return self._recent.low != 0.0 or self._recent.high != 0.0
 
     def drive(
-        self, demand: float, reference: float, path: float, damping: float, sensor_damps: bool
+        self,
+        held: float,
+        demand: float,
+        reference: float,
+        path: float,
+        damping: float,
+        *,
+        sensor_damps: bool,
     ) -> None:
         """Find the output of one tick of a moving axis.
 
         Args:
-            demand: velocity that the operator demands.
+            held: velocity at which the operator holds the joystick.
+            demand: what the filter gets of it.
             reference: velocity that the filter asks for; it may be anything.
             path: velocity that is added for the path, see ``Output``.
             damping: velocity that is added for damping, see ``Output``.
@@ -160,7 +168,7 @@ class OutputStage:
         if no_run_on:
             self._no_run_on -= 1
             recent.clear()
-        self._end_run_on(demand)
+        self._end_run_on(held)
         recent.add(demand)
         low, high = allowed_range(recent.low, recent.high, limits)
         own = within(reference, low, high, limits.minimum)
@@ -182,7 +190,7 @@ class OutputStage:
             if not abs(path) <= 1.0:
                 raise ValueError(f"added velocity is {path}")
             largest = self.largest_added if added else 0.0
-            low, high = self._range_with_added(demand, own, largest, no_run_on)
+            low, high = self._range_with_added(held, own, largest, no_run_on)
             target = own
             if added:
                 total = within(own + added, low, high, 0.0)
@@ -207,30 +215,30 @@ class OutputStage:
             carry = self._carry + total - output.setpoint
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
 
-    def _end_run_on(self, demand: float) -> None:
-        """End what runs on beyond the demand, by the fall, where it reaches a limit.
+    def _end_run_on(self, held: float) -> None:
+        """End what runs on beyond the joystick, by the fall, where it reaches a limit.
 
         After a reversal that is a time, and always a way: what will be left of it once the axis has
-        fallen from its velocity. Another demand of so much velocity begins the way again.
+        fallen from its velocity. A joystick that asks for so much velocity begins the way again.
         """
         recent, own = self._recent, self._own_ramp
-        if demand * self._side < 0.0:
+        if held * self._side < 0.0:
             self._reverse()
         if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
             recent.clear_against(self._side)
         self._crossed += 1
-        held = demand if own > 0.0 else -demand
-        beyond = abs(own) - held if held > 0.0 else abs(own)
+        asked = held if own > 0.0 else -held
+        beyond = abs(own) - asked if asked > 0.0 else abs(own)
         if beyond > 0.0:
             self._ran += beyond * self._tick_s
             falling = 0.5 * beyond * beyond / self.limits.fall_per_s
             if self._ran + falling > self.limits.run_on:
                 recent.clear()
-        elif demand:
+        elif held:
             self._ran = 0.0
 
     def _range_with_added(
-        self, demand: float, own: float, largest: float, no_run_on: bool
+        self, held: float, own: float, largest: float, no_run_on: bool
     ) -> tuple[float, float]:
         """Range of the own and the added velocity together, see ``range_with_added``.
 
@@ -238,9 +246,9 @@ class OutputStage:
         """
         low, high, maximum = self._demanded.low, self._demanded.high, self.limits.maximum
         if no_run_on:
-            low = demand if demand < 0.0 else max(low, -largest)
-            high = demand if demand > 0.0 else min(high, largest)
-        low, high = range_with_added(demand, low, high, own, largest)
+            low = held if held < 0.0 else max(low, -largest)
+            high = held if held > 0.0 else min(high, largest)
+        low, high = range_with_added(held, low, high, own, largest)
         return max(low, -maximum), min(high, maximum)
 
     def _with_carry(self, total: float, low: float, high: float) -> float:

@@ -133,10 +133,13 @@ def test_what_cannot_be_is_refused(changed_rig: Make, oil: str, why: str) -> Non
     assert why in str(refused.value)
 
 
-def test_the_shipped_file_differs_in_the_oil_only() -> None:
+def test_the_shipped_file_differs_in_the_oil_and_the_ends_only() -> None:
     pump, robust = (
         load_config(ROOT / "config" / f"forwarder-{name}.yaml")[0] for name in ("pump", "robust")
     )
-    assert pump.model_copy(update={"hydraulics": None}) == robust
     assert pump.hydraulics is not None
-    assert pump.hydraulics.flow == 1.2
+    oil, near_far = pump.hydraulics, pump.axes["near_far"]
+    limits = near_far.limits.model_copy(update={"ends": None})
+    axes = pump.axes | {"near_far": near_far.model_copy(update={"limits": limits})}
+    assert pump.model_copy(update={"hydraulics": None, "axes": axes}) == robust
+    assert oil.flow == 1.2

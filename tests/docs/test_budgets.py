@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 650,
     "docs/comparison.md": 650,
     "docs/decisions.md": 895,
-    "docs/deployment.md": 1970,
+    "docs/deployment.md": 2060,
     "docs/devices.md": 540,
     "docs/doctor.md": 420,
     "docs/glossary.md": 400,
@@ -59,12 +59,15 @@ BUDGET = {
 # Lines of Python, and why so many.
 LINES = {
     "canshaper/gate": (2_320, "read in a day by someone who has never seen it"),
-    "canshaper/shaping": (4_700, "the method: filters, axis, motion, observer of the sway"),
-    "canshaper": (55_900, "a new ability takes the room of an old one"),
-    "tests": (87_900, "one level for each behaviour"),
+    "canshaper/shaping": (
+        4_830,
+        "the method: filters, axis, motion, ends, observer of the sway",
+    ),
+    "canshaper": (56_200, "a new ability takes the room of an old one"),
+    "tests": (88_300, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (343, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.value import ValueInput, radius_input
 from tests.rigs.forwarder import Rig
+from tests.rigs.radius import RadiusInput
 
 STATUS = "status: { bus: crane, message: ShaperStatus }\n"
 TIP = "radius: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 }"
@@ -24,11 +24,11 @@ TIMEOUT_NS = 100_000_000
 Make = Callable[..., Rig]
 
 
-def bound(make: Make) -> tuple[ValueInput, Any]:
+def bound(make: Make) -> tuple[RadiusInput, Any]:
     rig = make({STATUS: MOTION + STATUS}, DBC)
     radius = rig.deployment.motions["crane"].radius
     assert radius is not None
-    return radius_input(radius), rig.message("TipPosition")
+    return RadiusInput(radius), rig.message("TipPosition")
 
 
 def frame(message: Any, raw: int) -> bytes:

@@ -7,9 +7,9 @@ import pytest
 from crccheck.crc import Crc8SaeJ1850
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.value import radius_input
 from canshaper.machine.deployment import Deployment
 from tests.machine.protected_machine import load
+from tests.rigs.radius import RadiusInput
 
 TICK_NS = 20_000_000
 LOW = b"\x77"
@@ -21,7 +21,7 @@ class Tip:
     def __init__(self, deployment: Deployment) -> None:
         radius = deployment.motions["crane"].radius
         assert radius is not None
-        self.radius = radius_input(radius)
+        self.radius = RadiusInput(radius)
         self.now_ns = 0
         self.count = 0
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.value import ValueInput, radius_input
 from tests.rigs.files import Machine
+from tests.rigs.radius import RadiusInput
 
 FIXED = "slew: slew, near_far: near_far, radius_m: 3"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
@@ -165,11 +165,11 @@ def test_a_radius_needs_a_range(machine: Machine, limits: str, says: str) -> Non
 # -- the radius as it arrives ----------------------------------------------------------------------
 
 
-def radius_of(machine: Machine) -> ValueInput:
+def radius_of(machine: Machine) -> RadiusInput:
     moving(machine, MEASURED)
     radius = machine.load().motions["crane"].radius
     assert radius is not None
-    return radius_input(radius)
+    return RadiusInput(radius)
 
 
 def tip(raw: int) -> bytes:

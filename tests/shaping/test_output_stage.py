@@ -14,7 +14,7 @@ def stage() -> OutputStage:
 
 
 def driven(stage: OutputStage, demand: float, reference: float = 0.4, path: float = 0.0) -> float:
-    stage.drive(demand, reference, path, 0.0, sensor_damps=False)
+    stage.drive(demand, demand, reference, path, 0.0, sensor_damps=False)
     return stage.output.setpoint
 
 
