@@ -20,7 +20,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 690,
+    "CHANGELOG.md": 700,
     "CONTRIBUTING.md": 560,
     "README.md": 600,
     "SECURITY.md": 430,
@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 650,
     "docs/comparison.md": 650,
     "docs/decisions.md": 895,
-    "docs/deployment.md": 2060,
+    "docs/deployment.md": 2110,
     "docs/devices.md": 540,
     "docs/doctor.md": 420,
     "docs/glossary.md": 400,
