@@ -7,7 +7,6 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, SequenceChecker
 from canshaper.codec.sent import Sender, SentMessage
 from canshaper.codec.signals import find_signal
-from canshaper.codec.valve import ValveCodec
 from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
@@ -19,6 +18,7 @@ from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.machines import AXES_OF, JOINTS, TIP, build_machine, machine_for
 from canshaper_sim.sensor_messages import sensor_messages
+from canshaper_sim.valve_frames import CommandReader
 
 # Feedback messages and their signals, in the order they are sent; they close with the sway.
 FEEDBACK: Mapping[str, tuple[str, ...]] = {
@@ -49,10 +49,9 @@ class _ValveInput:
     def __init__(self, axis: str, deployment: Deployment) -> None:
         bound = deployment.axes[axis]
         self.axis = axis
-        self._layout = bound.valve.message.fields.layout
-        self._codec: ValveCodec = bound.valve
+        self._length = bound.valve_message.length
+        self._reader = CommandReader(deployment, axis)
         protection = bound.valve.message.protection
-        self._counter = protection.counter
         self._sequence = SequenceChecker(
             protection, min(USUAL_MAX_STEP, protection.counts // 2), qualify=1
         )
@@ -64,7 +63,7 @@ class _ValveInput:
     def receive(self, data: bytes) -> None:
         """Take a command; what is none (wrong length, no velocity) closes the valve."""
         command = 0.0
-        if len(data) == self._layout.length:
+        if len(data) == self._length:
             known = self._known.get(data) or self._read(data)
             if self.age_s >= self.timeout_s:
                 self._sequence.resync()
@@ -78,9 +77,8 @@ class _ValveInput:
         """Alive counter and command of a frame, kept for when the same bytes come again."""
         if len(self._known) >= MOST_KNOWN:
             self._known.clear()
-        raw = self._layout.decode(data)
-        command = (self._codec.read(raw) or 0) / self._codec.steps
-        known = self._known[data] = raw[self._counter] if self._counter else 0, command
+        reader = self._reader
+        known = self._known[data] = reader.count(data), reader.command(data)
         return known
 
 

@@ -1,0 +1,91 @@
+"""What a valve reads in its frames: by the DBC and the deployment file alone.
+
+A valve does not know how the controller encodes. So nothing here is of ``canshaper.codec``, and a
+fault of that moves the simulated crane as it would move a real one.
+"""
+
+from cantools.database.can import Signal
+
+from canshaper.errors import DesignError
+from canshaper.machine.deployment import Deployment
+
+# Of a step: what the rounding of decimals may take.
+_ROUNDING = 1e-6
+
+
+class CommandReader:
+    """Reads the command of one axis.
+
+    Args:
+        deployment: names message and signals.
+        axis: whose valve it is.
+    """
+
+    __slots__ = ("_codes", "_counter", "_flags", "_full", "_negative", "_signal", "_step", "_zero")
+
+    def __init__(self, deployment: Deployment, axis: str) -> None:
+        section = deployment.axes[axis].config
+        valve, command = section.valve, section.command
+        entry = deployment.messages.find(valve.message)
+        if isinstance(entry, str):
+            raise DesignError(f"axes.{axis}.valve: {entry}")
+        signals = {signal.name: signal for signal in entry[1].signals}
+        # A gateway forwards the joystick's own frames: its section says what they mean.
+        stick = deployment.config.joysticks[command.joystick]
+        forwarded = deployment.config.gateway and valve.message == stick.message
+        scaling = command if forwarded else valve
+        self._signal = signal = signals[valve.signal]
+        low, high = float(signal.minimum or 0.0), float(signal.maximum or 0.0)
+        zero = scaling.zero or 0.0
+        full = scaling.full or (min(zero - low, high - zero) if low < zero else high - zero)
+        self._zero = round((zero - signal.offset) / signal.scale)
+        self._full = int(full / abs(signal.scale) + _ROUNDING)
+        self._step = -1 if (signal.scale < 0.0) != scaling.invert else 1
+        self._negative = self._codes = self._flags = None
+        if forwarded and command.negative:
+            self._negative = signals[command.negative]
+        if forwarded and (flags := command.flags):
+            self._flags = signals[flags.neutral], signals[flags.positive], signals[flags.negative]
+        if of := valve.direction:
+            codes = {of.neutral: 0, of.positive: 1, of.negative: -1}
+            self._codes = signals[of.signal], codes
+        bound = deployment.axes[axis].valve_message.signals  # also single bits
+        self._counter = next((s for s in bound if s.name == valve.alive_counter), None)
+
+    def count(self, data: bytes) -> int:
+        """Alive counter of a frame; 0 where the message has none."""
+        return _raw(self._counter, data) if self._counter else 0
+
+    def command(self, data: bytes) -> float:
+        """Command of a frame, -1 .. 1; 0 where its bytes are none."""
+        steps = self._step * (_raw(self._signal, data) - self._zero)
+        if self._negative:
+            back = self._step * (_raw(self._negative, data) - self._zero)
+            if min(steps, back) != 0:
+                return 0.0
+            steps -= back
+        elif self._codes or self._flags:
+            steps = steps * self._direction(data) if steps > 0 else 0
+        return steps / self._full if abs(steps) <= self._full else 0.0
+
+    def _direction(self, data: bytes) -> int:
+        """1, -1, or 0 for neutral and for what is no direction."""
+        if self._codes:
+            signal, codes = self._codes
+            return codes.get(_raw(signal, data), 0)
+        assert self._flags
+        set_ = [_raw(flag, data) == 1 for flag in self._flags]
+        return set_[1] - set_[2] if sum(set_) == 1 else 0
+
+
+def _raw(signal: Signal, data: bytes) -> int:
+    """The bits of a signal, as a number."""
+    if signal.byte_order == "little_endian":
+        value = int.from_bytes(data, "little") >> signal.start
+    else:  # ``start`` is its highest bit
+        last = signal.start // 8 * 8 + 7 - signal.start % 8 + signal.length
+        value = int.from_bytes(data, "big") >> (8 * len(data) - last)
+    value &= (1 << signal.length) - 1
+    if signal.is_signed and value >> (signal.length - 1):
+        value -= 1 << signal.length
+    return value
