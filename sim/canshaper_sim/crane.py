@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
-from canshaper_sim.actuator import Actuator
+from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.bend import Bend, BendParameters
@@ -52,7 +52,8 @@ _ALLOWED = {
     "radius_max_m": (0.0, 30.0),
     "height_min_m": (-20.0, 30.0),
     "height_max_m": (-20.0, 30.0),
-    "start_theta1_rad": (-1000.0, 1000.0),
+    "slew_min_rad": (-math.inf, 1000.0),
+    "slew_max_rad": (-1000.0, math.inf),
     "pump_flow": (0.1, math.inf),
 }
 
@@ -77,6 +78,8 @@ class CraneParameters:
     radius_max_m: float = 8.0
     height_min_m: float = 1.5  # the grapple (1.4 m) just clears the ground
     height_max_m: float = 7.0
+    slew_min_rad: float = -math.inf  # of a tip that is moved directly; else joints.slew_min_deg
+    slew_max_rad: float = math.inf
     start_theta1_rad: float = 0.0
     start_radius_m: float = 3.0
     start_height_m: float = 4.0
@@ -89,9 +92,11 @@ class CraneParameters:
     log: LogParameters = field(default_factory=LogParameters)
     pump_flow: float = math.inf  # most that the pump delivers, full axis flows
     pump: PumpParameters = field(default_factory=PumpParameters)
+    ends: EndParameters = field(default_factory=EndParameters)
 
     def __post_init__(self) -> None:
         start = {
+            "start_theta1_rad": (max(-1000.0, self.slew_min_rad), min(1000.0, self.slew_max_rad)),
             "start_radius_m": (self.radius_min_m, self.radius_max_m),
             "start_height_m": (self.height_min_m, self.height_max_m),
         }
@@ -114,10 +119,12 @@ class CraneParameters:
         reach_m = self.radius_min_m, self.radius_max_m
         height_m = self.height_min_m, self.height_max_m
         slew_rad_s, near_far_m_s = self.slew_full_speed_rad_s, self.near_far_full_speed_m_s
+        turn_rad = self.slew_min_rad, self.slew_max_rad
+        lift_m_s, ends = self.lift_full_speed_m_s, self.ends
         return TipBoom(
-            Actuator(self.slew, slew_rad_s, self.start_theta1_rad, -math.inf, math.inf),
-            Actuator(self.near_far, near_far_m_s, self.start_radius_m, *reach_m),
-            Actuator(self.lift, self.lift_full_speed_m_s, self.start_height_m, *height_m),
+            Actuator(self.slew, slew_rad_s, self.start_theta1_rad, *turn_rad, ends=ends),
+            Actuator(self.near_far, near_far_m_s, self.start_radius_m, *reach_m, ends=ends),
+            Actuator(self.lift, lift_m_s, self.start_height_m, *height_m, ends=ends),
         )
 
 
@@ -275,4 +282,4 @@ def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = N
     """
     p = parameters or CraneParameters()
     start = (p.start_theta1_rad, p.start_radius_m, p.start_height_m)
-    return Crane(p, sway, JointBoom(p.joints, p.slew, p.slew_full_speed_rad_s, start))
+    return Crane(p, sway, JointBoom(p.joints, p.slew, p.slew_full_speed_rad_s, start, p.ends))

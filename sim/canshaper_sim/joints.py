@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from canshaper.errors import DesignError
-from canshaper_sim.actuator import Actuator
+from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT_CYLINDER, SLEW
 from canshaper_sim.grapple import TipMotion
 from canshaper_sim.kinematics import Boom
@@ -113,6 +113,7 @@ class JointBoom:
         slew_valve: ValveParameters,
         slew_full_speed_rad_s: float,
         start: tuple[float, float, float],
+        ends: EndParameters | None = None,
     ) -> None:
         """Stand still with the tip at start: theta1 in rad, radius and height in m.
 
@@ -139,7 +140,7 @@ class JointBoom:
                     f"joints: {name} in the start pose: expected {_readable(name, (low, high))},"
                     f" got {_readable(name, [value])}"
                 )
-            self.axes[name] = Actuator(*drives[name], value, low, high)
+            self.axes[name] = Actuator(*drives[name], value, low, high, ends=ends)
         self._radius_m, self.height_m = self._boom.tip(lift, knuckle, extension)
         self._radius_rate_m_s = self.height_rate_m_s = 0.0
 
