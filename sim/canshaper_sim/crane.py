@@ -15,8 +15,17 @@ from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.bend import Bend, BendParameters
+from canshaper_sim.carrier import Carrier, CarrierParameters
 from canshaper_sim.contact import ContactParameters
-from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
+from canshaper_sim.grapple import (
+    Grapple,
+    Sway,
+    TipMotion,
+    accelerations,
+    advance,
+    new_tuple,
+    pushed,
+)
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
 from canshaper_sim.pump import Pump, PumpParameters
@@ -93,6 +102,7 @@ class CraneParameters:
     pump_flow: float = math.inf  # most that the pump delivers, full axis flows
     pump: PumpParameters = field(default_factory=PumpParameters)
     ends: EndParameters = field(default_factory=EndParameters)
+    carrier: CarrierParameters = field(default_factory=CarrierParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -151,6 +161,8 @@ class Crane:
         "_accelerations",
         "_axes",
         "_bend",
+        "_carrier",
+        "_grounded",
         "_pump",
         "_second",
         "_sway",
@@ -178,9 +190,15 @@ class Crane:
         self._axes = self.boom.axes
         self._bend = Bend(p.boom) if p.boom.frequency_hz else None
         self._pump = Pump(p.pump_flow, p.pump, self._axes) if p.pump_flow < math.inf else None
-        grounded = p.contact.ground_m > -math.inf
-        self._accelerations = self._pulled if grounded else accelerations
+        self._carrier = None if p.carrier.level else Carrier(p.carrier, p.grapple.g_m_s2)
+        self._grounded = p.contact.ground_m > -math.inf
+        free = not (self._grounded or self._carrier)
+        self._accelerations = accelerations if free else self._pulled
         self._sway = sway or Sway()
+        if self._carrier:
+            rest5, rest6 = self.rest_rad
+            theta5, theta6, *rates = self._sway
+            self._sway = Sway(theta5 + rest5, theta6 + rest6, *rates)
         self._second: SecondSwing | None = None
         self._time_s = 0.0
         # Set for good once a joint has passed 90 deg: the grapple is above the horizontal, where a
@@ -203,6 +221,11 @@ class Crane:
             )
         sway = self._second.shown(self._sway) if self._second else self._sway
         return new_tuple(CraneState, (self._time_s, *pose, *sway))
+
+    @property
+    def rest_rad(self) -> tuple[float, float]:
+        """(theta5, theta6) at which the grapple would hang still where the boom is now."""
+        return self._carrier.rest(self.boom.pose[0]) if self._carrier else (0.0, 0.0)
 
     @property
     def axes_at_stop(self) -> tuple[str, ...]:
@@ -247,7 +270,8 @@ class Crane:
             if self._bend:
                 tips = self._bend.advance(step_s, tips)
             if self._second:
-                self._second.advance(step_s, tips)
+                push = self._carrier.push(tips[1]) if self._carrier else (0.0, 0.0, 0.0)
+                self._second.advance(step_s, tips, push)
             self._sway = advance(
                 self.parameters.grapple, self._sway, step_s, tips, self._accelerations
             )
@@ -268,10 +292,16 @@ class Crane:
     def _pulled(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """What gravity, tip and ground make of the sway: (theta5'', theta6'')."""
-        free = accelerations(grapple, sway, tip)
-        held = self.parameters.contact.accelerations(grapple, sway, tip)
-        return free[0] + held[0], free[1] + held[1]
+        """What gravity, tip, ground and carrier make of the sway: (theta5'', theta6'')."""
+        across, along = accelerations(grapple, sway, tip)
+        if self._grounded:
+            held = self.parameters.contact.accelerations(grapple, sway, tip)
+            across, along = across + held[0], along + held[1]
+        if self._carrier:
+            push = self._carrier.push(tip)
+            more = pushed(grapple, sway, push, push)
+            across, along = across + more[0], along + more[1]
+        return across, along
 
 
 def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:

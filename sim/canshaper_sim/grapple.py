@@ -159,6 +159,24 @@ def accelerations(
     return -torque5 / inertia5, -specific6 / l2
 
 
+Push = tuple[float, float, float]
+"""Force on a mass, N/kg: outwards, in slew direction, upwards."""
+
+
+def pushed(
+    grapple: Grapple, sway: tuple[float, float, float, float], link: Push, load: Push
+) -> tuple[float, float]:
+    """What forces on link and grapple add to `accelerations`: by the ways that they go."""
+    s5, c5, s6, c6 = math.sin(sway[0]), math.cos(sway[0]), math.sin(sway[1]), math.cos(sway[1])
+    l1, l2 = grapple.l1_m, grapple.l2_m
+    l3 = l1 + l2 * c6
+    link_moment = grapple.m1_kg * l1 * (c5 * link[1] + s5 * link[2])
+    load_moment = grapple.m2_kg * l3 * (c5 * load[1] + s5 * load[2])
+    inertia5 = grapple.m1_kg * l1 * l1 + grapple.m2_kg * l3 * l3
+    along = s6 * (c5 * load[2] - s5 * load[1]) - c6 * load[0]
+    return (link_moment + load_moment) / inertia5, along / l2
+
+
 Accelerations = Callable[
     [Grapple, tuple[float, float, float, float], TipMotion], tuple[float, float]
 ]

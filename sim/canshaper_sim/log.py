@@ -11,7 +11,7 @@ with lean = a/g, the angle at which it would hang under the acceleration a of th
 import math
 from dataclasses import dataclass, replace
 
-from canshaper_sim.grapple import Grapple, Sway, TipMotion
+from canshaper_sim.grapple import Grapple, Push, Sway, TipMotion
 from canshaper_sim.ranges import check_ranges
 
 # name -> (lowest, highest) value.
@@ -69,14 +69,18 @@ class SecondSwing:
         self.across = share * sway.theta5_rad, share * sway.theta5_rate_rad_s
         self.along = share * sway.theta6_rad, share * sway.theta6_rate_rad_s
 
-    def advance(self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion]) -> None:
-        """Swing on for step_s seconds; the mean acceleration of the tip acts all the time."""
+    def advance(
+        self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion], push: Push
+    ) -> None:
+        """Swing on for step_s seconds; push and the tip's mean acceleration act all the time."""
         if step_s != self._step_s:
             self._step_s, self._by = step_s, self._over(step_s)
         start, middle, end = (_pulls(tip) for tip in tips)
         lean = self._share / (6.0 * self._gravity_m_s2)
-        self.across = self._moved(self.across, -lean * (start[0] + 4.0 * middle[0] + end[0]))
-        self.along = self._moved(self.along, lean * (start[1] + 4.0 * middle[1] + end[1]))
+        across = start[0] + 4.0 * middle[0] + end[0] - 6.0 * push[1]
+        along = start[1] + 4.0 * middle[1] + end[1] - 6.0 * push[0]
+        self.across = self._moved(self.across, -lean * across)
+        self.along = self._moved(self.along, lean * along)
 
     def shown(self, sway: Sway) -> Sway:
         """The swing of the tool, of that of its pendulum."""
