@@ -162,11 +162,13 @@ class Crane:
         "_axes",
         "_bend",
         "_carrier",
+        "_empty_kg",
         "_grounded",
         "_pump",
         "_second",
         "_sway",
         "_time_s",
+        "_uncompensated",
         "boom",
         "parameters",
         "swung_over",
@@ -190,6 +192,10 @@ class Crane:
         self._axes = self.boom.axes
         self._bend = Bend(p.boom) if p.boom.frequency_hz else None
         self._pump = Pump(p.pump_flow, p.pump, self._axes) if p.pump_flow < math.inf else None
+        # Their flow depends on the load: of what is in the grapple besides itself.
+        valves = [axis.valve for axis in self._axes.values()]
+        self._uncompensated = [v for v in valves if v.parameters.load or v.parameters.load_per_t]
+        self._empty_kg = p.grapple.m2_kg
         self._carrier = None if p.carrier.level else Carrier(p.carrier, p.grapple.g_m_s2)
         self._grounded = p.contact.ground_m > -math.inf
         free = not (self._grounded or self._carrier)
@@ -263,7 +269,10 @@ class Crane:
         # The smallest number of equal steps; the margin forgives rounding of dt_s.
         count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)
         step_s = dt_s / count
+        gripped_kg = self.parameters.grapple.m2_kg - self._empty_kg
         for _ in range(count):
+            for valve in self._uncompensated:
+                valve.meet(valve.parameters.against(gripped_kg))
             if self._pump:
                 self._pump.advance(step_s)
             tips = self.boom.advance(step_s)

@@ -63,7 +63,7 @@ class Pump:
     def advance(self, step_s: float) -> None:
         """Share the oil of the next step among the valves, by what their spools ask for now."""
         p, valves = self._parameters, self._by_load
-        asked = [abs(valve.spool) for valve in valves]
+        asked = [abs(valve.spool * valve.ease) for valve in valves]
         total = sum(asked)
         available = min(total, self._flow)
         if p.lag_s:
@@ -71,11 +71,12 @@ class Pump:
             available = self._delivered = self._delivered + change
         if total <= available + _NOTHING:
             for valve in valves:
-                valve.supply = 1.0
+                valve.supply = valve.ease
         elif p.shares_flow:
             for valve in valves:
-                valve.supply = available / total
+                valve.supply = available / total * valve.ease
         else:
             for valve, flow in zip(valves, asked, strict=True):
-                valve.supply = min(1.0, available / flow) if flow > _NOTHING else 1.0
-                available -= valve.supply * flow
+                part = min(1.0, available / flow) if flow > _NOTHING else 1.0
+                valve.supply = part * valve.ease
+                available -= part * flow

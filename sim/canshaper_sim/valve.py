@@ -5,6 +5,11 @@ magnet, the deadband of the spool, the flow limit, the rate limit of the spool a
 lag of oil and actuator. All values are fractions of the full speed of the axis. Between two changes
 of the command the spool moves on straight lines, so rate limit and lag are solved exactly for any
 step length.
+
+Without a pressure compensator the flow is that through an orifice, the root of the pressure that
+the load leaves (Merritt, Hydraulic Control Systems, 1967): an axis is slower against its load than
+with it. A cylinder is faster towards its rod, by the ratio of its areas, 1.25 to 2
+(``negative_gain``).
 """
 
 import math
@@ -22,8 +27,10 @@ _ALLOWED = {
     "deadband": (0.0, 0.5),
     "negative_more_deadband": (-0.3, 0.3),
     "hysteresis": (0.0, 0.2),
-    "negative_gain": (0.2, 1.0),
+    "negative_gain": (0.2, 2.0),
     "flow_limit": (0.05, 1.0),
+    "load": (-0.9, 0.9),
+    "load_per_t": (-0.9, 0.9),
     "rate_limit_1_s": (0.1, math.inf),  # inf: no rate limit
     "lag_s": (0.01, 1.0),  # a speed that jumps would need an infinite tip acceleration
 }
@@ -37,10 +44,14 @@ class ValveParameters:
     deadband: float = 0.05  # fraction of full stroke in which no oil flows
     negative_more_deadband: float = 0.0  # what negative commands need besides to open it
     hysteresis: float = 0.0  # play between command and spool, fraction of full stroke
-    negative_gain: float = 1.0  # speed at full negative command, fraction of full speed
+    negative_gain: float = 1.0  # speed at full negative command, of that at full positive
     flow_limit: float = 1.0  # largest |speed|, fraction of full speed
     rate_limit_1_s: float = 5.0  # full speeds per second of spool travel
     lag_s: float = 0.1  # time constant; 0.05 .. 0.15 s is usual
+    # Pressure that boom and empty grapple take in the positive direction, and help with in the
+    # negative one; fraction of the supply's. With a pressure compensator it does not count: 0.
+    load: float = 0.0
+    load_per_t: float = 0.0  # what every tonne in the grapple adds to that
 
     def __post_init__(self) -> None:
         check_ranges("valve", self, _ALLOWED)
@@ -56,15 +67,22 @@ class ValveParameters:
         opening = (abs(command) - deadband) / (1.0 - deadband)
         if opening <= 0.0:
             return 0.0
+        most = self.flow_limit
         if command < 0.0:
             opening *= self.negative_gain
-        return math.copysign(min(opening, self.flow_limit), command)
+            most *= max(1.0, self.negative_gain)
+        return math.copysign(min(opening, most), command)
+
+    def against(self, gripped_kg: float) -> float:
+        """Pressure that the load takes in the positive direction with so much in the grapple."""
+        return self.load + self.load_per_t * gripped_kg / 1000.0
 
 
 class Valve:
     """A valve in motion: `set_command`, then `advance` in steps, read `speed`.
 
     `supply` is the part of the oil that it asks for which it gets in the next step; 1 by itself.
+    `ease` is what its load makes of the flow, where nothing compensates it.
     """
 
     __slots__ = (
@@ -78,6 +96,7 @@ class Valve:
         "_requested",
         "_target",
         "_time_s",
+        "ease",
         "parameters",
         "speed",
         "spool",
@@ -87,7 +106,7 @@ class Valve:
     def __init__(self, parameters: ValveParameters | None = None) -> None:
         self.parameters = parameters or ValveParameters()
         self.speed = 0.0  # achieved speed, fraction of full speed
-        self.supply = 1.0
+        self.supply = self.ease = 1.0
         self._lag_s = self.parameters.lag_s
         self._ramp_1_s = self.parameters.rate_limit_1_s
         self._command = 0.0  # the last one
@@ -120,6 +139,11 @@ class Valve:
             self._pending.append((self._time_s + self.parameters.dead_time_s, flow))
         else:
             self._move_to(flow)
+
+    def meet(self, load: float) -> None:
+        """Get, in the next step, what flows against this load (`ValveParameters.against`)."""
+        forward = (self.spool or self._target) > 0.0
+        self.supply = self.ease = math.sqrt(max(0.0, 1.0 - load if forward else 1.0 + load))
 
     def advance(self, step_s: float) -> tuple[float, float, float, float]:
         """Let step_s seconds pass, in two halves.
