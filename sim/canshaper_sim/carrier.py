@@ -8,7 +8,7 @@ slew angle. A forwarder works on slopes up to 15 degrees (27 %), along and acros
 import math
 from dataclasses import dataclass
 
-from canshaper_sim.grapple import Push, TipMotion
+from canshaper_sim.grapple import Push
 from canshaper_sim.ranges import check_ranges
 
 # name -> (lowest, highest) value.
@@ -46,17 +46,11 @@ class Carrier:
         self.pitch_rad = math.radians(parameters.pitch_deg)
         self.roll_rad = math.radians(parameters.roll_deg)
 
-    def push(self, tip: TipMotion) -> Push:
+    def push(self, slew_rad: float) -> Push:
         """What a mass at the tip feels more than on a level carrier."""
         gravity, fall = self._gravity_m_s2, math.cos(self.pitch_rad)
         ahead = gravity * math.sin(self.pitch_rad)
         left = -gravity * fall * math.sin(self.roll_rad)
         up = gravity * (1.0 - fall * math.cos(self.roll_rad))
-        s, c = math.sin(tip.slew_rad), math.cos(tip.slew_rad)
+        s, c = math.sin(slew_rad), math.cos(slew_rad)
         return ahead * c + left * s, left * c - ahead * s, up
-
-    def rest(self, slew_rad: float) -> tuple[float, float]:
-        """(theta5, theta6) in rad at which the grapple hangs still."""
-        out, across, up = self.push(TipMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, slew_rad))
-        down = self._gravity_m_s2 - up
-        return math.atan2(across, down), -math.atan2(out, math.hypot(across, down))

@@ -19,12 +19,14 @@ from canshaper_sim.carrier import Carrier, CarrierParameters
 from canshaper_sim.contact import ContactParameters
 from canshaper_sim.grapple import (
     Grapple,
+    Push,
     Sway,
     TipMotion,
     accelerations,
     advance,
     new_tuple,
     pushed,
+    rest,
 )
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
@@ -34,6 +36,7 @@ from canshaper_sim.sway_sensor import SwaySensorParameters
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.tip_controller import TipControllerParameters
 from canshaper_sim.valve import ValveParameters
+from canshaper_sim.wind import Wind, WindParameters
 
 __all__ = [
     "AXES",
@@ -103,6 +106,7 @@ class CraneParameters:
     pump: PumpParameters = field(default_factory=PumpParameters)
     ends: EndParameters = field(default_factory=EndParameters)
     carrier: CarrierParameters = field(default_factory=CarrierParameters)
+    wind: WindParameters = field(default_factory=WindParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -169,6 +173,7 @@ class Crane:
         "_sway",
         "_time_s",
         "_uncompensated",
+        "_wind",
         "boom",
         "parameters",
         "swung_over",
@@ -197,11 +202,12 @@ class Crane:
         self._uncompensated = [v for v in valves if v.parameters.load or v.parameters.load_per_t]
         self._empty_kg = p.grapple.m2_kg
         self._carrier = None if p.carrier.level else Carrier(p.carrier, p.grapple.g_m_s2)
+        self._wind = Wind(p.wind) if p.wind.speed_m_s or p.wind.gust_m_s else None
         self._grounded = p.contact.ground_m > -math.inf
-        free = not (self._grounded or self._carrier)
+        free = not (self._grounded or self._carrier or self._wind)
         self._accelerations = accelerations if free else self._pulled
         self._sway = sway or Sway()
-        if self._carrier:
+        if self._carrier or self._wind:
             rest5, rest6 = self.rest_rad
             theta5, theta6, *rates = self._sway
             self._sway = Sway(theta5 + rest5, theta6 + rest6, *rates)
@@ -230,8 +236,8 @@ class Crane:
 
     @property
     def rest_rad(self) -> tuple[float, float]:
-        """(theta5, theta6) at which the grapple would hang still where the boom is now."""
-        return self._carrier.rest(self.boom.pose[0]) if self._carrier else (0.0, 0.0)
+        """(theta5, theta6) at which the grapple would hang still: here, in the present wind."""
+        return rest(self.parameters.grapple, *self._pushes(self.boom.pose[0]))
 
     @property
     def axes_at_stop(self) -> tuple[str, ...]:
@@ -275,12 +281,13 @@ class Crane:
                 valve.meet(valve.parameters.against(gripped_kg))
             if self._pump:
                 self._pump.advance(step_s)
+            if self._wind:
+                self._wind.advance(step_s)
             tips = self.boom.advance(step_s)
             if self._bend:
                 tips = self._bend.advance(step_s, tips)
             if self._second:
-                push = self._carrier.push(tips[1]) if self._carrier else (0.0, 0.0, 0.0)
-                self._second.advance(step_s, tips, push)
+                self._second.advance(step_s, tips, self._pushes(tips[1].slew_rad)[1])
             self._sway = advance(
                 self.parameters.grapple, self._sway, step_s, tips, self._accelerations
             )
@@ -301,16 +308,23 @@ class Crane:
     def _pulled(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """What gravity, tip, ground and carrier make of the sway: (theta5'', theta6'')."""
+        """What gravity, tip, ground, carrier and wind make of the sway: (theta5'', theta6'')."""
         across, along = accelerations(grapple, sway, tip)
         if self._grounded:
             held = self.parameters.contact.accelerations(grapple, sway, tip)
             across, along = across + held[0], along + held[1]
-        if self._carrier:
-            push = self._carrier.push(tip)
-            more = pushed(grapple, sway, push, push)
+        if self._carrier or self._wind:
+            more = pushed(grapple, sway, *self._pushes(tip.slew_rad))
             across, along = across + more[0], along + more[1]
         return across, along
+
+    def _pushes(self, slew_rad: float) -> tuple[Push, Push]:
+        """What link and grapple feel besides the gravity of level ground."""
+        link = load = self._carrier.push(slew_rad) if self._carrier else (0.0, 0.0, 0.0)
+        if self._wind:
+            out, across, up = self._wind.push(slew_rad, self.parameters.grapple.m2_kg)
+            load = load[0] + out, load[1] + across, load[2] + up
+        return link, load
 
 
 def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:

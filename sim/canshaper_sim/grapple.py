@@ -177,6 +177,19 @@ def pushed(
     return (link_moment + load_moment) / inertia5, along / l2
 
 
+def rest(grapple: Grapple, link: Push, load: Push) -> tuple[float, float]:
+    """(theta5, theta6) in rad at which nothing swings under these forces on link and grapple."""
+    theta5 = theta6 = 0.0
+    g, of_link = grapple.g_m_s2, grapple.m1_kg * grapple.l1_m
+    for _ in range(8):  # theta6 shortens what theta5 moves, by less each time
+        of_load = grapple.m2_kg * (grapple.l1_m + grapple.l2_m * math.cos(theta6))
+        across = of_link * link[1] + of_load * load[1]
+        theta5 = math.atan2(across, of_link * (g - link[2]) + of_load * (g - load[2]))
+        down = math.cos(theta5) * (g - load[2]) + math.sin(theta5) * load[1]
+        theta6 = math.atan2(-load[0], down)
+    return theta5, theta6
+
+
 Accelerations = Callable[
     [Grapple, tuple[float, float, float, float], TipMotion], tuple[float, float]
 ]
