@@ -54,6 +54,7 @@ __all__ = [
 INTERNAL_STEP_S: Final = 0.010
 
 _HORIZONTAL: Final = math.pi / 2.0
+_NONE: Final = (0.0, 0.0, 0.0)
 
 # name -> (lowest, highest) value that still describes a forestry or loader crane.
 _ALLOWED = {
@@ -208,6 +209,11 @@ class Crane:
         self._accelerations = accelerations if free else self._pulled
         self._sway = sway or Sway()
         if self._carrier or self._wind:
+            theta1, radius_m, height_m, *_ = self.boom.pose
+            tip = TipMotion(radius_m, 0.0, 0.0, 0.0, 0.0, 0.0, theta1, height_m)
+            for _ in range(4):  # carrier and grapple lean on each other, by less each time
+                if self._carrier:
+                    self._carrier.settle(p.grapple, Sway(*self.rest_rad), tip)
             rest5, rest6 = self.rest_rad
             theta5, theta6, *rates = self._sway
             self._sway = Sway(theta5 + rest5, theta6 + rest6, *rates)
@@ -237,7 +243,7 @@ class Crane:
     @property
     def rest_rad(self) -> tuple[float, float]:
         """(theta5, theta6) at which the grapple would hang still: here, in the present wind."""
-        return rest(self.parameters.grapple, *self._pushes(self.boom.pose[0]))
+        return rest(self.parameters.grapple, *self._pushes(*self.boom.pose[:2]))
 
     @property
     def axes_at_stop(self) -> tuple[str, ...]:
@@ -286,8 +292,11 @@ class Crane:
             tips = self.boom.advance(step_s)
             if self._bend:
                 tips = self._bend.advance(step_s, tips)
+            if self._carrier:
+                self._carrier.advance(step_s, self.parameters.grapple, self._sway, tips[1])
             if self._second:
-                self._second.advance(step_s, tips, self._pushes(tips[1].slew_rad)[1])
+                push = self._pushes(tips[1].slew_rad, tips[1].radius_m)[1]
+                self._second.advance(step_s, tips, push)
             self._sway = advance(
                 self.parameters.grapple, self._sway, step_s, tips, self._accelerations
             )
@@ -314,13 +323,13 @@ class Crane:
             held = self.parameters.contact.accelerations(grapple, sway, tip)
             across, along = across + held[0], along + held[1]
         if self._carrier or self._wind:
-            more = pushed(grapple, sway, *self._pushes(tip.slew_rad))
+            more = pushed(grapple, sway, *self._pushes(tip.slew_rad, tip.radius_m))
             across, along = across + more[0], along + more[1]
         return across, along
 
-    def _pushes(self, slew_rad: float) -> tuple[Push, Push]:
+    def _pushes(self, slew_rad: float, radius_m: float) -> tuple[Push, Push]:
         """What link and grapple feel besides the gravity of level ground."""
-        link = load = self._carrier.push(slew_rad) if self._carrier else (0.0, 0.0, 0.0)
+        link = load = self._carrier.push(slew_rad, radius_m) if self._carrier else _NONE
         if self._wind:
             out, across, up = self._wind.push(slew_rad, self.parameters.grapple.m2_kg)
             load = load[0] + out, load[1] + across, load[2] + up

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass, replace
 
 from canshaper_sim.grapple import Grapple, Push, Sway, TipMotion
+from canshaper_sim.oscillator import moved, swing_over
 from canshaper_sim.ranges import check_ranges
 
 # name -> (lowest, highest) value.
@@ -74,13 +75,13 @@ class SecondSwing:
     ) -> None:
         """Swing on for step_s seconds; push and the tip's mean acceleration act all the time."""
         if step_s != self._step_s:
-            self._step_s, self._by = step_s, self._over(step_s)
+            self._step_s, self._by = step_s, swing_over(self._omega, self._ratio, step_s)
         start, middle, end = (_pulls(tip) for tip in tips)
         lean = self._share / (6.0 * self._gravity_m_s2)
         across = start[0] + 4.0 * middle[0] + end[0] - 6.0 * push[1]
         along = start[1] + 4.0 * middle[1] + end[1] - 6.0 * push[0]
-        self.across = self._moved(self.across, -lean * across)
-        self.along = self._moved(self.along, lean * along)
+        self.across = moved(self._by, self.across, -lean * across)
+        self.along = moved(self._by, self.along, lean * along)
 
     def shown(self, sway: Sway) -> Sway:
         """The swing of the tool, of that of its pendulum."""
@@ -91,20 +92,6 @@ class SecondSwing:
             rest * sway.theta5_rate_rad_s + across[1],
             rest * sway.theta6_rate_rad_s + along[1],
         )
-
-    def _over(self, step_s: float) -> tuple[float, float, float, float]:
-        """What a free swing makes of (angle, rate) in that time, exactly."""
-        omega, ratio = self._omega, self._ratio
-        damped = omega * math.sqrt(1.0 - ratio**2)
-        fade = math.exp(-ratio * omega * step_s)
-        cosine = fade * math.cos(damped * step_s)
-        sine = fade * math.sin(damped * step_s) / damped
-        slow = ratio * omega * sine
-        return cosine + slow, sine, -omega * omega * sine, cosine - slow
-
-    def _moved(self, state: tuple[float, float], lean: float) -> tuple[float, float]:
-        by, off = self._by, state[0] - lean
-        return lean + by[0] * off + by[1] * state[1], by[2] * off + by[3] * state[1]
 
 
 def _pulls(tip: TipMotion) -> tuple[float, float]:

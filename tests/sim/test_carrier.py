@@ -3,12 +3,14 @@
 import math
 
 import pytest
+from scipy.linalg import eigh
 
 from canshaper.errors import DesignError
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.parameters import changed_parameters
 from tests.sim.drives import TICK_S
+from tests.sim.test_log import period_s
 
 FREE = Grapple(c5_n_m_s_rad=0.0, c6_n_m_s_rad=0.0)
 
@@ -124,3 +126,63 @@ def test_a_slope_that_no_forwarder_works_on_is_refused(name: str) -> None:
 def test_level_ground_changes_nothing() -> None:
     assert CraneParameters().carrier.level
     assert on_slope().state == Crane().state
+
+
+ROCKING = ("carrier.rock_hz=1.2", "carrier.rock_damping=0.02", "carrier.roll_kg_m2=4e4")
+LEFT = f"start_theta1_rad={math.pi / 2}"
+
+
+def test_a_carrier_on_tyres_leans_by_what_hangs_there() -> None:
+    """Moment over stiffness; and nothing moves."""
+    stiff = 4e4 * (2.0 * math.pi * 1.2) ** 2
+    for radius_m in (3.0, 6.0):
+        crane = on_slope(*ROCKING, LEFT, f"start_radius_m={radius_m}", "carrier.boom_kg=800")
+        lean = 9.81 * radius_m * (340.0 + 400.0) / stiff
+        for state in swing(crane, 2.0):
+            # The boom points left, which goes down: the grapple hangs outwards.
+            assert state.theta6_rad == pytest.approx(-lean, rel=0.01)
+            assert state.theta6_rad == pytest.approx(crane.rest_rad[1], abs=1e-6)
+
+
+def test_it_rocks_with_its_own_period_once_it_is_pushed() -> None:
+    light = ("grapple.m1_kg=0", "grapple.m2_kg=1", "carrier.pitch_kg_m2=4e4")
+    crane = on_slope(*ROCKING, *light, "start_radius_m=4")
+    for command in [1.0] * 30 + [0.0] * 40:
+        crane.step(TICK_S, {"near_far": command})
+    rolls, carrier = [], crane._carrier
+    assert carrier
+    for _ in range(250):
+        crane.step(TICK_S, {})
+        rolls.append(carrier.pitch[1])
+    assert period_s(rolls) == pytest.approx(1.0 / 1.2, rel=0.01)
+    assert carrier.roll == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+def test_a_tip_that_gives_way_makes_the_pendulum_slower() -> None:
+    soft = ("carrier.rock_hz=2", "carrier.rock_damping=0", "carrier.roll_kg_m2=1e4")
+    free = ("grapple.l1_m=0", "grapple.m1_kg=0", "grapple.c5_n_m_s_rad=0", "grapple.c6_n_m_s_rad=0")
+    place = ("start_height_m=6", "carrier.boom_kg=0", "start_radius_m=1.8")
+
+    crane = on_slope(*free, *place, *soft, sway=Sway(theta5_rad=0.03))
+    angles = [state.theta5_rad for state in swing(crane, 40.0)]
+    # Roll and swing against the vertical, small: mass and stiffness matrix of Lagrange.
+    inertia, pull, height_m, length_m = 1e4, 300.0 * 9.81, 6.0, 1.2
+    mass = [
+        [inertia + 300.0 * height_m**2, 300.0 * height_m * length_m],
+        [300.0 * height_m * length_m, 300.0 * length_m**2],
+    ]
+    stiffness = [[inertia * (4.0 * math.pi) ** 2 - pull * height_m, 0.0], [0.0, pull * length_m]]
+    squares = eigh(stiffness, mass, eigvals_only=True)
+    assert 2.0 * math.pi / math.sqrt(squares[0]) > 1.02 * 2.0 * math.pi / math.sqrt(9.81 / 1.2)
+    assert period_s(angles) == pytest.approx(2.0 * math.pi / math.sqrt(squares[0]), rel=0.003)
+
+
+def test_slewing_rocks_it_and_the_rocking_dies_away() -> None:
+    crane = on_slope("carrier.rock_hz=1.2", "grapple.c5_n_m_s_rad=600", "grapple.c6_n_m_s_rad=600")
+    carrier, rolls = crane._carrier, []
+    assert carrier
+    for command in [1.0] * 60 + [0.0] * 500:
+        crane.step(TICK_S, {"slew": command})
+        rolls.append(abs(carrier.roll[1]))
+    assert max(rolls[:100]) > 0.003
+    assert max(rolls[-50:]) < 0.05 * max(rolls)

@@ -1,0 +1,22 @@
+"""A damped swing about a place that stands during a step, solved exactly."""
+
+import math
+
+State = tuple[float, float]
+"""Deflection and its rate."""
+
+
+def swing_over(omega: float, ratio: float, step_s: float) -> tuple[float, float, float, float]:
+    """What a free swing, undamped of this frequency (rad/s), makes of (deflection, rate)."""
+    damped = omega * math.sqrt(1.0 - ratio**2)
+    fade = math.exp(-ratio * omega * step_s)
+    cosine = fade * math.cos(damped * step_s)
+    sine = fade * math.sin(damped * step_s) / damped
+    slow = ratio * omega * sine
+    return cosine + slow, sine, -omega * omega * sine, cosine - slow
+
+
+def moved(by: tuple[float, float, float, float], state: State, about: float) -> State:
+    """A state after such a step, in which the swing is about this place."""
+    off = state[0] - about
+    return about + by[0] * off + by[1] * state[1], by[2] * off + by[3] * state[1]
