@@ -12,7 +12,7 @@ LIFT: Final = "lift"  # positive: upwards
 LIFT_CYLINDER: Final = "lift_cylinder"  # joint theta2; positive: the main boom rises
 KNUCKLE: Final = "knuckle"  # joint theta3; positive: the outer boom folds out
 EXTENSION: Final = "extension"  # joint d4; positive: the telescope goes out
-ROTATOR: Final = "rotator"  # turns the grapple about itself, which no model here needs
+ROTATOR: Final = "rotator"  # turns the grapple about itself; positive: counter-clockwise from above
 
 TIP_AXES: Final = (SLEW, NEAR_FAR, LIFT)
 JOINT_AXES: Final = (SLEW, LIFT_CYLINDER, KNUCKLE, EXTENSION)

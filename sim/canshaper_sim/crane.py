@@ -12,26 +12,18 @@ from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 from canshaper_sim.actuator import Actuator, EndParameters
-from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, ROTATOR, SLEW
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.bend import Bend, BendParameters
 from canshaper_sim.carrier import Carrier, CarrierParameters
 from canshaper_sim.contact import ContactParameters
-from canshaper_sim.grapple import (
-    Grapple,
-    Push,
-    Sway,
-    TipMotion,
-    accelerations,
-    advance,
-    new_tuple,
-    pushed,
-    rest,
-)
+from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
 from canshaper_sim.pump import Pump, PumpParameters
 from canshaper_sim.ranges import check_ranges
+from canshaper_sim.rotator import Rotator, RotatorParameters
+from canshaper_sim.surroundings import Surroundings
 from canshaper_sim.sway_sensor import SwaySensorParameters
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.tip_controller import TipControllerParameters
@@ -54,7 +46,6 @@ __all__ = [
 INTERNAL_STEP_S: Final = 0.010
 
 _HORIZONTAL: Final = math.pi / 2.0
-_NONE: Final = (0.0, 0.0, 0.0)
 
 # name -> (lowest, highest) value that still describes a forestry or loader crane.
 _ALLOWED = {
@@ -108,6 +99,7 @@ class CraneParameters:
     ends: EndParameters = field(default_factory=EndParameters)
     carrier: CarrierParameters = field(default_factory=CarrierParameters)
     wind: WindParameters = field(default_factory=WindParameters)
+    rotator: RotatorParameters = field(default_factory=RotatorParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -166,15 +158,13 @@ class Crane:
         "_accelerations",
         "_axes",
         "_bend",
-        "_carrier",
         "_empty_kg",
-        "_grounded",
         "_pump",
         "_second",
         "_sway",
         "_time_s",
         "_uncompensated",
-        "_wind",
+        "around",
         "boom",
         "parameters",
         "swung_over",
@@ -202,20 +192,20 @@ class Crane:
         valves = [axis.valve for axis in self._axes.values()]
         self._uncompensated = [v for v in valves if v.parameters.load or v.parameters.load_per_t]
         self._empty_kg = p.grapple.m2_kg
-        self._carrier = None if p.carrier.level else Carrier(p.carrier, p.grapple.g_m_s2)
-        self._wind = Wind(p.wind) if p.wind.speed_m_s or p.wind.gust_m_s else None
-        self._grounded = p.contact.ground_m > -math.inf
-        free = not (self._grounded or self._carrier or self._wind)
-        self._accelerations = accelerations if free else self._pulled
+        self.around = Surroundings(
+            p.contact if p.contact.ground_m > -math.inf else None,
+            None if p.carrier.level else Carrier(p.carrier, p.grapple.g_m_s2),
+            Wind(p.wind) if p.wind.speed_m_s or p.wind.gust_m_s else None,
+            Rotator(p.rotator, p.log) if p.log.length_m or p.log.off_centre_m else None,
+        )
+        self._accelerations = accelerations if self.around.none else self.around.accelerations
         self._sway = sway or Sway()
-        if self._carrier or self._wind:
+        if not self.around.none:
             theta1, radius_m, height_m, *_ = self.boom.pose
             tip = TipMotion(radius_m, 0.0, 0.0, 0.0, 0.0, 0.0, theta1, height_m)
-            for _ in range(4):  # carrier and grapple lean on each other, by less each time
-                if self._carrier:
-                    self._carrier.settle(p.grapple, Sway(*self.rest_rad), tip)
-            rest5, rest6 = self.rest_rad
+            self.around.settle(p.grapple, tip)
             theta5, theta6, *rates = self._sway
+            rest5, rest6 = self.rest_rad
             self._sway = Sway(theta5 + rest5, theta6 + rest6, *rates)
         self._second: SecondSwing | None = None
         self._time_s = 0.0
@@ -243,7 +233,7 @@ class Crane:
     @property
     def rest_rad(self) -> tuple[float, float]:
         """(theta5, theta6) at which the grapple would hang still: here, in the present wind."""
-        return rest(self.parameters.grapple, *self._pushes(*self.boom.pose[:2]))
+        return self.around.rest(self.parameters.grapple, *self.boom.pose[:2])
 
     @property
     def axes_at_stop(self) -> tuple[str, ...]:
@@ -272,39 +262,42 @@ class Crane:
         if not 0.0 < dt_s < math.inf:
             raise ValueError(f"crane: dt_s: expected a positive value, got {dt_s}")
         for name, command in commands.items():
-            axis = self._axes.get(name)
-            if axis is None:
-                raise ValueError(
-                    f"crane: axis: expected one of {', '.join(self._axes)}, got {name!r}"
-                )
-            axis.valve.set_command(command)
+            if name != ROTATOR:
+                self._axis(name).valve.set_command(command)
+            elif self.around.rotator:  # it matters to a log only
+                self.around.rotator.axis.valve.set_command(command)
         # The smallest number of equal steps; the margin forgives rounding of dt_s.
         count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)
         step_s = dt_s / count
-        gripped_kg = self.parameters.grapple.m2_kg - self._empty_kg
         for _ in range(count):
-            for valve in self._uncompensated:
-                valve.meet(valve.parameters.against(gripped_kg))
-            if self._pump:
-                self._pump.advance(step_s)
-            if self._wind:
-                self._wind.advance(step_s)
-            tips = self.boom.advance(step_s)
-            if self._bend:
-                tips = self._bend.advance(step_s, tips)
-            if self._carrier:
-                self._carrier.advance(step_s, self.parameters.grapple, self._sway, tips[1])
-            if self._second:
-                push = self._pushes(tips[1].slew_rad, tips[1].radius_m)[1]
-                self._second.advance(step_s, tips, push)
-            self._sway = advance(
-                self.parameters.grapple, self._sway, step_s, tips, self._accelerations
-            )
+            self._advance(step_s)
         self._time_s += dt_s
         if self.parameters.log.gripped(self._time_s):
             self._grip(self.parameters.log)
         if abs(self._sway.theta5_rad) > _HORIZONTAL or abs(self._sway.theta6_rad) > _HORIZONTAL:
             self.swung_over = True
+
+    def _axis(self, name: str) -> Actuator:
+        """An axis that takes commands; raises ValueError for a name of none."""
+        if axis := self._axes.get(name):
+            return axis
+        raise ValueError(f"crane: axis: expected one of {', '.join(self._axes)}, got {name!r}")
+
+    def _advance(self, step_s: float) -> None:
+        """One internal step."""
+        grapple = self.parameters.grapple
+        for valve in self._uncompensated:
+            valve.meet(valve.parameters.against(grapple.m2_kg - self._empty_kg))
+        if self._pump:
+            self._pump.advance(step_s)
+        tips = self.boom.advance(step_s)
+        if self._bend:
+            tips = self._bend.advance(step_s, tips)
+        self.around.advance(step_s, grapple, self._sway, tips[1])
+        if self._second:
+            push = self.around.pushes(grapple, tips[1].slew_rad, tips[1].radius_m)[1]
+            self._second.advance(step_s, tips, push)
+        self._sway = advance(grapple, self._sway, step_s, tips, self._accelerations)
 
     def _grip(self, log: LogParameters) -> None:
         """Grip it, once."""
@@ -312,28 +305,9 @@ class Crane:
         if log.second_period_s:
             self._second = SecondSwing(log, grapple.g_m_s2, self._sway)
         self.pick_up(log.loaded(grapple))
+        if self.around.rotator:
+            self.around.rotator.grip(self.parameters.grapple)
         self.parameters = replace(self.parameters, log=LogParameters())
-
-    def _pulled(
-        self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
-    ) -> tuple[float, float]:
-        """What gravity, tip, ground, carrier and wind make of the sway: (theta5'', theta6'')."""
-        across, along = accelerations(grapple, sway, tip)
-        if self._grounded:
-            held = self.parameters.contact.accelerations(grapple, sway, tip)
-            across, along = across + held[0], along + held[1]
-        if self._carrier or self._wind:
-            more = pushed(grapple, sway, *self._pushes(tip.slew_rad, tip.radius_m))
-            across, along = across + more[0], along + more[1]
-        return across, along
-
-    def _pushes(self, slew_rad: float, radius_m: float) -> tuple[Push, Push]:
-        """What link and grapple feel besides the gravity of level ground."""
-        link = load = self._carrier.push(slew_rad, radius_m) if self._carrier else _NONE
-        if self._wind:
-            out, across, up = self._wind.push(slew_rad, self.parameters.grapple.m2_kg)
-            load = load[0] + out, load[1] + across, load[2] + up
-        return link, load
 
 
 def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:

@@ -20,6 +20,8 @@ _ALLOWED = {
     "grip_s": (0.0, math.inf),
     "mass_kg": (0.0, 10_000.0),
     "below_m": (-1.0, 5.0),
+    "length_m": (0.0, 10.0),
+    "off_centre_m": (-3.0, 3.0),
     "second_period_s": (0.0, 2.0),
     "second_share": (-1.0, 0.9),
     "second_damping_ratio": (0.0, 0.9),
@@ -33,6 +35,9 @@ class LogParameters:
     grip_s: float = math.inf
     mass_kg: float = 500.0
     below_m: float = 0.3  # its centre of mass below that of the grapple
+    # What makes the planes of the swing differ, by the rotator; 0: a point.
+    length_m: float = 0.0
+    off_centre_m: float = 0.0  # its middle from the grapple
     second_period_s: float = 0.0  # 0: no second swing; 0.5 to 0.8 is usual with a long log
     second_share: float = -0.2  # of the lean; a body that hangs below swings against it
     second_damping_ratio: float = 0.04

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Final, Protocol
 
 from canshaper.errors import DesignError
-from canshaper_sim.axes import JOINT_AXES, SLEW, TIP_AXES
+from canshaper_sim.axes import JOINT_AXES, ROTATOR, SLEW, TIP_AXES
 from canshaper_sim.crane import Crane, CraneParameters, joint_crane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
@@ -79,7 +79,7 @@ class TipControlledCrane:
         if not 0.0 < dt_s < math.inf:
             raise ValueError(f"crane: dt_s: expected a positive value, got {dt_s}")
         for name, command in commands.items():
-            if name not in self._commands:
+            if name not in (*self._commands, ROTATOR):
                 raise DesignError(
                     f"crane: axis: expected one of {', '.join(TIP_AXES)}, got {name!r}"
                 )
@@ -90,6 +90,8 @@ class TipControlledCrane:
         while rest_s > _SAME_TIME_S:
             if self._to_tick_s <= _SAME_TIME_S:
                 self._joint_commands = self._controller.tick(self._commands, self._boom.joints)
+                if ROTATOR in self._commands:  # past the controller
+                    self._joint_commands[ROTATOR] = self._commands[ROTATOR]
                 self._to_tick_s += self._controller.period_s
             part_s = min(rest_s, self._to_tick_s)
             self.crane.step(part_s, self._joint_commands)

@@ -198,8 +198,7 @@ class PlantNode:
                 valve.command = 0.0
             valve.age_s += dt_s
             closed = canopen.present and canopen.closed(valve.axis)
-            if valve.axis != ROTATOR:
-                commands[valve.axis] = 0.0 if closed else valve.command
+            commands[valve.axis] = 0.0 if closed else valve.command
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:

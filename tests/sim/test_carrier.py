@@ -149,7 +149,7 @@ def test_it_rocks_with_its_own_period_once_it_is_pushed() -> None:
     crane = on_slope(*ROCKING, *light, "start_radius_m=4")
     for command in [1.0] * 30 + [0.0] * 40:
         crane.step(TICK_S, {"near_far": command})
-    rolls, carrier = [], crane._carrier
+    rolls, carrier = [], crane.around.carrier
     assert carrier
     for _ in range(250):
         crane.step(TICK_S, {})
@@ -179,7 +179,7 @@ def test_a_tip_that_gives_way_makes_the_pendulum_slower() -> None:
 
 def test_slewing_rocks_it_and_the_rocking_dies_away() -> None:
     crane = on_slope("carrier.rock_hz=1.2", "grapple.c5_n_m_s_rad=600", "grapple.c6_n_m_s_rad=600")
-    carrier, rolls = crane._carrier, []
+    carrier, rolls = crane.around.carrier, []
     assert carrier
     for command in [1.0] * 60 + [0.0] * 500:
         crane.step(TICK_S, {"slew": command})
