@@ -12,16 +12,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from canshaper.campaign.operators import OPERATORS, Draw, Fault, bus_fault, sensor_fault
-from canshaper.config.uncertainty import Uncertainty
+from canshaper.config.uncertainty import MOST_FLOW, Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.axes import ALL_AXES, JOINT_AXES, SLEW
+from canshaper_sim.axes import ALL_AXES, JOINT_AXES, NEAR_FAR, SLEW
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.strokes import Script
 
+# How near an end stop a drive begins that is to meet it.
+_NEAR_M = 1.5
+_GUSTS = 0.25  # standard deviation of the wind, of its mean
 # Parts of the drive in which a load is picked up, and put down.
 _PICK_UP, _PUT_DOWN = (0.1, 0.5), (0.5, 0.9)
 _FULL_SPEEDS = {
@@ -83,11 +86,12 @@ def draw_drive(
         ranges: from which the crane is drawn.
         nominal: the crane that the ranges are about.
     """
-    of_crane, of_operator, of_load, of_fault = (
-        Draw(one) for one in np.random.SeedSequence(seed).spawn(4)
+    of_crane, of_operator, of_load, of_fault, of_place = (
+        Draw(one) for one in np.random.SeedSequence(seed).spawn(5)
     )
     crane, axes = driven_axes(deployment)
     parameters, factors = _crane(of_crane, axes, ranges, nominal or CraneParameters())
+    parameters, of_places = _place(of_place, axes, ranges, parameters, seed)
     swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
     operator = of_operator.one_of([*OPERATORS])
     script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
@@ -103,6 +107,7 @@ def draw_drive(
     }
     if fault.disturb is not None:
         options["disturb"] = fault.disturb
+    factors |= of_places
     factors |= {"sway_across_deg": swing[0], "sway_along_deg": swing[1], **of_loads}
     return Setting(operator, fault.name, factors, script, options)
 
@@ -152,6 +157,34 @@ def _crane(
         else:
             crane = replace(crane, **changed)
     return replace(crane, joints=joints), factors
+
+
+def _place(
+    draw: Draw, axes: Sequence[str], ranges: Uncertainty, crane: CraneParameters, seed: int
+) -> tuple[CraneParameters, dict[str, float]]:
+    """Pump, ground and wind, and how near its stops the tip is; what was drawn of them."""
+    factors = {
+        "pump_flow": draw.between(*ranges.pump_flow),
+        "starved": float(draw.between(0.0, 100.0) < ranges.starved_pct),
+        "pitch_deg": draw.between(*ranges.slope_deg) * draw.one_of((-1, 1)),
+        "roll_deg": draw.between(*ranges.slope_deg) * draw.one_of((-1, 1)),
+        "rock_hz": draw.between(*ranges.rock_hz),
+        "wind_m_s": draw.between(*ranges.wind_m_s),
+        "wind_heading_deg": draw.between(-180.0, 180.0),
+    }
+    near, ahead_m = draw.between(0.0, 100.0) < ranges.stops_pct, draw.between(0.0, _NEAR_M)
+    at_m = draw.one_of((crane.radius_min_m + ahead_m, crane.radius_max_m - ahead_m))
+    if near and NEAR_FAR in axes:
+        crane = replace(crane, start_radius_m=at_m)
+    carrier = replace(crane.carrier, **{n: factors[n] for n in ("pitch_deg", "roll_deg")})
+    speed = factors["wind_m_s"]
+    heading, gust = factors["wind_heading_deg"], _GUSTS * speed
+    wind = replace(crane.wind, speed_m_s=speed, gust_m_s=gust, heading_deg=heading, seed=seed)
+    if factors["pump_flow"] < MOST_FLOW:
+        pump = replace(crane.pump, shares_flow=0.0 if factors["starved"] else 1.0)
+        crane = replace(crane, pump_flow=factors["pump_flow"], pump=pump)
+    crane = replace(crane, carrier=replace(carrier, rock_hz=factors["rock_hz"]), wind=wind)
+    return crane, factors | {"near_stop": float(near)}
 
 
 def _loads(

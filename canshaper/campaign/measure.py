@@ -7,7 +7,7 @@ from typing import Any
 from canshaper.campaign.draw import Setting, draw_drive, driven_axes
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
-from canshaper.design.lockstep import Simulation, driven_part
+from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
 from canshaper.machine.deployment import Deployment
 from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
@@ -35,17 +35,33 @@ def measured_drive(
     broken, why = 0, ""
     for time_ms in simulation.ticks():
         tracks.add(time_ms)
+        if simulation.plant.crane.swung_over:  # what comes then says nothing
+            break
         for event in simulation.controller.events:
             if isinstance(event, RefusalEvent):
                 broken, why = broken + 1, why or f"{time_ms / 1000.0:.2f} s: {event.text}"
+    raw = None if setting.fault else _raw_deg(deployment, setting, nominal or CraneParameters())
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,
         **tracks.measures(),
+        "raw_deg": raw,
         "broken": broken,
         "why": why,
         "swung_over": simulation.plant.crane.swung_over,
     }
+
+
+def _raw_deg(deployment: Deployment, setting: Setting, nominal: CraneParameters) -> float | None:
+    """Swing that the same drive leaves with anti-sway off, deg."""
+    options: DriveOptions = {**setting.options, "bypass": True}
+    simulation = Simulation(deployment, setting.script, **options)
+    tracks = _Tracks(deployment, setting, nominal, simulation.plant)
+    for time_ms in simulation.ticks():
+        tracks.add(time_ms)
+        if simulation.plant.crane.swung_over:
+            return None
+    return tracks.measures()["residual_deg"]
 
 
 class _Tracks:
@@ -67,21 +83,26 @@ class _Tracks:
         self._commands: dict[str, list[float]] = {name: [] for name in axes}
         self._speeds: dict[str, list[float]] = {name: [] for name in axes}
         self._states: list[CraneState] = []
+        self._across: list[float] = []
+        self._along: list[float] = []
 
     def add(self, time_ms: int) -> None:
         """Take the state of the crane after a tick."""
         plant = self._plant
         crane, commands, speeds = plant.crane, self._commands, self._speeds
         self._t_s.append(time_ms / 1000.0)
-        self._states.append(crane.state)
+        self._states.append(state := crane.state)
+        # A slope and the wind hold the grapple askew: that is no swing.
+        across, along = crane.rest_rad
+        self._across.append(math.degrees(state.theta5_rad - across))
+        self._along.append(math.degrees(state.theta6_rad - along))
         for name in commands:
             commands[name].append(plant.command(name))
             speeds[name].append(crane.speed(name))
 
     def measures(self) -> dict[str, float | None]:
         """Return the measures of the drive by the names of ``MEASURES``; None for a missing one."""
-        across = [math.degrees(state.theta5_rad) for state in self._states]
-        along = [math.degrees(state.theta6_rad) for state in self._states]
+        across, along = self._across, self._along
         swing = [*map(math.hypot, across, along)]
         tip = [
             (at.radius_m * math.cos(at.theta1_rad), at.radius_m * math.sin(at.theta1_rad))

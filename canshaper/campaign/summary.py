@@ -19,8 +19,10 @@ from canshaper.report.console import new_table
 
 Columns = Mapping[str, Sequence[Any]]
 # Not drawn, but measured or noted of a drive.
-_OUTCOMES = ("seed", *MEASURES, "broken", "why", "swung_over", "fault")
+_OUTCOMES = ("seed", *MEASURES, "raw_deg", "broken", "why", "swung_over", "fault")
 WORST = 10
+# A drive is worse than without canshaper where it leaves so much more swing, deg.
+MORE_DEG = 0.3
 # What the worst drives are sorted by, and what is looked into first.
 FIRST = "residual_deg"
 
@@ -40,6 +42,24 @@ class Promises:
     broken: int
     most: float
     why: str
+
+
+@dataclass(frozen=True)
+class Worse:
+    """Drives without a fault that leave more swing than with anti-sway off, plus ``MORE_DEG``.
+
+    Attributes:
+        drives: all that were driven in both ways.
+        worse: how many do.
+        low, high: bounds of their share.
+        seeds: of the five worst, with what each leaves and what it leaves with anti-sway off, deg.
+    """
+
+    drives: int
+    worse: int
+    low: float
+    high: float
+    seeds: Sequence[tuple[int, float, float]]
 
 
 @dataclass(frozen=True)
@@ -67,7 +87,7 @@ class Summary:
         quantiles: by measure and quantile, of the drives without a fault of bus or sensor.
         faulty: the same, of those with one.
         counts: of drives without and with a fault, and of those whose grapple swung over.
-        promises: see there.
+        promises, worse: see there.
         influences: of the measures, each factor.
         worst: the drives that leave the most swing, without a fault.
         verdicts: of the limits of the file.
@@ -77,6 +97,7 @@ class Summary:
     faulty: Mapping[str, Mapping[str, Quantile]]
     counts: Mapping[str, int]
     promises: Promises
+    worse: Worse
     influences: Mapping[str, Sequence[Influence]]
     worst: Sequence[Mapping[str, Any]]
     verdicts: Sequence[Verdict]
@@ -115,10 +136,21 @@ def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
             "swung_over": sum(columns["swung_over"]),
         },
         Promises(drives, len(broken), most_of(len(broken), drives), why),
+        _worse(sound),
         {measure: influences(factors, sound[measure]) for measure in MEASURES},
         worst(sound),
         [_verdict(key, limit, quantiles) for key, limit in accept.items()],
     )
+
+
+def _worse(columns: Columns) -> Worse:
+    """Compare each drive with the same one with anti-sway off."""
+    of = columns["seed"], columns[FIRST], columns.get("raw_deg", [None] * len(columns["seed"]))
+    pairs = [(s, a, b) for s, a, b in zip(*of, strict=True) if a is not None and b is not None]
+    worse = sorted((one for one in pairs if one[1] > one[2] + MORE_DEG), key=lambda o: o[2] - o[1])
+    count, drives = len(worse), len(pairs)
+    high, low = most_of(count, drives), 1.0 - most_of(drives - count, drives)
+    return Worse(drives, count, low, high, worse[:5])
 
 
 def _where(columns: Columns, keep: Sequence[bool]) -> dict[str, list[Any]]:
@@ -238,6 +270,15 @@ def lines(summary: Summary) -> Iterator[str]:
     )
     if promises.why:
         yield f"  first: {promises.why}"
+    if (worse := summary.worse).drives:
+        share = f"{100 * worse.worse / worse.drives:.2g} %"
+        bounds = f"{100 * worse.low:.2g}..{100 * worse.high:.2g}"
+        yield (
+            f"Worse than with anti-sway off, by more than {MORE_DEG:g} deg: {worse.worse} of"
+            f" {worse.drives} drives, {share} ({bounds})"
+        )
+        for seed, left, raw in worse.seeds:
+            yield f"  drive {seed}: {left:.2f} deg, with anti-sway off {raw:.2f}"
     if over := summary.counts["swung_over"]:
         yield f"The grapple swung above the horizontal in {over} drives: their figures say nothing"
     for one in summary.verdicts:

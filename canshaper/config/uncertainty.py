@@ -15,6 +15,8 @@ MEASURES = {
     "travel_error_s": "way of an axis less the commanded one, s of full speed",
     "dip_pct": "largest fall of a command while the joystick is held, % of full command",
 }
+# Full axis flows that a pump counts as without a limit.
+MOST_FLOW = 100.0
 QUANTILES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 
 
@@ -79,6 +81,26 @@ class Uncertainty(Section):
     valve_gain_pct: Range[Annotated[float, _end(-80, 100, "%")]] = _usual(
         -15.0, 10.0, "full speed of an axis"
     )
+    pump_flow: Range[Annotated[float, _end(0.5, MOST_FLOW, "full axis flows")]] = _usual(
+        MOST_FLOW, MOST_FLOW, "most that the pump delivers"
+    )
+    slope_deg: Range[Annotated[float, _end(0, 15, "deg")]] = _usual(
+        0.0, 0.0, "slope on which the carrier stands, along and across"
+    )
+    rock_hz: Range[Annotated[float, _end(0, 5, "Hz")]] = _usual(
+        0.0, 0.0, "frequency of the carrier on its tyres, 0 for a stiff one"
+    )
+    wind_m_s: Range[Annotated[float, _end(0, 12, "m/s")]] = _usual(
+        0.0, 0.0, "mean of the wind, with gusts of a quarter of it"
+    )
+    starved_pct: Annotated[
+        float, number(0, 100, "% of the drives", "in which the heaviest axis goes without oil")
+    ] = 0.0
+    """Drives with plain load sensing: where the pump delivers less than is asked for, the axis with
+    the heaviest load goes without oil."""
+    stops_pct: Annotated[
+        float, number(0, 100, "% of the drives", "that begin near an end stop of the tip")
+    ] = 0.0
     load_change_pct: Annotated[
         float, number(0, 100, "% of the drives", "in which a load is picked up and put down")
     ] = 40.0

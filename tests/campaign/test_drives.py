@@ -157,3 +157,69 @@ def test_late_lost_and_garbled_frames_reach_the_controller_as_such() -> None:
 def _axes(simulation: Simulation) -> list:
     controller: Controller = simulation.controller
     return [*controller.axes.values()]
+
+
+# -- pump, ground, wind and stops ------------------------------------------------------------------
+
+OUTSIDE = Uncertainty(
+    pump_flow=[1.1, 1.5],
+    starved_pct=50,
+    slope_deg=[0, 10],
+    rock_hz=[0.8, 1.5],
+    wind_m_s=[0, 8],
+    stops_pct=50,
+)
+
+
+def test_by_default_the_crane_stands_level_in_still_air_with_all_the_oil() -> None:
+    nominal = CraneParameters()
+    for setting in settings(50):
+        crane = setting.options["parameters"]
+        assert crane is not None
+        assert (crane.pump_flow, crane.carrier) == (nominal.pump_flow, nominal.carrier)
+        assert crane.wind.speed_m_s == crane.wind.gust_m_s == 0.0
+        assert crane.start_radius_m == pytest.approx(setting.factors["radius_m"])
+
+
+def test_what_is_outside_of_the_crane_changes_nothing_else_of_a_drive() -> None:
+    for one, other in zip(settings(30), settings(30, OUTSIDE), strict=True):
+        assert one.script == other.script
+        for name in ("length_pct", "slew_lag_s", "near_far_gain_pct", "load_mass"):
+            assert one.factors[name] == other.factors[name]
+
+
+def test_pump_ground_wind_and_stops_reach_the_crane() -> None:
+    near = starved = 0
+    for setting in settings(200, OUTSIDE):
+        crane, of = setting.options["parameters"], setting.factors
+        assert crane is not None
+        assert 1.1 <= crane.pump_flow == of["pump_flow"] <= 1.5
+        assert crane.pump.shares_flow == 1.0 - of["starved"]
+        assert abs(crane.carrier.pitch_deg) <= 10.0 >= abs(crane.carrier.roll_deg)
+        assert 0.8 <= crane.carrier.rock_hz <= 1.5
+        assert crane.wind.gust_m_s == 0.25 * crane.wind.speed_m_s <= 2.0
+        starved += int(of["starved"])
+        if of["near_stop"]:
+            near += 1
+            assert min(crane.start_radius_m - 1.8, 8.0 - crane.start_radius_m) <= 1.5
+    assert 70 <= near <= 130
+    assert 70 <= starved <= 130
+
+
+def test_what_a_slope_holds_askew_is_no_swing() -> None:
+    still = {"load_change_pct": 0, "bus_fault_pct": 0, "sensor_fault_pct": 0, "sway_deg": [0, 0]}
+    askew = Uncertainty(**still, slope_deg=[8, 8])
+    level = Uncertainty(**still)
+    for seed in (1, 2):
+        one, other = (measured_drive(ROBUST, seed, ranges) for ranges in (askew, level))
+        assert abs(one["residual_deg"] - other["residual_deg"]) < 2.0
+        assert one["raw_deg"] > 0.0
+
+
+def test_each_sound_drive_is_driven_with_anti_sway_off_too() -> None:
+    setting = draw_drive(ROBUST, 3, RANGES)
+    row = measured_drive(ROBUST, 3, RANGES)
+    assert not setting.fault
+    crane = drive(ROBUST, setting.script, **{**setting.options, "bypass": True})
+    assert crane.crane is not None
+    assert row["raw_deg"] == pytest.approx(crane_metrics(crane, crane.crane).residual_deg, rel=0.02)

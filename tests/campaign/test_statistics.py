@@ -8,6 +8,8 @@ import pytest
 from scipy import stats
 
 from canshaper.campaign.statistics import influences, most_of, quantile
+from canshaper.campaign.summary import lines, summarise
+from canshaper.config.uncertainty import MEASURES
 
 DISTRIBUTIONS = {
     "normal": stats.norm(),
@@ -87,3 +89,28 @@ def test_drives_without_the_measure_are_left_out() -> None:
     assert influences({"a": factor}, [None] * 190 + [1.0] * 10) == []
     half = [k if k % 2 else None for k in factor]
     assert influences({"a": factor}, half)[0].trend == pytest.approx(1.0)
+
+
+def test_drives_that_leave_more_than_with_anti_sway_off_are_counted_and_named() -> None:
+    left = [0.5, 2.0, 1.35, 9.0, None, 1.0]
+    raw = [5.0, 1.0, 1.04, 3.0, 1.0, None]
+    count = len(left)
+    columns = {
+        "seed": [*range(count)],
+        "fault": [""] * count,
+        "broken": [0] * count,
+        "why": [""] * count,
+        "operator": ["both"] * count,
+        "swung_over": [False] * count,
+        "raw_deg": raw,
+        **dict.fromkeys(MEASURES, left),
+    }
+    worse = summarise(columns, {}).worse
+    assert (worse.drives, worse.worse) == (4, 3)
+    assert [seed for seed, _, _ in worse.seeds] == [3, 1, 2]
+    exact = stats.binomtest(3, 4)
+    assert worse.high == pytest.approx(exact.proportion_ci(0.9, "exact").high)
+    assert worse.low == pytest.approx(exact.proportion_ci(0.9, "exact").low)
+    (head, first, *_) = [line for line in lines(summarise(columns, {})) if "off" in line]
+    assert head.startswith("Worse than with anti-sway off, by more than 0.3 deg: 3 of 4 drives")
+    assert first == "  drive 3: 9.00 deg, with anti-sway off 3.00"

@@ -27,7 +27,7 @@ BUDGET = {
     "docs/api.md": 150,
     "docs/architecture.md": 310,
     "docs/calibration.md": 370,
-    "docs/campaign.md": 760,
+    "docs/campaign.md": 820,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 650,
@@ -63,8 +63,8 @@ LINES = {
         4_830,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (56_200, "a new ability takes the room of an old one"),
-    "tests": (88_300, "one level for each behaviour"),
+    "canshaper": (56_600, "a new ability takes the room of an old one"),
+    "tests": (89_700, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
