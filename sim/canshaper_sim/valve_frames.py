@@ -6,7 +6,6 @@ fault of that moves the simulated crane as it would move a real one.
 
 from cantools.database.can import Signal
 
-from canshaper.errors import DesignError
 from canshaper.machine.deployment import Deployment
 
 # Of a step: what the rounding of decimals may take.
@@ -27,8 +26,7 @@ class CommandReader:
         section = deployment.axes[axis].config
         valve, command = section.valve, section.command
         entry = deployment.messages.find(valve.message)
-        if isinstance(entry, str):
-            raise DesignError(f"axes.{axis}.valve: {entry}")
+        assert not isinstance(entry, str)  # it is bound
         signals = {signal.name: signal for signal in entry[1].signals}
         # A gateway forwards the joystick's own frames: its section says what they mean.
         stick = deployment.config.joysticks[command.joystick]

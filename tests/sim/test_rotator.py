@@ -9,7 +9,7 @@ from canshaper_sim.axes import ROTATOR
 from canshaper_sim.crane import Crane, CraneState
 from canshaper_sim.cranes import one_crane
 from canshaper_sim.grapple import Sway
-from canshaper_sim.machines import TIP_CONTROLLER, build_machine
+from canshaper_sim.machines import TIP_CONTROLLER
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from tests.rigs.files import CONFIG, read
@@ -92,18 +92,6 @@ def test_the_rotator_alone_does_not_move_the_centre() -> None:
     assert rotator.axis.position > 6.0
 
 
-def test_turning_a_log_off_its_middle_turns_the_lean() -> None:
-    crane = Crane(changed_parameters(["log.grip_s=0", "log.off_centre_m=0.3"]))
-    crane.step(TICK_S, {})
-    before = crane.rest_rad
-    for _ in range(90):
-        crane.step(TICK_S, {ROTATOR: 1.0})
-    turned = math.atan2(-crane.rest_rad[0] * 1.4, crane.rest_rad[1] * 1.2)
-    assert before[0] == 0.0
-    assert before[1] > 0.1
-    assert turned == pytest.approx(1.6, abs=0.15)
-
-
 def test_a_point_in_the_grapple_has_no_planes() -> None:
     assert swung(turn=1.0, sway=Sway(0.1, 0.2)) == swung(sway=Sway(0.1, 0.2))
 
@@ -124,8 +112,3 @@ def test_the_frames_of_its_valve_turn_it(machine: str) -> None:
     rotator = plant.crane.around.rotator
     assert rotator
     assert 0.1 < rotator.axis.position < 0.3  # until its timeout, and on with its lag
-
-
-def test_a_tip_controller_refuses_other_axes() -> None:
-    with pytest.raises(ValueError, match="axis: expected one of slew, near_far, lift, got 'x'"):
-        build_machine(TIP_CONTROLLER).step(TICK_S, {"x": 0.0})

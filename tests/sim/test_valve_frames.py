@@ -91,14 +91,6 @@ def test_a_rocker_through_the_gateway(tmp_path: Path) -> None:
     assert says(rig.deployment, "slew", "7d 7d 00 00 01 00 00 00") == 0.0  # both
 
 
-def test_a_message_that_is_in_no_file_is_a_fault(machine: Machine) -> None:
-    deployment = machine.load()
-    lost = deployment.axes["slew"].config.valve.model_copy(update={"message": "Lost"})
-    object.__setattr__(deployment.axes["slew"].config, "valve", lost)
-    with pytest.raises(ValueError, match=r"axes.slew.valve: .*Lost"):
-        CommandReader(deployment, "slew")
-
-
 def test_a_codec_that_turns_the_direction_drives_the_crane_the_wrong_way(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.errors import DesignError
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
-from canshaper_sim.crane import Crane, joint_crane
+from canshaper_sim.crane import Crane
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.valve import ValveParameters
 from tests.sim.drives import TICK_S
@@ -62,11 +62,6 @@ def test_what_it_does_from_the_first_step_on() -> None:
     jump = ("lift.load=0.5", "lift.rate_limit_1_s=inf", "lift.deadband=0")
     up = opening(crane(*jump), LIFT, 1.0, TICK_S)
     assert up == pytest.approx(0.5**0.5 * -math.expm1(-0.2), abs=1e-12)
-
-
-def test_a_joint_has_a_load_too() -> None:
-    of = joint_crane(changed_parameters(["joints.knuckle.load=0.36"]))
-    assert opening(of, "knuckle", 1.0, 1.0) == pytest.approx(0.8, abs=1e-3)
 
 
 def test_the_pump_shares_what_the_loads_let_through() -> None:
