@@ -43,11 +43,11 @@ def test_a_boom_that_points_elsewhere_feels_it_from_elsewhere() -> None:
 def test_gusts_have_their_size_and_their_time() -> None:
     wind = Wind(WindParameters(speed_m_s=6.0, gust_m_s=1.2, gust_s=2.0))
     speeds = []
-    for _ in range(100_000):
+    for _ in range(40_000):
         wind.advance(0.1)
         speeds.append(math.sqrt(wind.force_n / (0.5 * 1.225 * 0.6)))
     assert statistics.mean(speeds) == pytest.approx(6.0, abs=0.1)
-    assert statistics.stdev(speeds) == pytest.approx(1.2, rel=0.05)
+    assert statistics.stdev(speeds) == pytest.approx(1.2, rel=0.06)
     late = statistics.correlation(speeds[:-20], speeds[20:])  # one time constant later
     assert late == pytest.approx(math.exp(-1.0), abs=0.05)
 
