@@ -13,6 +13,7 @@ rocking are too small to matter to the swing; its angles and accelerations are n
 
 import math
 from dataclasses import dataclass
+from operator import mul
 
 from canshaper_sim.grapple import Grapple, Push, Sway, TipMotion
 from canshaper_sim.oscillator import State, moved, swing_over
@@ -107,17 +108,20 @@ class Carrier:
         p, gravity = self._parameters, self._gravity_m_s2
         s5, c5 = math.sin(sway.theta5_rad), math.cos(sway.theta5_rad)
         s6, c6 = math.sin(sway.theta6_rad), math.cos(sway.theta6_rad)
-        mass = grapple.m1_kg + grapple.m2_kg
-        whirl = sway.theta5_rate_rad_s**2 + sway.theta6_rate_rad_s**2
-        tension = mass * (gravity * c5 * c6 + (grapple.l1_m + grapple.l2_m) * whirl)
+        line = -s6, s5 * c6, -c5 * c6  # from the tip to what hangs there
         radius, turn = tip.radius_m, tip.slew_rate_rad_s
-        half = 0.5 * p.boom_kg
-        out = -tension * s6 - half * (tip.radius_acceleration_m_s2 - radius * turn * turn)
+        out = tip.radius_acceleration_m_s2 - radius * turn * turn
         across = radius * tip.slew_acceleration_rad_s2 + 2.0 * tip.radius_rate_m_s * turn
-        across = tension * s5 * c6 - half * across
+        push = self.push(tip.slew_rad, radius)
+        felt = push[0] - out, push[1] - across, push[2] - tip.height_acceleration_m_s2 - gravity
+        whirl = (sway.theta5_rate_rad_s * c6) ** 2 + sway.theta6_rate_rad_s**2
+        tension = (grapple.l1_m + grapple.l2_m) * whirl + sum(map(mul, felt, line))
+        tension *= grapple.m1_kg + grapple.m2_kg
+        half = 0.5 * p.boom_kg
+        out, across = tension * line[0] - half * out, tension * line[1] - half * across
         # About the boom, and about the horizontal across it.
         along = -tip.height_m * across
-        over = tip.height_m * out + radius * (tension * c5 * c6 + half * gravity)
+        over = tip.height_m * out + radius * (half * gravity - tension * line[2])
         s, c = math.sin(tip.slew_rad), math.cos(tip.slew_rad)
         stiff = self._omega * self._omega
         roll, pitch = along * c - over * s, along * s + over * c

@@ -37,12 +37,27 @@ class TwinCrane:
         length: factor on the length of link and grapple.
         lag_s: time constant of each valve with its oil.
         radius_until_s: the sensor of the radius falls silent then.
+        pump: full axis flows that both valves share.
+        ends_m: lowest and highest radius.
+        cushion_s: length of the cushions before these ends, s of full speed.
+        slope_deg: of the ground, down ahead and down to the right.
+        tyres: frequency and damping ratio of the rocking carrier, and its inertia, the same about
+            both axes; the crane itself then has no weight.
+        wind_n: on the grapple, to the left of the carrier.
+        log: kg in the grapple's middle, its length, its angle to the boom in degrees.
     """
 
     radius_m: float = 3.0
     length: float = 1.0
     lag_s: tuple[float, float] = (0.1, 0.1)
     radius_until_s: float = math.inf
+    pump: float = math.inf
+    ends_m: tuple[float, float] = (-math.inf, math.inf)
+    cushion_s: float = 0.0
+    slope_deg: tuple[float, float] = (0.0, 0.0)
+    tyres: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    wind_n: float = 0.0
+    log: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Valve:
@@ -52,14 +67,15 @@ class Valve:
         self.command = self.spool = self.speed = 0.0
         self._share = -math.expm1(-STEP_S / lag_s)
 
-    def step(self) -> float:
-        """Change of speed in a step, full speeds."""
+    def move(self) -> None:
+        """Move the spool on for a step."""
         opening = max(0.0, (abs(self.command) - 0.05) / 0.95)
         error = math.copysign(opening, self.command) - self.spool
         self.spool += math.copysign(min(abs(error), 5.0 * STEP_S), error)
-        change = self._share * (self.spool - self.speed)
-        self.speed += change
-        return change
+
+    def step(self, supply: float = 1.0) -> None:
+        """Let the oil follow for a step, with so much of it."""
+        self.speed += self._share * (supply * self.spool - self.speed)
 
 
 class Twin:
@@ -67,40 +83,82 @@ class Twin:
 
     def __init__(self, crane: TwinCrane) -> None:
         link, arm = 0.2 * crane.length, 1.2 * crane.length
+        pitch, roll = (math.radians(one) for one in crane.slope_deg)
+        rock_hz, ratio, inertia = crane.tyres
+        stiffness = inertia * (2.0 * math.pi * rock_hz) ** 2
+        damping = 2.0 * ratio * inertia * 2.0 * math.pi * rock_hz
+        tyre = f'stiffness="{stiffness}" damping="{damping}"'
+        rocks = f'<joint axis="1 0 0" {tyre}/><joint axis="0 1 0" {tyre}/>' if rock_hz else ""
+        kg = (1e-3, 1e-3) if rock_hz else (500, 100)
+        log_kg, length_m, yaw_deg = crane.log
+        slim = f"1e-6 {log_kg * length_m**2 / 12.0 + 1e-6} {log_kg * length_m**2 / 12.0 + 1e-6}"
         self._model = mujoco.MjModel.from_xml_string(f"""
         <mujoco>
-          <compiler angle="radian" balanceinertia="false"/>
+          <compiler angle="radian" eulerseq="yxz" balanceinertia="false"/>
           <option gravity="0 0 -9.81" integrator="RK4" timestep="{STEP_S}">
             <flag contact="disable"/></option>
-          <worldbody><body pos="0 0 4">
-            <inertial pos="0 0 0" mass="500" diaginertia="40 40 40"/>
+          <worldbody><body euler="{pitch} {roll} 0">
+            <inertial pos="0 0 0" mass="1" diaginertia="{inertia} {inertia} {inertia}"/>{rocks}
+            <body pos="0 0 4">
+            <inertial pos="0 0 0" mass="{kg[0]}" diaginertia="1e-3 1e-3 1e-3"/>
             <joint axis="0 0 1" armature="{ROTOR}"/>
-            <body><inertial pos="0 0 0" mass="100" diaginertia="1 1 1"/>
+            <body><inertial pos="0 0 0" mass="{kg[1]}" diaginertia="1e-3 1e-3 1e-3"/>
               <joint type="slide" axis="1 0 0" armature="{ROTOR}"/>
               <body><inertial pos="0 0 {-link}" mass="40" diaginertia="1e-6 1e-6 1e-6"/>
                 <joint axis="1 0 0" damping="120"/>
                 <body pos="0 0 {-link}">
-                  <inertial pos="0 0 {-arm}" mass="300" diaginertia="1e-6 1e-6 1e-6"/>
+                  <inertial pos="0 0 {-arm}" mass="{300 + log_kg}" diaginertia="{slim}"
+                    euler="0 0 {math.radians(yaw_deg)}"/>
                   <joint axis="0 1 0" damping="120"/>
-                </body></body></body></body></worldbody>
+                </body></body></body></body></body></worldbody>
         </mujoco>""")
         self._data = mujoco.MjData(self._model)
-        self._data.qpos[1] = crane.radius_m
+        self._crane, self._first = crane, 2 if rock_hz else 0  # of the joints of the crane
+        self._data.qpos[self._first + 1] = crane.radius_m
+        self._data.xfrc_applied[5][:3] = (0.0, crane.wind_n, 0.0)
         self.valves = {axis: Valve(lag) for axis, lag in zip(FULL, crane.lag_s, strict=True)}
 
     def step(self) -> float:
         """One tick of the valves' frames; the grapple's tilt against the vertical, degrees."""
-        data = self._data
+        data, pump = self._data, self._crane.pump
         for _ in range(STEPS):
-            for joint, (axis, full) in enumerate(FULL.items()):
-                data.qfrc_applied[joint] = ROTOR * full * self.valves[axis].step() / STEP_S
+            for valve in self.valves.values():
+                valve.move()
+            asked = sum(abs(valve.spool) for valve in self.valves.values())
+            for joint, (axis, full) in enumerate(FULL.items(), self._first):
+                self.valves[axis].step(min(1.0, pump / asked) if asked else 1.0)
+                speed = full * self.valves[axis].speed
+                if axis == "near_far":
+                    speed = self._within_ends(speed, full)
+                change = (speed - float(data.qvel[joint])) / STEP_S
+                data.qfrc_applied[joint] = ROTOR * change
             mujoco.mj_step(self._model, data)
-        return math.degrees(math.acos(min(1.0, float(data.xmat[4][8]))))
+        return math.degrees(math.acos(min(1.0, float(data.xmat[5][8]))))
+
+    def _within_ends(self, speed: float, full: float) -> float:
+        """Speed of the radius that its cushions and ends let through."""
+        low, high = self._crane.ends_m
+        room = max(0.0, high - self.radius_m if speed > 0.0 else self.radius_m - low)
+        if cushion_s := self._crane.cushion_s:
+            most = max(0.1 * full, full * math.sqrt(room / (full * cushion_s)))
+            speed = math.copysign(min(abs(speed), most), speed)
+        return math.copysign(min(abs(speed), room / STEP_S), speed)
 
     @property
     def radius_m(self) -> float:
         """Of the tip."""
-        return float(self._data.qpos[1])
+        return float(self._data.qpos[self._first + 1])
+
+    @property
+    def sway_rad(self) -> tuple[float, float]:
+        """Angles of the two joints of the grapple, across the boom and along it."""
+        across, along = self._data.qpos[self._first + 2 : self._first + 4]
+        return float(across), float(along)
+
+    def begin(self, sway_rad: tuple[float, float], rocked_rad: tuple[float, float]) -> None:
+        """Stand still with these angles of the grapple's joints, and of the tyres: roll, pitch."""
+        self._data.qpos[self._first + 2 : self._first + 4] = sway_rad
+        self._data.qpos[: self._first] = rocked_rad[: self._first]
 
 
 @dataclass(frozen=True)
