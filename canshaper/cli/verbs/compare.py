@@ -28,6 +28,8 @@ _WORKS = {
     "cycle": "cycle",
     "load": "load",
     "slow": "gain",
+    "pump": "pump",
+    "end": "end",
     "start": "start",
 }
 
@@ -49,10 +51,10 @@ def compare(
     Each filter is put on slew and near-far of the file, and the simulated crane driven under the
     output limits and with the two-axis motion of the file: pulses, taps and reversals of each
     axis, strokes of both, random joysticks, a loading cycle, a load picked up on the way, a slow
-    valve, a start with swing; at -30 to +30 % pendulum length. The tables have the largest swing
-    that is left, what the operator feels, the worst case of each filter, which of ours stops as
-    soon and leaves less, and what no shaper can beat. A file whose sway sensors damp has rows with
-    them. Writes compare.png and compare.json. Takes one to two minutes.
+    valve, a small pump, an end stop, a start with swing; at -30 to +30 % pendulum length. The
+    tables have the largest swing that is left, what the operator feels, the worst case of each
+    filter, which of ours stops as soon and leaves less, and what no shaper can beat. A file whose
+    sway sensors damp has rows with them. Writes compare.png and compare.json. Takes one to two minutes.
 
     Examples:
 

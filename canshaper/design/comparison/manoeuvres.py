@@ -17,6 +17,9 @@ LOAD_M = 0.4
 _LOAD_FROM_S, _LOAD_TO_S = 7.5, 17.0
 # What is left of the full speed that the file names.
 SLOW_VALVE = 0.7
+# What a small pump delivers, full axis flows; from where a pulse meets the end stop at full speed.
+PUMP_FLOW = 1.2
+END_FROM_M = 5.7
 # Near-far begins so much later than slew, where both move.
 LATE_S = (-1.2, 0.0, 1.2)
 # Duration in s and level.
@@ -34,7 +37,7 @@ class Manoeuvre:
 
     Attributes:
         work: kind of work, a column of the table: pulse, tap, reversal, both, random, cycle,
-            load, gain or start.
+            load, gain, pump, end or start.
         name: what it is called.
         script: the strokes, with a rest at the end.
         axis: the axis that moves, None where several do.
@@ -74,6 +77,20 @@ def manoeuvres() -> list[Manoeuvre]:
         *(
             replace(at_once, work="gain", name=f"slow {_word(axis)}", lengths_pct=(0,), crane=crane)
             for axis, crane in _slow_cranes()
+        ),
+        replace(
+            at_once,
+            work="pump",
+            name="small pump",
+            lengths_pct=(0,),
+            crane=replace(_NOMINAL, pump_flow=PUMP_FLOW),
+        ),
+        replace(
+            pulse,
+            work="end",
+            name="end stop",
+            lengths_pct=(0,),
+            crane=replace(_NOMINAL, start_radius_m=END_FROM_M),
         ),
         replace(
             pulse, work="start", name="swinging", lengths_pct=(0,), initial_deg=INITIAL_SWAY_DEG

@@ -16,7 +16,7 @@ FELT_DIP = 0.05
 # Run-on is read from feedback every 20 ms.
 HALF_TICK_S = 0.01
 # Another grapple or valve than the deployment has, or swing at the start: columns of their own.
-_OTHER_CRANES = ("load", "gain", "start")
+_OTHER_CRANES = ("load", "gain", "pump", "end", "start")
 
 
 @dataclass(frozen=True)

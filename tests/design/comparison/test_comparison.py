@@ -42,7 +42,7 @@ def test_manoeuvres_end_in_rest_and_cover_what_they_should() -> None:
     for work in ("pulse", "tap", "reversal"):
         alone = {t.script.axes for t in tasks if t.work == work}
         assert alone == {("slew",), ("near_far",)}
-    for both in (t for t in tasks if t.work in ("both", "gain", "cycle", "load")):
+    for both in (t for t in tasks if t.work in ("both", "gain", "cycle", "load", "pump")):
         assert {"slew", "near_far"} <= set(both.script.axes)
     for one in tasks:
         assert one.script.duration_s - max(s.end_s for s in one.script.strokes) >= 5.0

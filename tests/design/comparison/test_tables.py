@@ -35,7 +35,10 @@ def made(name: str, stop_s: float, residual_deg: float, dip: float = 0.0) -> lis
         replace(pulse, work="cycle", path=0.0),
         replace(pulse, manoeuvre="random 1", work="random", path=10.0 - stop_s),
         replace(pulse, manoeuvre="random 2", work="random", residual_deg=residual_deg * 1.5),
-        *(replace(pulse, work=w, residual_deg=residual_deg * 9) for w in ("load", "gain", "start")),
+        *(
+            replace(pulse, work=work, residual_deg=residual_deg * 9)
+            for work in ("load", "gain", "pump", "end", "start")
+        ),
     ]
 
 
