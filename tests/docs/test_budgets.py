@@ -31,7 +31,7 @@ BUDGET = {
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 650,
-    "docs/comparison.md": 690,
+    "docs/comparison.md": 720,
     "docs/decisions.md": 895,
     "docs/deployment.md": 2110,
     "docs/devices.md": 540,

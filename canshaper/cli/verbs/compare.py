@@ -54,7 +54,8 @@ def compare(
     valve, a small pump, an end stop, a start with swing; at -30 to +30 % pendulum length. The
     tables have the largest swing that is left, what the operator feels, the worst case of each
     filter, which of ours stops as soon and leaves less, and what no shaper can beat. A file whose
-    sway sensors damp has rows with them. Writes compare.png and compare.json. Takes one to two minutes.
+    sway sensors damp has rows with them. Writes compare.png and compare.json. Takes one to two
+    minutes.
 
     Examples:
 
