@@ -27,7 +27,7 @@ BUDGET = {
     "docs/api.md": 150,
     "docs/architecture.md": 310,
     "docs/calibration.md": 370,
-    "docs/campaign.md": 850,
+    "docs/campaign.md": 945,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 650,
