@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from cantools.database.can import Message
 
@@ -29,10 +29,6 @@ from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.named_codes import Listing, check_codes, listings
 from canshaper.machine.used_message import NamedCode, StartValue, UsedMessage, key_path
 
-if TYPE_CHECKING:
-    from canshaper.config.limits import Position
-    from canshaper.machine.inputs import Bound
-
 
 @dataclass(frozen=True)
 class Lookup:
@@ -43,16 +39,14 @@ class Lookup:
         config: the deployment file.
         messages: those of its DBC files.
         used: those that are bound so far, by bus, id without priority, and whether it is extended.
-        positions: those of them with positions, by bus and name.
+        positions: those of them with positions, and as they are bound, by bus and name.
     """
 
     diagnostics: Diagnostics
     config: DeploymentConfig
     messages: Messages
     used: dict[tuple[str, int, bool], UsedMessage] = field(default_factory=dict)
-    positions: "dict[tuple[str, str], tuple[UsedMessage, Bound[Position]]]" = field(
-        default_factory=dict
-    )
+    positions: dict[tuple[str, str], tuple[UsedMessage, Any]] = field(default_factory=dict)
 
     @cached_property
     def _listings(self) -> dict[tuple[str, str], list[Listing]]:

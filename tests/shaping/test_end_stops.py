@@ -5,6 +5,7 @@ import random
 import pytest
 
 from canshaper.shaping.end_stops import EndStops, RunOn, bounds
+from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.off import Off
@@ -109,3 +110,10 @@ def test_without_a_filter_nothing_runs_on() -> None:
     run_on = RunOn(Off(), None, TICK_S, 2.0)
     run_on.add(1.0, 1)
     assert run_on.travel() == (0, 0)
+
+
+@pytest.mark.parametrize(("target", "expected"), [(0.5, 0.05), (-0.5, -0.1)])
+def test_a_motion_plans_no_position_beyond_an_end(target: float, expected: float) -> None:
+    axis = MovingAxis(1.0, TICK_S, SwayModel(MODE, TICK_S), room_m=(-0.002, 0.001))
+    axis.add(target, 1.0)
+    assert axis.added == pytest.approx(expected)

@@ -1,5 +1,7 @@
 """The output stage by itself: how it begins, and for how long nothing runs on."""
 
+from dataclasses import replace
+
 import pytest
 
 from canshaper.shaping.limits import OutputLimits
@@ -58,3 +60,28 @@ def test_for_a_tail_after_the_filter_has_started_nothing_runs_on(rests: int) -> 
             assert driven(one, 0.4) == 0.4
         over = rests + demanded == TAIL
         assert driven(one, 0.0) == (0.4 if over else 0.0), demanded
+
+
+@pytest.mark.parametrize(("held", "moves"), [(0.4, True), (0.0, False)])
+def test_how_far_it_runs_on_counts_from_the_joystick_and_not_from_the_demand(
+    held: float, moves: bool
+) -> None:
+    """An axis ahead of its end stop gets no demand, and its operator holds the joystick."""
+    one = OutputStage(replace(LIMITS, tail_s=1.0, run_on=0.02), 125, TICK_S, spreads=False)
+    for _ in range(5):
+        driven(one, 0.4)
+    for _ in range(10):
+        one.drive(held, 0.0, 0.4, 0.0, 0.0, sensor_damps=False)
+    assert bool(one.output.steps) is moves
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_nothing_is_added_against_a_joystick_that_is_held_without_a_demand(sign: float) -> None:
+    one = stage()
+    one.largest_added = 0.25
+    for _ in range(5):
+        one.drive(sign, 0.0, 0.0, -0.2 * sign, 0.0, sensor_damps=False)
+    assert one.output.steps == 0
+    for _ in range(5):
+        one.drive(0.0, 0.0, 0.0, -0.2 * sign, 0.0, sensor_damps=False)
+    assert one.output.steps * sign < 0
