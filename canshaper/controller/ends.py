@@ -46,7 +46,7 @@ class AxisEnds:
         if ticks := now // period - last // period:  # it held its last demand until now
             self._run_on.add(axis.command, ticks)
         if position is None:
-            runner.room, axis.bounds = UNBOUNDED, (-1.0, 1.0)
+            runner.room = axis.bounds = UNBOUNDED
         else:
             runner.room = self._stops.room(position, axis.sent, self._run_on.travel())
             axis.bounds = bounds(runner.room, runner.displaced)

@@ -78,7 +78,7 @@ class ShapedAxis:
         self.sway = sway
         self.sensed: SensedSway | None = None
         self.scale = 1.0
-        self.bounds = -1.0, 1.0
+        self.bounds = -math.inf, math.inf
         self.error = ""
         self._tick_s = tick_s
         self._neutral_band = neutral_band

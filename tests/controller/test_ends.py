@@ -120,6 +120,18 @@ def test_two_axes_and_a_motion_read_one_message(changed_rig: Make) -> None:
     assert not any("radius=lost" in text for text in texts[-5:])
 
 
+def test_a_demand_counts_once_for_each_command_to_the_valve(changed_rig: Make) -> None:
+    changes = {NEAR_FAR: f", {ENDS} {NEAR_FAR}"}
+    slow, quick = changed_rig(changes), changed_rig(changes | {"tick_ms: 20": "tick_ms: 10"})
+    room = []
+    for rig, ticks in ((slow, 1), (quick, 2)):
+        run(rig, 5.0, 3 * ticks)
+        run(rig, 5.0, 25 * ticks, NearFar=1000)
+        room.append(rig.controller.axes["near_far"].room[1])
+    assert room[0] == pytest.approx(room[1], abs=0.05)
+    assert room[0] < 2.8
+
+
 @pytest.mark.parametrize(
     ("ends", "why"),
     [
@@ -127,12 +139,14 @@ def test_two_axes_and_a_motion_read_one_message(changed_rig: Make) -> None:
         ("lowest: 2, highest: 3, margin: 0.5, full_speed: 1", "twice the margin, got 3"),
         ("lowest: 2, highest: 8, margin: 0, full_speed: 0", "full_speed: expected a speed, got 0"),
         ("lowest: 2, highest: 8, full_speed: 1", "ends.margin: missing"),
+        ("signal: Nothing, lowest: 2, highest: 8, margin: 0, full_speed: 1", "got 'Nothing'"),
         ("lowest: 2, highest: 80, margin: 0, full_speed: 1", "within the range of Radius, [0|60]"),
     ],
 )
 def test_what_cannot_be_is_refused(changed_rig: Make, ends: str, why: str) -> None:
+    tip = TIP.replace("signal: Radius, ", "") if "signal" in ends else TIP
     with pytest.raises(ConfigError) as refused:
-        changed_rig({NEAR_FAR: f", ends: {{ {TIP}, {ends} }} {NEAR_FAR}"})
+        changed_rig({NEAR_FAR: f", ends: {{ {tip}, {ends} }} {NEAR_FAR}"})
     assert why in str(refused.value)
 
 

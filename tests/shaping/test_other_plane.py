@@ -45,6 +45,21 @@ def test_it_is_damped_within_the_bound_of_what_may_be_added() -> None:
     assert (rig.axis.state, rig.axis.raw) == (State.READY, 0)
 
 
+def test_it_is_not_damped_into_an_end_stop_nor_without_bounds_by_ends_that_are_far() -> None:
+    for bounds in ((-0.06, 0.04), (0.0, 0.04), (-0.06, 0.0), (-1.0, 1.0)):
+        rig = swinging(Rig())
+        rig.axis.bounds = bounds
+        seen = []
+        for _ in range(round(2.5 / TICK_S)):
+            rig.run(TICK_S, damps=True)
+            seen.append(rig.axis.sent)
+        step = 1.0 / 125
+        assert max(-LARGEST, bounds[0]) - step <= min(seen)
+        assert max(seen) <= min(LARGEST, bounds[1]) + step
+        assert min(seen) < 0.0 or not bounds[0]
+        assert max(seen) > 0.0 or not bounds[1]
+
+
 @pytest.mark.parametrize("damps", [False, True])
 def test_not_by_a_sensor_that_is_only_watched_and_not_where_no_other_axis_makes_it(
     damps: bool,
