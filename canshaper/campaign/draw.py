@@ -175,15 +175,16 @@ def _place(
     near, ahead_m = draw.between(0.0, 100.0) < ranges.stops_pct, draw.between(0.0, _NEAR_M)
     at_m = draw.one_of((crane.radius_min_m + ahead_m, crane.radius_max_m - ahead_m))
     if near and NEAR_FAR in axes:
+        factors["radius_m"] = at_m
         crane = replace(crane, start_radius_m=at_m)
-    carrier = replace(crane.carrier, **{n: factors[n] for n in ("pitch_deg", "roll_deg")})
+    tilts = {name: factors[name] for name in ("pitch_deg", "roll_deg", "rock_hz")}
     speed = factors["wind_m_s"]
     heading, gust = factors["wind_heading_deg"], _GUSTS * speed
     wind = replace(crane.wind, speed_m_s=speed, gust_m_s=gust, heading_deg=heading, seed=seed)
     if factors["pump_flow"] < MOST_FLOW:
         pump = replace(crane.pump, shares_flow=0.0 if factors["starved"] else 1.0)
         crane = replace(crane, pump_flow=factors["pump_flow"], pump=pump)
-    crane = replace(crane, carrier=replace(carrier, rock_hz=factors["rock_hz"]), wind=wind)
+    crane = replace(crane, carrier=replace(crane.carrier, **tilts), wind=wind)
     return crane, factors | {"near_stop": float(near)}
 
 

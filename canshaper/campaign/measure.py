@@ -30,38 +30,55 @@ def measured_drive(
     the controller makes a frame, only what was asked and what the limits are.
     """
     setting = draw_drive(deployment, seed, ranges, nominal)
-    simulation = Simulation(deployment, setting.script, **setting.options)
-    tracks = _Tracks(deployment, setting, nominal or CraneParameters(), simulation.plant)
-    broken, why = 0, ""
-    for time_ms in simulation.ticks():
-        tracks.add(time_ms)
-        if simulation.plant.crane.swung_over:  # what comes then says nothing
-            break
-        for event in simulation.controller.events:
-            if isinstance(event, RefusalEvent):
-                broken, why = broken + 1, why or f"{time_ms / 1000.0:.2f} s: {event.text}"
-    raw = None if setting.fault else _raw_deg(deployment, setting, nominal or CraneParameters())
+    drive = _Drive(deployment, setting, nominal or CraneParameters())
+    raw = None if setting.fault else _Drive(deployment, setting, drive.nominal, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,
-        **tracks.measures(),
-        "raw_deg": raw,
-        "broken": broken,
-        "why": why,
-        "swung_over": simulation.plant.crane.swung_over,
+        **drive.measures,
+        "raw_deg": raw.measures["residual_deg"] if raw else None,
+        "broken": len(drive.refused),
+        "why": drive.refused[0] if drive.refused else "",
+        "swung_over": drive.swung_over,
     }
 
 
-def _raw_deg(deployment: Deployment, setting: Setting, nominal: CraneParameters) -> float | None:
-    """Swing that the same drive leaves with anti-sway off, deg."""
-    options: DriveOptions = {**setting.options, "bypass": True}
-    simulation = Simulation(deployment, setting.script, **options)
-    tracks = _Tracks(deployment, setting, nominal, simulation.plant)
-    for time_ms in simulation.ticks():
-        tracks.add(time_ms)
-        if simulation.plant.crane.swung_over:
-            return None
-    return tracks.measures()["residual_deg"]
+class _Drive:
+    """A drive of a setting, driven and measured.
+
+    One whose grapple swings above the horizontal ends there: what comes after that says nothing,
+    and it leaves as much as its largest swing.
+
+    Attributes:
+        nominal: the crane whose full speeds the operator expects.
+        measures: see ``MEASURES``.
+        refused: valve frames that the gate has refused, with their times.
+        swung_over: its grapple swung above the horizontal.
+    """
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        setting: Setting,
+        nominal: CraneParameters,
+        *,
+        bypass: bool = False,
+    ) -> None:
+        options: DriveOptions = {**setting.options, "bypass": bypass}
+        simulation = Simulation(deployment, setting.script, **options)
+        plant = simulation.plant
+        tracks = _Tracks(deployment, setting, nominal, plant)
+        self.nominal, self.refused = nominal, list[str]()
+        for time_ms in simulation.ticks():
+            tracks.add(time_ms)
+            for event in simulation.controller.events:
+                if isinstance(event, RefusalEvent):
+                    self.refused.append(f"{time_ms / 1000.0:.2f} s: {event.text}")
+            if plant.crane.swung_over:
+                break
+        self.measures, self.swung_over = tracks.measures(), plant.crane.swung_over
+        if self.swung_over:
+            self.measures["residual_deg"] = self.measures["peak_deg"]
 
 
 class _Tracks:

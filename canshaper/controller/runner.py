@@ -50,7 +50,8 @@ class AxisControl:
         period_ticks, period_s: time between two commands to its valve.
         room: how far it may still move in both directions ahead of its end stops, full speed times
             seconds.
-        displaced: how far the motion has moved it from where its own commands lead, likewise.
+        displaced: how far the motion has moved it from where its own commands lead, in the same
+            unit.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.

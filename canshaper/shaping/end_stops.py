@@ -105,8 +105,11 @@ class RunOn:
 
         Where a reversal cuts off what is left of the one, all of the other comes.
         """
-        left = self._left
-        return sum(map(mul, left, self._negative)), sum(map(mul, left, self._positive))
+        left, negative, positive = self._left, self._negative, self._positive
+        return (
+            sum(map(mul, left, negative)) if any(negative) else 0.0,
+            sum(map(mul, left, positive)) if any(positive) else 0.0,
+        )
 
 
 def bounds(room: tuple[float, float], displaced: float) -> tuple[float, float]:

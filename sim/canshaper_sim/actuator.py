@@ -12,7 +12,7 @@ _ALLOWED = {"cushion_s": (0.0, 2.0), "creep": (0.02, 1.0)}
 
 @dataclass(frozen=True, slots=True)
 class EndParameters:
-    """What every axis meets at its ends: by default a hard stop.
+    """End stops of every axis: hard by default, or with a cushion ahead of them.
 
     A cushion throttles the oil over the last part of the stroke. One that is profiled brakes with a
     constant deceleration, the least peak pressure: the speed is bounded by the root of the way that

@@ -92,7 +92,7 @@ class Carrier:
         self._bends = *turned, tip.height_m - grapple.l1_m - grapple.l2_m
 
     def push(self, slew_rad: float, radius_m: float) -> Push:
-        """What a mass that hangs there feels more than on a level carrier that stands."""
+        """Return the force on a mass that hangs there, less that on a level carrier at rest."""
         gravity = self._gravity_m_s2
         roll, pitch = self._slope[0] + self.roll[0], self._slope[1] + self.pitch[0]
         fall = math.cos(pitch)

@@ -233,6 +233,8 @@ class Crane:
     @property
     def rest_rad(self) -> tuple[float, float]:
         """(theta5, theta6) at which the grapple would hang still: here, in the present wind."""
+        if self.around.none:
+            return 0.0, 0.0
         return self.around.rest(self.parameters.grapple, *self.boom.pose[:2])
 
     @property

@@ -166,7 +166,7 @@ Push = tuple[float, float, float]
 def pushed(
     grapple: Grapple, sway: tuple[float, float, float, float], link: Push, load: Push
 ) -> tuple[float, float]:
-    """What forces on link and grapple add to `accelerations`: by the ways that they go."""
+    """Return what forces on link and grapple add to `accelerations`, by virtual work."""
     s5, c5, s6, c6 = math.sin(sway[0]), math.cos(sway[0]), math.sin(sway[1]), math.cos(sway[1])
     l1, l2 = grapple.l1_m, grapple.l2_m
     l3 = l1 + l2 * c6

@@ -7,7 +7,7 @@ State = tuple[float, float]
 
 
 def swing_over(omega: float, ratio: float, step_s: float) -> tuple[float, float, float, float]:
-    """What a free swing, undamped of this frequency (rad/s), makes of (deflection, rate)."""
+    """Return the transition matrix of (deflection, rate), row by row; omega in rad/s undamped."""
     damped = omega * math.sqrt(1.0 - ratio**2)
     fade = math.exp(-ratio * omega * step_s)
     cosine = fade * math.cos(damped * step_s)

@@ -1,7 +1,7 @@
 """The rotator, and what a log does to the swing that hangs from it off its middle or is long.
 
 The log turns with the rotator, n being its horizontal direction seen from the boom, and q the tilt
-of the grapple outwards and in slew direction. Its centre, e beside the line through the joints,
+of the grapple outwards and in slew direction. Its centre, e from the line through the joints,
 pulls the grapple askew; its moment of inertia J counts in the plane of the log only, so a swing
 that is neither along nor across the log wanders between the two planes. Of the rigid body by
 Lagrange, in small angles:

@@ -1,4 +1,4 @@
-"""What pulls at the grapple besides gravity and tip: ground, carrier, wind, and how a log hangs."""
+"""Surroundings that pull at the grapple: ground, carrier, wind, and how a log hangs in it."""
 
 from dataclasses import dataclass
 
@@ -61,7 +61,7 @@ class Surroundings:
         return across, along
 
     def pushes(self, grapple: Grapple, slew_rad: float, radius_m: float) -> tuple[Push, Push]:
-        """What link and grapple feel besides the gravity of level ground."""
+        """Return the forces on link and grapple in addition to the gravity of level ground."""
         link = self.carrier.push(slew_rad, radius_m) if self.carrier else (0.0, 0.0, 0.0)
         if self.wind is None:
             return link, link

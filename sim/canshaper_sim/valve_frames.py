@@ -1,4 +1,4 @@
-"""What a valve reads in its frames: by the DBC and the deployment file alone.
+"""A valve reads its frames by the DBC and the deployment file alone.
 
 A valve does not know how the controller encodes. So nothing here is of ``canshaper.codec``, and a
 fault of that moves the simulated crane as it would move a real one.

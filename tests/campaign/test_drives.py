@@ -1,5 +1,6 @@
 """What a campaign draws, and what it measures of a drive."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -201,6 +202,7 @@ def test_pump_ground_wind_and_stops_reach_the_crane() -> None:
         starved += int(of["starved"])
         if of["near_stop"]:
             near += 1
+            assert of["radius_m"] == crane.start_radius_m
             assert min(crane.start_radius_m - 1.8, 8.0 - crane.start_radius_m) <= 1.5
     assert 70 <= near <= 130
     assert 70 <= starved <= 130
@@ -223,3 +225,13 @@ def test_each_sound_drive_is_driven_with_anti_sway_off_too() -> None:
     crane = drive(ROBUST, setting.script, **{**setting.options, "bypass": True})
     assert crane.crane is not None
     assert row["raw_deg"] == pytest.approx(crane_metrics(crane, crane.crane).residual_deg, rel=0.02)
+
+
+def test_a_drive_that_swings_over_ends_there_and_counts_with_what_it_has_swung(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("canshaper_sim.crane._HORIZONTAL", math.radians(4.0))
+    row = measured_drive(ROBUST, 3, RANGES)
+    assert row["swung_over"]
+    assert row["residual_deg"] == row["peak_deg"] > 0.0
+    assert row["raw_deg"] >= 4.0
