@@ -280,7 +280,7 @@ def lines(summary: Summary) -> Iterator[str]:
         for seed, left, raw in worse.seeds:
             yield f"  drive {seed}: {left:.2f} deg, with anti-sway off {raw:.2f}"
     if over := summary.counts["swung_over"]:
-        yield f"The grapple swung above the horizontal in {over} drives: their figures say nothing"
+        yield f"The grapple swung above the horizontal in {over} drives, which end and count there"
     for one in summary.verdicts:
         verdict = "kept" if one.kept else "NOT SHOWN"
         if one.quantile.low is not None and one.quantile.low > one.limit:
