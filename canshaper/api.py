@@ -111,9 +111,7 @@ class Controller:
     def axes(self) -> dict[str, AxisState]:
         """Return the state of each axis by its name."""
         runners = self._inner.axes.items()
-        return {
-            name: AxisState(one.axis.state, one.axis.reason, one.axis.sent) for name, one in runners
-        }
+        return {name: AxisState(one.axis.state, one.reason, one.axis.sent) for name, one in runners}
 
     def events(self) -> list[Event]:
         """Return the events since the last call: changes of states, valves, other nodes.

@@ -74,6 +74,10 @@ class ReportedAxis(Protocol):
         """State, reason, commands."""
 
     @property
+    def reason(self) -> Reason:
+        """Why it is in its state, or what holds it back."""
+
+    @property
     def sway_deg(self) -> float:
         """Predicted swing of the load."""
 
@@ -101,7 +105,7 @@ def _applied_pct(one: ReportedAxis) -> float:
 # Nothing here may be a lambda: a deployment is handed over by the process that has read it.
 AXIS_STATUS: list[StatusField[ReportedAxis]] = [
     StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State)),
-    StatusField("Reason", attrgetter("axis.reason"), _Code(Reason), True, max(Reason)),
+    StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason)),
     StatusField("RawCommand", _command_pct, required=True),
     StatusField("ShapedCommand", _applied_pct, required=True),
     StatusField("PredictedSway", attrgetter("sway_deg"), required=True),

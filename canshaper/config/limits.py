@@ -196,6 +196,13 @@ class Motion(Section):
         return self
 
 
+class OtherFlow(Position):
+    """Measured flow of functions that are not ours."""
+
+    signal: str = Field(description="signal with that flow, or with what it follows")
+    full: Annotated[float, number(1e-6, 1e6, "units", "its value for one full axis flow")]
+
+
 class Hydraulics(Section):
     """Oil that the pump delivers; see ``FlowBudget``."""
 
@@ -204,13 +211,17 @@ class Hydraulics(Section):
     others: Annotated[
         float, number(0, 100, "full axis flows", "what functions take that are not ours")
     ] = 0.0
+    """What functions take that are not ours. With others_measured it counts while that is lost: 0
+    for as if they took nothing, as much as flow for no motion."""
+    others_measured: OtherFlow | None = None
+    """Where that is measured: by signal, in the unit of which full is one full axis flow."""
     shares: dict[str, Annotated[float, number(0, 100, "full axis flows", "of an axis")]] = Field(
         {}, description="what an axis takes at full speed, by name; without an entry 1"
     )
 
     @model_validator(mode="after")
     def _some_left(self) -> Self:
-        if self.others >= self.flow:
+        if self.others >= self.flow and not self.others_measured:
             raise ValueError(f"others: expected less than the flow, got {self.others:g}")
         return self
 

@@ -238,8 +238,8 @@ class Controller:
         for motion in self.motions:
             if (event := motion.step(now_ns, last, now)) is not None:
                 self.events.append(event)
-        if self._flow and (shared := self._flow.step(now - last)) is not None:
-            self.events.append(shared)
+        if self._flow:
+            self.events += self._flow.step(now_ns, now - last)
         return changed
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
@@ -255,7 +255,9 @@ class Controller:
         self._ends = [AxisEnds(self.axes[name], one) for name, one in inputs.positions.items()]
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
         oil = self.deployment.config.hydraulics
-        self._flow = SharedFlow(oil, self.axes, inputs.joysticks, tick_s) if oil else None
+        self._flow = None
+        if oil:
+            self._flow = SharedFlow(oil, self.axes, inputs.joysticks, inputs.other_flow, tick_s)
 
     def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
         """Report changes of the valve's feedback and of the sway sensor."""

@@ -93,6 +93,18 @@ class FlowEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherFlowEvent:
+    """The measured flow of functions that are not ours is lost, or known again."""
+
+    known: bool
+
+    @property
+    def text(self) -> str:
+        """Line for the log."""
+        return f"hydraulics_others={'known' if self.known else 'lost'}"
+
+
+@dataclass(frozen=True, slots=True)
 class EndsEvent:
     """The position by which an axis is stopped ahead of its end stops is lost, or known again."""
 

@@ -1,11 +1,12 @@
 """The oil of one pump, shared by the demands of all axes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from canshaper.config.limits import Hydraulics
-from canshaper.controller.events import FlowEvent
+from canshaper.controller.events import FlowEvent, OtherFlowEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
+from canshaper.inputs.value import Value
 from canshaper.shaping.flow_budget import FlowBudget
 from canshaper.shaping.limits import within
 from canshaper.shaping.states import Reason, State
@@ -23,6 +24,7 @@ class SharedFlow:
         config: the oil, and what each axis takes of it.
         axes: the axes by name.
         joysticks: the joysticks by name.
+        others: measured flow of functions that are not ours, where there is one.
         tick_s: time between two ticks of the controller.
     """
 
@@ -31,22 +33,35 @@ class SharedFlow:
         config: Hydraulics,
         axes: Mapping[str, AxisControl],
         joysticks: Mapping[str, JoystickInput],
+        others: Value | None,
         tick_s: float,
     ) -> None:
         self._axes = [
             (one, joysticks[one.bound.config.command.joystick].commands) for one in axes.values()
         ]
         shares = [config.shares.get(name, 1.0) for name in axes]
-        self._budget = FlowBudget(config.flow - config.others, shares, tick_s)
+        self._config, self._others = config, others
+        self._known = True
+        self._budget = FlowBudget(shares, tick_s)
         self._enough = round(ENOUGH_S / tick_s)
         self._ticks = self._enough  # since it was scaled last
 
-    def step(self, ticks: int) -> FlowEvent | None:
-        """Scale the demands of this tick; the event where that is to be reported.
+    def step(self, now_ns: int, ticks: int) -> Iterator[FlowEvent | OtherFlowEvent]:
+        """Scale the demands of this tick, and yield what is to be reported.
 
         Args:
+            now_ns: monotonic time.
             ticks: that have passed; more than 1 where deadlines were missed.
         """
+        config = self._config
+        flow = config.flow - config.others
+        if self._others is not None and (measured := config.others_measured):
+            value = self._others.fresh(now_ns)
+            if (known := value is not None) is not self._known:
+                self._known = known
+                yield OtherFlowEvent(known)
+            if value is not None:
+                flow = config.flow - max(value / measured.full, 0.0)
         demands, outputs = [], []
         for runner, commands in self._axes:
             command = runner.bound.config.command
@@ -57,11 +72,10 @@ class SharedFlow:
                 demand = within(demand, *runner.axis.bounds, 0.0)
             demands.append(demand if abs(demand) > command.neutral_pct / 100.0 else 0.0)
             outputs.append(runner.axis.sent)
-        scale = self._budget.step(demands, outputs, ticks)
+        scale = self._budget.step(flow, demands, outputs, ticks)
         for runner, _ in self._axes:
             runner.axis.scale = scale
         before = self._ticks
         self._ticks = 0 if scale < 1.0 else before + ticks
         if before >= self._enough > self._ticks or before < self._enough <= self._ticks:
-            return FlowEvent(scale)
-        return None
+            yield FlowEvent(scale)

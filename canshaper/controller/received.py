@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.sent import Sender
-from canshaper.config.limits import Ends, Radius
+from canshaper.config.limits import Ends, OtherFlow, Radius
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
@@ -38,6 +38,7 @@ class MachineInputs:
         sway_sensors: measurements of sway, by the name of each axis that reads them.
         radii: measured radius of the tip, by the name of its two-axis motion.
         positions: measured position, by the name of the axis that has ends.
+        other_flow: measured flow of functions that are not ours, where there is one.
         gates: switches that enable a joystick, but for the one that is pressed, by its name.
         bound: all of them that receive frames, with their messages.
     """
@@ -58,6 +59,8 @@ class MachineInputs:
         motions, axes = deployment.motions.items(), deployment.axes.items()
         self.radii = {n: self._position(one.radius) for n, one in motions if one.radius}
         self.positions = {name: self._position(one.ends) for name, one in axes if one.ends}
+        others = deployment.other_flow
+        self.other_flow = self._position(others) if others else None
         self.sway_sensors = self._sway_sensors(deployment)
 
     def _sway_sensors(self, deployment: Deployment) -> dict[str, "SwaySensorInput"]:
@@ -100,7 +103,9 @@ class MachineInputs:
         having = [self.joysticks[n] for n, one in config.joysticks.items() if one.next_profile]
         return ProfileButtons(having, profile_names(config)) if having else None
 
-    def _position(self, bound: BoundValue[Radius] | BoundValue[Ends]) -> Value:
+    def _position(
+        self, bound: BoundValue[Radius] | BoundValue[Ends] | BoundValue[OtherFlow]
+    ) -> Value:
         if (message := self._positions.get(bound.key)) is None:
             message = self._positions[bound.key] = PositionInput(bound)
             self.bound.append((bound, message))

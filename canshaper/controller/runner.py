@@ -328,6 +328,16 @@ class AxisControl:
         return math.degrees(sway.sway_rad(self._full_speed_m_s)) if sway else 0.0
 
     @property
+    def reason(self) -> Reason:
+        """Why the axis is in its state; in ACTIVE also what holds it back from its demand."""
+        axis = self.axis
+        if axis.state is State.ACTIVE and abs(axis.command) < 1.0 and axis.command in axis.bounds:
+            return Reason.END_STOP
+        if axis.state is State.ACTIVE and axis.command and axis.scale < 1.0:
+            return Reason.FLOW_LIMITED
+        return axis.reason
+
+    @property
     def trust(self) -> Trust:
         """Trust state of the sway sensor; NO_DATA without one."""
         return self.axis.sensed.state if self.axis.sensed else Trust.NO_DATA

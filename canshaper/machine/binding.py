@@ -23,6 +23,7 @@ from canshaper.machine.inputs import (
     BoundValue,
     Choosing,
     bind_emergency_stop,
+    bind_others,
     bind_switch,
 )
 from canshaper.machine.joysticks import (
@@ -59,6 +60,8 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     switches = bind_switches(lookup)
     axes = bind_axes(lookup)
     motions = bind_motions(lookup)
+    measured = config.hydraulics.others_measured if config.hydraulics else None
+    others = bind_others(lookup, ("hydraulics", "others_measured"), measured) if measured else None
     stop = bind_emergency_stop(lookup, config.emergency_stop) if config.emergency_stop else None
     load_state = (
         bind_switch(lookup, ("load_state",), config.load_state) if config.load_state else None
@@ -79,6 +82,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         {name: joystick for name, joystick in joysticks.items() if joystick},
         axes,
         motions,
+        others,
         stop,
         *service,
         Identity(

@@ -11,6 +11,7 @@ from canshaper.codec.layout import is_j1939
 from canshaper.codec.sent import SentMessage
 from canshaper.codec.status import StatusCodec
 from canshaper.config.inputs import InputSection
+from canshaper.config.limits import OtherFlow
 from canshaper.config.schema import DeploymentConfig, EmergencyStop
 from canshaper.config.source import Source
 from canshaper.machine.buses import BusLoad, bus_load
@@ -34,6 +35,7 @@ class Deployment:
     joysticks: dict[str, BoundJoystick]
     axes: dict[str, BoundAxis]
     motions: dict[str, BoundMotion]
+    other_flow: BoundValue[OtherFlow] | None
     emergency_stop: Bound[EmergencyStop] | None
     status: StatusCodec[dict[str, int]] | None
     status_ticks: int
@@ -81,7 +83,8 @@ class Deployment:
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
         # Several parts may read one message.
-        read = [*(motion.radius for motion in self.motions.values()), *(a.ends for a in axes)]
+        radii = (motion.radius for motion in self.motions.values())
+        read = [*radii, *(axis.ends for axis in axes), self.other_flow]
         positions = {one.key: one for one in read if one}.values()
         sensors = {s.message.key: s.message for axis in axes if (s := axis.sway_sensor)}.values()
         others = (

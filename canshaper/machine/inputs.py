@@ -14,7 +14,7 @@ from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
-from canshaper.config.limits import Ends, Position, Radius
+from canshaper.config.limits import Ends, OtherFlow, Position, Radius
 from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.contraries import ENABLE, STOP
@@ -200,17 +200,36 @@ def bind_ends(lookup: Lookup, place: Place, config: Ends) -> BoundValue[Ends] | 
     """Bind the position by which an axis is stopped ahead of its end stops."""
     if (result := _bind_position(lookup, place, config, "a position")) is None:
         return None
+    _check_range(lookup, place, result, ("lowest", "highest"), "a position")
+    return result[1]
+
+
+def bind_others(lookup: Lookup, place: Place, config: OtherFlow) -> BoundValue[OtherFlow] | None:
+    """Bind the measured flow of functions that are not ours."""
+    if (result := _bind_position(lookup, place, config, "a flow")) is None:
+        return None
+    _check_range(lookup, place, result, ("full",), "a flow")
+    return result[1]
+
+
+def _check_range(
+    lookup: Lookup,
+    place: Place,
+    result: tuple[UsedMessage, BoundValue[AnyPosition]],
+    keys: Iterable[str],
+    what: str,
+) -> None:
+    """Check that a signal has a range, and that values of its section lie in it."""
     used, bound = result
     signal = bound.signal
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or high <= low:
-        used.add_fault(f"{signal.name} has no range in the DBC; what lies outside is no position")
-        return None
-    for key in ("lowest", "highest"):
-        if not low <= (value := getattr(config, key)) <= high:
-            text = f"expected a position within the range of {signal.name}, [{low:g}|{high:g}]"
+        used.add_fault(f"{signal.name} has no range in the DBC; what lies outside is not {what}")
+        return
+    for key in keys:
+        if not low <= (value := getattr(bound.config, key)) <= high:
+            text = f"expected {what} within the range of {signal.name}, [{low:g}|{high:g}]"
             lookup.diagnostics.add((*place, key), f"{text}, got {value:g}")
-    return bound
 
 
 def _bind_position(

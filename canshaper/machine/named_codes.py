@@ -80,6 +80,11 @@ def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
         if one := motion.radius:
             listing = Listing(("motion", name, "radius", "codes"), (one.signal,), one.codes)
             add(one.bus, one.message, listing)
+    if config.hydraulics and (others := config.hydraulics.others_measured):
+        listing = Listing(
+            ("hydraulics", "others_measured", "codes"), (others.signal,), others.codes
+        )
+        add(others.bus, others.message, listing)
     if load := config.load_state:
         values = frozenset(values_of_schedules(config).values())
         listing = Listing(("load_state", "codes"), (load.signal,), load.codes, values)

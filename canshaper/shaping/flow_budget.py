@@ -16,7 +16,6 @@ class FlowBudget:
     """The factor of all demands, tick by tick.
 
     Args:
-        flow: what the pump delivers, full axis flows, less what others take.
         shares: of each axis at full speed, full axis flows.
         tick_s: time between two calls of ``step``.
 
@@ -24,24 +23,27 @@ class FlowBudget:
         scale: the factor, 0 to 1.
     """
 
-    __slots__ = ("_flow", "_rise", "_shares", "scale")
+    __slots__ = ("_rise", "_shares", "scale")
 
-    def __init__(self, flow: float, shares: Sequence[float], tick_s: float) -> None:
-        self._flow, self._shares = flow, shares
+    def __init__(self, shares: Sequence[float], tick_s: float) -> None:
+        self._shares = shares
         self._rise = tick_s / RISE_S
         self.scale = 1.0
 
-    def step(self, demands: Sequence[float], outputs: Sequence[float], ticks: int = 1) -> float:
+    def step(
+        self, flow: float, demands: Sequence[float], outputs: Sequence[float], ticks: int = 1
+    ) -> float:
         """Find the factor of this tick.
 
         An axis whose demand has ended, or was reversed, still asks for what its filter lets run on.
 
         Args:
+            flow: what the pump delivers, full axis flows, less what others take.
             demands: of the operator, by axis, [-1, 1].
             outputs: velocities sent in the last tick, by axis, [-1, 1] of full speed.
             ticks: that have passed; more than 1 where deadlines were missed.
         """
-        asked, free = 0.0, self._flow
+        asked, free = 0.0, flow
         for share, demand, output in zip(self._shares, demands, outputs, strict=True):
             asked += share * abs(demand)
             if demand * output <= 0.0:

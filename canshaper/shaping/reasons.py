@@ -79,6 +79,15 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "another axis moves this one without its own joystick, within "
         "[bounds](safety.md#added-velocity)",
     ),
+    Reason.FLOW_LIMITED: ReasonText(
+        "slower: the pump gives no more",
+        "the axes ask for more oil than the pump delivers: all are slowed by one factor "
+        "([`hydraulics`](deployment.md#hydraulics))",
+    ),
+    Reason.END_STOP: ReasonText(
+        "slower: an end stop is near",
+        "slowed or stopped ahead of an end stop ([`limits.ends`](deployment.md#end-stops))",
+    ),
     Reason.JOYSTICK_NOT_NEUTRAL: ReasonText(
         "let go of the joystick",
         "the joystick is deflected before the axis is ready",

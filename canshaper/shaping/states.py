@@ -46,6 +46,8 @@ class Reason(IntEnum):
     STOP_DONE = 6
     RESET = 7
     COMPENSATING = 8
+    FLOW_LIMITED = 9
+    END_STOP = 10
     JOYSTICK_NOT_NEUTRAL = 16
     ENABLE_OFF = 17
     # Input lost or invalid: bounded shaped stop.

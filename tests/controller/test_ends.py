@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
-from canshaper.shaping.states import State
+from canshaper.shaping.states import Reason, State
 from tests.rigs.forwarder import ROOT, Rig
 
 Make = Callable[..., Rig]
@@ -54,9 +54,11 @@ def test_at_an_end_only_the_way_back_is_open(pump: Rig, radius_m: float, joystic
     run(pump, radius_m, 20, NearFar=joystick)
     assert demand(pump) == 0.0
     assert pump.state("near_far") is State.ACTIVE
+    assert pump.controller.axes["near_far"].reason is Reason.END_STOP
     run(pump, radius_m, 3)
     run(pump, radius_m, 20, NearFar=-joystick)
     assert demand(pump) == -joystick / 1000
+    assert pump.controller.axes["near_far"].reason is Reason.JOYSTICK_MOVED
 
 
 def test_near_an_end_it_creeps(pump: Rig) -> None:

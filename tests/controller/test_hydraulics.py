@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import pytest
 
+from canshaper.codec.frame import Frame
 from canshaper.config.load import load_config
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import ConfigError
-from canshaper.shaping.states import State
+from canshaper.shaping.states import Reason, State
 from tests.rigs.forwarder import ROOT, Rig
 
 Make = Callable[..., Rig]
@@ -144,3 +145,68 @@ def test_the_shipped_file_differs_in_the_oil_and_the_ends_only() -> None:
     usual = {"hydraulics": None, "axes": axes, "uncertainty": robust.uncertainty}
     assert pump.model_copy(update=usual) == robust
     assert oil.flow == 1.2
+
+
+SAW = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200, full: 10"
+
+
+def with_saw(make: Make, others: float) -> Rig:
+    oil = f"{{ flow: 1.5, others: {others}, others_measured: {{ {SAW} }} }}"
+    return make({"axes:\n": f"hydraulics: {oil}\naxes:\n"})
+
+
+def saw(rig: Rig, flow: float) -> None:
+    message = rig.message("TipPosition")
+    values = {"SlewAngle": 0, "Radius": flow, "Height": 0}
+    rig.receive(Frame("crane", message.frame_id, False, message.encode(values)))
+
+
+@pytest.mark.parametrize(("others", "left"), [(0.0, 0.75), (0.3, 0.6), (1.5, 0.0)])
+def test_what_others_take_is_measured_and_the_constant_counts_while_it_is_lost(
+    changed_rig: Make, others: float, left: float
+) -> None:
+    rig = with_saw(changed_rig, others)
+    rig.run(3)
+    saw(rig, 5.0)
+    rig.run(1, **FULL)
+    assert commands(rig) == pytest.approx([0.5, 0.5, 0.0])
+    rig.run(100, **FULL)
+    assert commands(rig) == pytest.approx([left, left, 0.0])
+    saw(rig, 15.0)
+    rig.run(1, **FULL)
+    assert commands(rig) == [0.0, 0.0, 0.0]
+    lost = [line for line in news(rig) if "others" in line]
+    assert lost[-2:] == ["hydraulics_others=lost", "hydraulics_others=known"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "why"),
+    [
+        ("full: 90", "hydraulics.others_measured.full: expected a flow within the range of Radius"),
+        ("full: 0", "hydraulics.others_measured.full: expected 1e-06 to 1e+06 units, got 0"),
+        ("signal: Speed", "hydraulics.others_measured.signal: "),
+    ],
+)
+def test_a_measured_flow_that_cannot_be_is_refused(changed_rig: Make, keys: str, why: str) -> None:
+    name = keys.partition(":")[0]
+    oil = ", ".join(keys if one.startswith(name) else one for one in SAW.split(", "))
+    with pytest.raises(ConfigError) as refused:
+        text = f"hydraulics: {{ flow: 1.5, others_measured: {{ {oil} }} }}"
+        changed_rig({"axes:\n": f"{text}\naxes:\n"})
+    assert why in str(refused.value)
+
+
+def test_its_reason_says_that_the_pump_gives_no_more(pump: Rig) -> None:
+    pump.run(3)
+    pump.run(30, **FULL)
+    axes = pump.controller.axes
+    reasons = [axis.reason for axis in axes.values()]
+    assert reasons == [Reason.FLOW_LIMITED, Reason.FLOW_LIMITED, Reason.JOYSTICK_NEUTRAL]
+    frame = axes["slew"].status_frame()
+    assert frame is not None
+    sent = pump.message("SlewStatus").decode(frame.data, decode_choices=False)
+    assert sent["Reason"] == Reason.FLOW_LIMITED
+    pump.run(20)  # runs on
+    assert axes["slew"].reason is Reason.JOYSTICK_MOVED
+    pump.run(150, Slew=1000)
+    assert axes["slew"].reason is Reason.JOYSTICK_MOVED

@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 650,
     "docs/comparison.md": 720,
     "docs/decisions.md": 895,
-    "docs/deployment.md": 2110,
+    "docs/deployment.md": 2150,
     "docs/devices.md": 540,
     "docs/doctor.md": 420,
     "docs/glossary.md": 400,

@@ -1,6 +1,7 @@
 """One axis of a machine as its files say: what its joystick means, what its valve was sent."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,6 +41,34 @@ class Words:
     status: Field
     length: int
     timeout_ns: int
+
+
+@dataclass(frozen=True)
+class Ends:
+    """End stops of an axis: message with its position, positions in raw steps."""
+
+    key: Key
+    length: int
+    field: Field
+    low: float
+    high: float
+    timeout_ns: int
+    sign: int
+
+    @classmethod
+    def read(cls, section: Mapping[str, Any], message: Any) -> "Ends":
+        """From its section in the file, and the message that it names."""
+        signal = next(s for s in message.signals if s.name == section["signal"])
+        field, margin = Field(signal), section["margin"]
+        return cls(
+            (section["bus"], message.frame_id, message.is_extended_frame),
+            message.length,
+            field,
+            (section["lowest"] + margin) / field.scale,
+            (section["highest"] - margin) / field.scale,
+            section["timeout_ms"] * 1_000_000,
+            1 if section["full_speed"] > 0 else -1,
+        )
 
 
 @dataclass

@@ -36,6 +36,8 @@ class AxisRules:
         self._skipped = 0
         self.partner: AxisRules | None = None  # of a two-axis motion
         self.lost = 0  # frames that were not sent since the last one
+        self.bypassed_ns = LONG_AGO  # anti-sway was off last
+        self._oil: deque[tuple[int, float]] = deque()  # command that there is oil for
         self._count: int | None = None
 
     # -- before a frame ---------------------------------------------------------------------------
@@ -48,6 +50,8 @@ class AxisRules:
             joystick_works: whether the node of the joystick does.
         """
         joystick, axis = self.joystick, self.axis
+        if joystick.bypasses():
+            self.bypassed_ns = now_ns
         causes, self.causes = self.causes, set()
         if self._stop_until_ns is not None and now_ns > self._stop_until_ns:
             self._stop_until_ns = None
@@ -109,7 +113,7 @@ class AxisRules:
         # The daemon may not have been ready in the tick in which it was armed here.
         self._moved = self.armed and (self._moved or self.raw != 0)
         recent.append((now_ns, command, self._moved))
-        tail_ns = (axis.tail + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
+        tail_ns = self.tail_ns
         # What was commanded until the next entry counts up to there.
         while len(recent) > 1 and recent[1][0] < now_ns - tail_ns:
             recent.popleft()
@@ -120,6 +124,22 @@ class AxisRules:
         still = [c for since_ns, c, sure in recent if sure and since_ns >= now_ns - certain_ns]
         self._commanded_down = min((0.0, *still)) < 0.0
         self._commanded_up = max((0.0, *still)) > 0.0
+
+    @property
+    def certain(self) -> float:
+        """Command that moves the axis for certain."""
+        return self._command if self._moved else 0.0
+
+    @property
+    def tail_ns(self) -> int:
+        """Time in which a command counts after it is over."""
+        return (self.axis.tail + 2) * self.axis.period_ticks * self._tick_ns + SLACK_NS
+
+    def share_oil(self, now_ns: int, factor: float) -> None:
+        """Only so much of its command counts from now on."""
+        self._oil.append((now_ns, factor * self._commands[-1][1]))
+        while len(self._oil) > 1 and self._oil[1][0] < now_ns - self.tail_ns:
+            self._oil.popleft()
 
     def silenced(self) -> None:
         """Nothing is sent any more, and the valve closes by itself; from neutral after that."""
@@ -183,6 +203,9 @@ class AxisRules:
         elif not self._turns:
             low = low if self._command <= 0.0 else 0.0
             high = high if self._command >= 0.0 else 0.0
+        if self._oil:
+            commands = [command for _, command in self._oil]
+            low, high = max(low, min(0.0, *commands)), min(high, max(0.0, *commands))
         # Where its operator commands nothing and holds nothing against it, another one may.
         if axis.largest_added and not self._commanded_down and self._command <= 0.0:
             low = min(low, -axis.largest_added)

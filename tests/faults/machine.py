@@ -11,7 +11,7 @@ import cantools
 import yaml
 from cantools.database.can import Message
 
-from tests.faults.axis import Axis, Node, Words
+from tests.faults.axis import Axis, Ends, Node, Words
 from tests.faults.fields import Field
 from tests.faults.inputs import Input, Joystick, Key, Switches, key_of
 from tests.faults.sensor import SensorMessage
@@ -68,6 +68,13 @@ class Machine:
         self.radius: tuple[Key, int, Field] | None = None
         for motion in data.get("motion", {}).values():
             self._motion(motion, messages)
+        self.hydraulics: dict[str, Any] | None = data.get("hydraulics")
+        limits = {name: section.get("limits", {}) for name, section in data["axes"].items()}
+        self.ends = {
+            name: Ends.read(one["ends"], messages[one["ends"]["message"]])
+            for name, one in limits.items()
+            if "ends" in one
+        }
         self.stop: Input | None = None
         if stop := data.get("emergency_stop"):
             self.stop = Input("stop", stop, messages[stop["message"]])

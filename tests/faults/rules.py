@@ -11,6 +11,7 @@ the daemon's states nor what they are called. For every axis, in every frame of 
     never faster than commanded within the tail, never against the joystick, or on the way back
     no jump: never quicker than the valve's rates, but to neutral
     the alive counter goes on by one
+    where the file says so: no faster than there is oil for, and nothing towards an end stop
 
 A reload, a change of a number: nothing of this ends with them, so the rules do not know them.
 """
@@ -21,6 +22,7 @@ from tests.faults.judge import Violation
 from tests.faults.machine import Key, Machine
 from tests.faults.other_nodes import AddressRules, NodeRules, WordRules
 from tests.faults.received import Received, ReceivedJoystick, ReceivedSwitches
+from tests.faults.shared import EndRules, FlowRules
 
 
 class Rules:
@@ -51,6 +53,10 @@ class Rules:
             if axis.words
         }
         self.addresses = {bus: AddressRules(bus, own) for bus, own in machine.addresses.items()}
+        self._oil = FlowRules(machine.hydraulics, self.axes) if machine.hydraulics else None
+        self._ends = {
+            n: EndRules(self.axes[n], one, machine.tick_ns) for n, one in machine.ends.items()
+        }
         # Longest time between two ticks after which a motion may go on; and how old what is sent
         # may be: a tick; in a gateway as long as that, because frames leave before the next tick.
         waits = [
@@ -88,6 +94,8 @@ class Rules:
         """The daemon has read a frame."""
         if entry := self._inputs.get(frame[:3]):
             entry.receive(frame.data, arrived_ns)
+        for ends in self._ends.values():
+            ends.receive(frame, arrived_ns)
         for one in self.commanded(frame):
             one.foreign_ns = arrived_ns
             one.causes.add("another sender")
@@ -132,6 +140,8 @@ class Rules:
             address = self.addresses.get(one.axis.valve_key[0])
             if address and not address.usable(now_ns):
                 one.silenced()
+        if self._oil:
+            self._oil.decide(now_ns)
         for node_rules in self._nodes.values():
             node_rules.looked_at()
 
@@ -159,6 +169,9 @@ class Rules:
             raise Violation(f"{axes[0].axis.name}: {wrong}")
         for one in axes:
             if wrong := one.check(frame, ticks):
+                raise Violation(f"{one.axis.name}: {wrong}")
+            ends = self._ends.get(one.axis.name)
+            if ends and (wrong := ends.wrong(now_ns)):
                 raise Violation(f"{one.axis.name}: {wrong}")
             if one.raw and old_ns > self._oldest_ns:
                 raise Violation(f"{one.axis.name}: sent {one.raw} of {old_ns / 1e6:.0f} ms ago")

@@ -226,6 +226,7 @@ class Sequence:
     def _way_back(self, end_s: float) -> float:
         """All faults are over: a press with the joysticks in neutral, and every axis moves."""
         world, sign = self.world, self.rng.choice((-1.0, 1.0))
+        world.at(round(end_s * 1e9), lambda: setattr(world, "radius", 5000))  # off its end stop
         settle_s = SETTLE_CANOPEN_S if self.machine.nodes else SETTLE_S
         if any(address for address in self.machine.addresses.values()):
             world.at(round(end_s * 1e9), lambda: self.reload("same"))

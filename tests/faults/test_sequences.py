@@ -6,11 +6,14 @@ More, and one again: ``python -m tests.faults SEED --deployment NAME``.
 import random
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 from unittest.mock import patch
 
 import pytest
 
+from canshaper.controller import ends
 from canshaper.controller.controller import Controller
+from canshaper.shaping.flow_budget import FlowBudget
 from tests.faults.judge import Violation
 from tests.faults.lies import LIES
 from tests.faults.sequence import ACTS, SENDING, Sequence, kinds_for
@@ -20,6 +23,7 @@ from tests.faults.shipped import CONFIG, NAMES, shipped
 QUICK, SAMPLE = 1, 18
 # So many sequences may a lie stay unseen.
 MOST = 200
+BUDGET, BOUNDS = FlowBudget.step, ends.bounds  # as they are
 # Seen after many sequences.
 RARE = {"always active", "another sender unseen", "emergency unseen", "enable forced"}
 RARE |= {"error code unseen"}
@@ -90,6 +94,25 @@ def test_the_rules_catch_what_the_controller_does_not_do(method: str) -> None:
     with patch.object(Controller, method, lambda *_: None):
         seed = _caught("forwarder", lambda _: None)
     Sequence("forwarder", seed).run()
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "wrong"),
+    [
+        (FlowBudget, "step", lambda *_: 1.0),  # the pump delivers enough, always
+        (FlowBudget, "step", lambda one, flow, *rest: BUDGET(one, 1.2 * flow, *rest)),
+        (ends, "bounds", lambda *_: (-1.0, 1.0)),  # no end stop
+        (ends, "bounds", lambda *arguments: tuple(-side for side in BOUNDS(*arguments)[::-1])),
+    ],
+    ids=["no budget", "budget too large", "no end stop", "wrong end stop"],
+)
+@pytest.mark.slow
+def test_the_rules_catch_a_budget_or_an_end_stop_that_is_none(
+    where: Any, name: str, wrong: Any
+) -> None:
+    with patch.object(where, name, wrong):
+        seed = _caught("forwarder-pump", lambda _: None)
+    Sequence("forwarder-pump", seed).run()
 
 
 def test_a_seed_is_the_same_sequence_every_time() -> None:

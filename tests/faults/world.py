@@ -67,7 +67,9 @@ class World:
             name: sorted((rng.randrange(ticks), rng.randrange(ticks))) for name in self._joysticks
         }
         self._toggled = rng.random() < 0.2
-        self._radius = rng.randint(2000, 8000)
+        self.radius = rng.randint(2000, 8000)
+        if machine.ends and rng.random() < 0.5:  # at an end stop
+            self.radius = rng.choice((1000, 9000))
         self.nodes = {
             node.number: CanopenNode(self, node, machine, rng) for node in machine.nodes.values()
         }
@@ -183,7 +185,7 @@ class World:
         return raw
 
     def _radius_now(self) -> None:
-        for frame in radius_frames(self.machine, self._radius, self.active()):
+        for frame in radius_frames(self.machine, self.radius, self.active()):
             self.put(frame)
 
     def _sensor(self, sensor: SensorMessage) -> None:

@@ -16,5 +16,5 @@ def report(
     active_set: int = 0,
 ) -> Any:
     """An axis with these values."""
-    axis = SimpleNamespace(state=state, reason=reason, command=command, sent=sent)
-    return SimpleNamespace(axis=axis, sway_deg=sway_deg, active_set=active_set)
+    axis = SimpleNamespace(state=state, command=command, sent=sent)
+    return SimpleNamespace(axis=axis, reason=reason, sway_deg=sway_deg, active_set=active_set)
