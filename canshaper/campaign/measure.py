@@ -79,6 +79,7 @@ class _Drive:
         self.measures, self.swung_over = tracks.measures(), plant.crane.swung_over
         if self.swung_over:
             self.measures["residual_deg"] = self.measures["peak_deg"]
+            self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
 
 
 class _Tracks:
@@ -96,6 +97,7 @@ class _Tracks:
         self._tick_s = deployment.config.tick_ms / 1000.0
         self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}
         self._full = nominal.full_speeds
+        self._still_deg = deployment.config.still_deg
         self._t_s: list[float] = []
         self._commands: dict[str, list[float]] = {name: [] for name in axes}
         self._speeds: dict[str, list[float]] = {name: [] for name in axes}
@@ -136,10 +138,11 @@ class _Tracks:
         }
         crane = CraneTrace(tip, tip, swing)
         recording = Recording(self._t_s, axes, crane)
-        of_crane = crane_metrics(recording, crane)
+        of_crane = crane_metrics(recording, crane, self._still_deg)
         strokes = find_strokes(recording)
         dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
         return {
+            "still_s": of_crane.still_s,
             "residual_deg": of_crane.residual_deg,
             "peak_deg": of_crane.peak_deg,
             "run_on_s": of_crane.run_on_s,

@@ -253,9 +253,10 @@ def tables(summary: Summary) -> Iterator[Table]:
             drawn.add_row(factor.name, f"{100 * factor.explained:.0f} %", trend)
         yield drawn
     if summary.worst:
-        drawn = new_table("worst", "seed", "left, deg", "peak, deg", "run-on, s")
+        drawn = new_table("worst", "seed", "still, s", "left, deg", "peak, deg", "run-on, s")
+        shown = ("still_s", "residual_deg", "peak_deg", "run_on_s")
         for row in summary.worst:
-            figures = [row[name] or 0.0 for name in ("residual_deg", "peak_deg", "run_on_s")]
+            figures = [row[name] or 0.0 for name in shown]
             drawn.add_row(row["operator"], str(row["seed"]), *(f"{one:.2f}" for one in figures))
         yield drawn
 

@@ -287,6 +287,10 @@ class DeploymentConfig(Section):
     assumed: list[str] = Field([], description="keys of numbers that no one has measured or typed")
     """Keys of numbers that are guesses of init until someone measures them (a verb with --write
     takes them out) or has them from a manual (then take them out here)."""
+    still_deg: Annotated[
+        float, number(0.2, 20, "deg", "swing below which the grapple counts as still")
+    ] = 2.0
+    """Swing below which the grapple counts as still, in reports."""
     uncertainty: Uncertainty = Uncertainty()
     """Ranges from which a campaign draws its drives."""
     accept: Accept = Accept()

@@ -8,6 +8,7 @@ from canshaper.config.section import Section, number
 
 # Of each drive, with what it is and its unit.
 MEASURES = {
+    "still_s": "from the last release until the swing stays below still_deg, or the drive ends, s",
     "residual_deg": "largest swing that is left later than 2.5 s after the last release, deg",
     "peak_deg": "largest swing of the drive, deg",
     "run_on_s": "from the last release until the tip stands, s",

@@ -27,6 +27,8 @@ class Figures:
     Attributes:
         axis: the axis.
         profile: the profile; ``OWN`` for the axis' own filter.
+        still_s: from the release until the swing stays below ``still_deg`` of the file.
+        swings_on: whether that is a lower bound: it swings longer than the drive of 10 s.
         run_on_s: from the release to the tip below 5 % of full speed.
         run_on_travel_s: distance run on, seconds of full speed.
         peak_deg: largest swing.
@@ -36,6 +38,8 @@ class Figures:
 
     axis: str
     profile: str
+    still_s: float
+    swings_on: bool
     run_on_s: float
     run_on_travel_s: float
     peak_deg: float
@@ -71,6 +75,8 @@ def figures(deployment: Deployment) -> Iterator[Figures]:
             yield Figures(
                 axis,
                 name or OWN,
+                right.still_s or 0.0,
+                bool(right.swings_on),
                 right.run_on_s or 0.0,
                 right.run_on_travel or 0.0,
                 right.peak_deg or 0.0,
@@ -90,7 +96,7 @@ def _press(deployment: Deployment, axis: str, name: str, length_pct: int) -> Axi
 
     script = Script("press", (Stroke(axis, *_PRESS),), _DRIVE_S)
     recording = drive(deployment, script, parameters=crane, prepare=choose)
-    return axis_metrics(recording, axis)
+    return axis_metrics(recording, axis, deployment.config.still_deg)
 
 
 def swinging_axis(deployment: Deployment, name: str) -> tuple[BoundAxis, Sway]:

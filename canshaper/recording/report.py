@@ -18,6 +18,7 @@ from canshaper.report.table import NOTHING, axis_title
 
 STRAIGHT = "joystick"
 ROWS = (
+    ("still after, s", "still_s", 1.0, 1),
     ("peak sway, deg", "peak_deg", 1.0, 1),
     ("RMS sway, deg", "rms_deg", 1.0, 1),
     ("residual sway, deg", "residual_deg", 1.0, 1),
@@ -59,8 +60,9 @@ class Replayed:
             return
         recording, straight = self.trace.recording(), self.trace.straight()
         for axis in self.deployment.axes:
-            self.measures[axis] = axis_metrics(recording, axis)
-            self.straight[axis] = axis_metrics(straight, axis)
+            still_deg = self.deployment.config.still_deg
+            self.measures[axis] = axis_metrics(recording, axis, still_deg)
+            self.straight[axis] = axis_metrics(straight, axis, still_deg)
 
     def count(self, axis: str, state: str) -> int:
         """How often an axis went into a state."""

@@ -6,12 +6,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from canshaper.report.stroke_metrics import (
+    STILL_DEG,
     crane_metrics,
     dip,
     re_rise,
     rms,
     run_on_s,
     run_on_travel,
+    still_after,
     time_to_95_s,
 )
 from canshaper.report.strokes import (
@@ -44,6 +46,9 @@ class AxisMetrics:
     """Measures of one axis over one drive; ``Stroke`` defines press, plateau, release, rest.
 
     Attributes:
+        still_s: from the release until |sway| in the plane of the axis stays below the bound of a
+            still grapple. Longest over the strokes of this axis alone.
+        swings_on: whether that is a lower bound: the rest ended with more swing.
         peak_deg: largest |sway| in the plane of the axis over the whole drive, degrees.
         rms_deg: square root of the time mean of sway^2 over the whole drive (trapezoids, so a
             lost sample gets no extra weight), degrees.
@@ -68,6 +73,8 @@ class AxisMetrics:
     A measure is None where the drive holds nothing it could be taken from.
     """
 
+    still_s: float | None
+    swings_on: bool | None
     peak_deg: float | None
     rms_deg: float | None
     residual_deg: float | None
@@ -95,14 +102,14 @@ class AxisComparison:
     cross_residual_reduction_pct: float | None
 
 
-def axis_metrics(recording: Recording, axis: str) -> AxisMetrics:
-    """Measure one axis of a drive.
+def axis_metrics(recording: Recording, axis: str, still_deg: float = STILL_DEG) -> AxisMetrics:
+    """Measure one axis of a drive; swing below ``still_deg`` counts as none.
 
     Raises:
         KeyError: the drive has no such axis.
         ValueError: the recording is malformed (see ``find_strokes``).
     """
-    return _measure(recording, find_strokes(recording)[axis], axis)
+    return _measure(recording, find_strokes(recording)[axis], axis, still_deg)
 
 
 def compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
@@ -111,7 +118,7 @@ def compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
     Raises:
         ValueError: the drives have different axes, no samples, or are malformed.
     """
-    return _compare(*aligned(raw, shaped))
+    return _compare(*aligned(raw, shaped), STILL_DEG)
 
 
 def report_dict(
@@ -120,6 +127,7 @@ def report_dict(
     *,
     transport: str,
     missed_deadlines: int | None,
+    still_deg: float = STILL_DEG,
     facts: Mapping[str, object] | None = None,
 ) -> dict[str, Any]:
     """Return the comparison as a dictionary ready for JSON.
@@ -134,6 +142,7 @@ def report_dict(
         shaped: the same operator script with the filters on.
         transport: the bus the drives went over.
         missed_deadlines: ticks of the control loop that came late; None when not counted.
+        still_deg: swing below which a grapple counts as still.
         facts: anything else for the top of the report (JSON types).
 
     Raises:
@@ -144,8 +153,9 @@ def report_dict(
         "transport": transport,
         "missed_deadlines": missed_deadlines,
         "duration_s": round(min(raw.t_s[-1], shaped.t_s[-1]), 2),
-        "crane": _crane_dict(raw, shaped),
-        "axes": {name: _axis_dict(axis) for name, axis in _compare(raw, shaped).items()},
+        "still_deg": still_deg,
+        "crane": _crane_dict(raw, shaped, still_deg),
+        "axes": {n: _axis_dict(axis) for n, axis in _compare(raw, shaped, still_deg).items()},
     }
     repeated = report.keys() & (facts or {}).keys()
     if repeated:
@@ -153,12 +163,12 @@ def report_dict(
     return report | {name: _finite(fact) for name, fact in (facts or {}).items()}
 
 
-def _compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
+def _compare(raw: Recording, shaped: Recording, still_deg: float) -> dict[str, AxisComparison]:
     raw_strokes, shaped_strokes = find_strokes(raw), find_strokes(shaped)
     comparison = {}
     for axis in raw.axes:
-        off = _measure(raw, raw_strokes[axis], axis)
-        on = _measure(shaped, shaped_strokes[axis], axis)
+        off = _measure(raw, raw_strokes[axis], axis, still_deg)
+        on = _measure(shaped, shaped_strokes[axis], axis, still_deg)
         comparison[axis] = AxisComparison(
             raw=off,
             shaped=on,
@@ -172,7 +182,9 @@ def _compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
     return comparison
 
 
-def _measure(recording: Recording, strokes: list[Stroke], axis: str) -> AxisMetrics:
+def _measure(
+    recording: Recording, strokes: list[Stroke], axis: str, still_deg: float
+) -> AxisMetrics:
     t_s, trace = recording.t_s, recording.axes[axis]
     sway = trace.sway_deg
     windows = residual_windows(recording, strokes)
@@ -184,7 +196,11 @@ def _measure(recording: Recording, strokes: list[Stroke], axis: str) -> AxisMetr
     ]
     rests = [stroke for stroke in strokes if len(stroke.rest) > 1]
     alone = [stroke for stroke in rests if stroke.alone]
+    swinging = [] if sway is None else [stroke.rest for stroke in alone]
+    still_s, swings_on = still_after(t_s, sway or [], swinging, still_deg)
     return AxisMetrics(
+        still_s,
+        swings_on,
         peak_deg=None if sway is None else _largest(map(abs, sway)),
         rms_deg=None if sway is None else rms(t_s, sway),
         residual_deg=None
@@ -211,10 +227,13 @@ def _reduction_pct(raw: float | None, shaped: float | None) -> float | None:
     return 100.0 * (1.0 - shaped / raw)
 
 
-def _crane_dict(raw: Recording, shaped: Recording) -> dict[str, Any] | None:
+def _crane_dict(raw: Recording, shaped: Recording, still_deg: float) -> dict[str, Any] | None:
     if raw.crane is None or shaped.crane is None:
         return None
-    off, on = (asdict(crane_metrics(r, c)) for r, c in ((raw, raw.crane), (shaped, shaped.crane)))
+    off, on = (
+        asdict(crane_metrics(recording, crane, still_deg))
+        for recording, crane in ((raw, raw.crane), (shaped, shaped.crane))
+    )
     reductions = {
         f"{name}_reduction_pct": _reduction_pct(off[f"{name}_deg"], on[f"{name}_deg"])
         for name in ("peak", "rms", "residual")
@@ -239,6 +258,8 @@ def _rounded(values: Mapping[str, float | None]) -> dict[str, float | None]:
 
 
 def _round(name: str, value: float | None) -> float | None:
+    if isinstance(value, bool):
+        return value
     if value is None or not math.isfinite(value):
         return None
     digits = next((d for unit, d in _DIGITS.items() if name.endswith(unit)), _DIGITS_FRACTION)

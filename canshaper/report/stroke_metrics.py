@@ -1,15 +1,16 @@
 """Figures of one stroke of the joystick and of the crane: rise, run-on, dip, swing."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from canshaper.report.strokes import Stroke, residual_window, rests
+from canshaper.report.strokes import RESIDUAL_WINDOW_MIN_S, Stroke, residual_window, rests
 from canshaper_sim.recording import AxisTrace, CraneTrace, Point, Recording
 
 REACHED = 0.95  # of the asked speed: the usual 5 % band of a settling time
 LOST_AGAIN = 0.90  # below this the speed was not reached but only passed through
 STOPPED = 0.05  # of full speed: the deadband of a common proportional valve
+STILL_DEG = 2.0  # a grapple of 1.2 m then moves by 4 cm: it can be placed
 
 
 def rms(t_s: list[float], values: list[float]) -> float | None:
@@ -49,14 +50,42 @@ def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | 
 
 def run_on_s(t_s: list[float], speed: Sequence[float], rest: range) -> float:
     """Seconds from the first sample of a rest until what moves at this |speed| stands."""
+    return _until_below_s(t_s, speed, rest, STOPPED)
+
+
+def still_after(
+    t_s: list[float], sway_deg: Sequence[float], rests: Iterable[range], still_deg: float
+) -> tuple[float | None, bool | None]:
+    """Longest time from a release until the swing stays below a bound.
+
+    Args:
+        t_s: times of the samples.
+        sway_deg: swing, degrees; its size counts.
+        rests: samples of each rest, the first one that of the release.
+        still_deg: the bound.
+
+    Returns:
+        The time in s, and whether it is a lower bound: that rest ended with more swing, or too soon
+        behind it to tell. None without a rest.
+    """
+    times = []
+    for rest in rests:
+        time_s = _until_below_s(t_s, sway_deg, rest, still_deg)
+        looked_s = t_s[rest[-1]] - t_s[rest[0]] - time_s
+        times.append((time_s, looked_s < RESIDUAL_WINDOW_MIN_S and time_s > 0.0))
+    return max(times, key=lambda one: (one[1], one[0]), default=(None, None))
+
+
+def _until_below_s(t_s: list[float], values: Sequence[float], rest: range, level: float) -> float:
+    """Seconds from the first sample of a rest until |values| stay below, or to its end."""
     release, last = rest[0], rest[-1]
-    moving = next((k for k in reversed(rest) if abs(speed[k]) >= STOPPED), None)
-    if moving is None:
+    above = next((k for k in reversed(rest) if abs(values[k]) >= level), None)
+    if above is None:
         return 0.0
-    if moving == last:
+    if above == last:
         return t_s[last] - t_s[release]
-    around = {k: abs(speed[k]) for k in (moving, moving + 1)}
-    return _crossing_s(t_s, around, moving, STOPPED) - t_s[release]
+    around = {k: abs(values[k]) for k in (above, above + 1)}
+    return _crossing_s(t_s, around, above, level) - t_s[release]
 
 
 def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
@@ -93,6 +122,9 @@ class CraneMetrics:
     A rest is the time from the release of the last joystick until any is pressed.
 
     Attributes:
+        still_s: from the release until the total swing stays below the bound of a still grapple.
+            The longest.
+        swings_on: whether that is a lower bound: the rest ended with more swing.
         peak_deg: largest total swing of the grapple over the whole drive, degrees.
         rms_deg: square root of the time mean of its square, degrees.
         residual_deg: largest total swing of the rests, later than ``RESIDUAL_DWELL_S`` after the
@@ -104,6 +136,8 @@ class CraneMetrics:
     A measure is None where the drive holds nothing it could be taken from.
     """
 
+    still_s: float | None
+    swings_on: bool | None
     peak_deg: float | None
     rms_deg: float | None
     residual_deg: float | None
@@ -111,8 +145,10 @@ class CraneMetrics:
     run_on_m: float | None
 
 
-def crane_metrics(recording: Recording, crane: CraneTrace) -> CraneMetrics:
-    """Measure a drive whose crane is ``crane``.
+def crane_metrics(
+    recording: Recording, crane: CraneTrace, still_deg: float = STILL_DEG
+) -> CraneMetrics:
+    """Measure a drive whose crane is ``crane``; swing below ``still_deg`` counts as none.
 
     Raises:
         ValueError: the recording is malformed (see ``find_strokes``).
@@ -122,7 +158,10 @@ def crane_metrics(recording: Recording, crane: CraneTrace) -> CraneMetrics:
     windows = [window for rest in still if (window := residual_window(t_s, rest))]
     traces = recording.axes.values()
     speed = [max(abs(trace.speed[k]) for trace in traces) for k in range(len(t_s))]
+    still_s, swings_on = still_after(t_s, sway, still, still_deg)
     return CraneMetrics(
+        still_s,
+        swings_on,
         peak_deg=max(sway, default=None),
         rms_deg=rms(t_s, sway),
         residual_deg=max((sway[k] for window in windows for k in window), default=None),

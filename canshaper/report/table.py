@@ -22,6 +22,8 @@ _SWAY_ROWS = (
     ("RMS sway, deg", "rms"),
     ("residual sway, deg", "residual"),
 )
+STILL_S = "still_s"
+_STILL: PairRow = ("still after, s", STILL_S, 1.0, 1)
 _CRANE_ROWS: Sequence[PairRow] = (
     ("run-on, s", "run_on_s", 1.0, 2),
     ("run-on, m", "run_on_m", 1.0, 2),
@@ -48,7 +50,8 @@ def print_report(report: Mapping[str, Any], console: Console) -> None:
         table = _table(dict(axes[first : first + _AXES_A_TABLE]), _PAIR_ROWS, arrow)
         if table.row_count:
             console.print(table)
-    console.print(Text(f"raw {arrow} shaped: the same script with filters off, then on", "dim"))
+    same = f"raw {arrow} shaped: the same script with filters off, then on; still: below"
+    console.print(Text(f"{same} {report['still_deg']:g} deg", "dim"))
     for name, axis in report["axes"].items():
         line = _cross_line(name, axis, arrow)
         if line is not None:
@@ -71,7 +74,9 @@ def axis_title(name: str) -> str:
 def _table(axes: Mapping[str, Any], pairs: Sequence[PairRow], arrow: str) -> Table:
     """One column an axis, one row a measure: fits a narrow terminal."""
     table = new_table("", *map(axis_title, axes))
-    rows = [
+    title, key, scale, digits = _STILL
+    rows = [(title, [_pair_cell(axis, key, scale, digits, arrow) for axis in axes.values()])]
+    rows += [
         (title, [_sway_cell(axis, measure, arrow) for axis in axes.values()])
         for title, measure in _SWAY_ROWS
     ] + [
@@ -98,6 +103,9 @@ def _pair_cell(axis: Mapping[str, Any], key: str, scale: float, digits: int, arr
     if values == [None, None]:
         return Text(NOTHING, style="dim")
     numbers = [_number(None if v is None else scale * v, digits) for v in values]
+    if key == STILL_S:  # of a drive that ended before only a lower bound is known
+        on = (axis[drive]["swings_on"] for drive in ("raw", "shaped"))
+        numbers = [f">{one}" if more else one for one, more in zip(numbers, on, strict=True)]
     return Text(f" {arrow} ".join(numbers))
 
 

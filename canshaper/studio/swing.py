@@ -1,4 +1,4 @@
-"""How far a grapple swings: the largest sway of the last full swing, and its residual. No clock."""
+"""How far and how long a grapple swings, and what a filter leaves of it. No clock."""
 
 import math
 from collections import deque
@@ -19,24 +19,51 @@ LEAST_SWING_S = 1.0
 
 
 class Swing:
-    """Sway in any direction over one full swing.
+    """Sway in any direction over one full swing, and how long it lasts after a release.
 
     Args:
         models: sway models of the deployment, the longest period counts.
+        still_deg: swing below which the grapple counts as still.
     """
 
-    def __init__(self, models: Iterable[Sway]) -> None:
+    def __init__(self, models: Iterable[Sway], still_deg: float) -> None:
         periods = [2.0 * math.pi / model.mode().omega_rad_s for model in models]
         self._lasts_s = max([LEAST_SWING_S, *periods])
+        self._still_deg = still_deg
         self._sways: deque[tuple[float, float]] = deque()
+        self._over_s = -math.inf
+        self._moved = False
+        self._released_s: float | None = None
 
     def add(self, sway_deg: tuple[float, float], now_s: float) -> None:
         """Take a sway, across and along the boom."""
-        self._sways.append((now_s, math.hypot(*sway_deg)))
+        sway = math.hypot(*sway_deg)
+        self._sways.append((now_s, sway))
+        if sway >= self._still_deg:
+            self._over_s = now_s
+
+    def move(self, now_s: float, *, moved: bool) -> None:
+        """Take whether any joystick is deflected."""
+        if moved:
+            self._released_s = None
+        elif self._moved:
+            self._released_s = now_s
+        self._moved = moved
+
+    def still_s(self, now_s: float) -> tuple[float | None, bool]:
+        """Time from the release until the last sway that was no stillness, and whether it swings.
+
+        There is none before a release, and while a joystick is deflected. A swing is over when
+        there has been no such sway for as long as a full swing.
+        """
+        if self._released_s is None:
+            return None, False
+        return max(self._over_s - self._released_s, 0.0), now_s - self._over_s < self._lasts_s
 
     def invalidate(self) -> None:
         """Begin again."""
         self._sways.clear()
+        self._over_s, self._released_s, self._moved = -math.inf, None, False
 
     def largest_deg(self, now_s: float) -> float | None:
         """The largest one of the last full swing; None before there is any."""

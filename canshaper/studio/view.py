@@ -62,7 +62,7 @@ class CraneView:
         self._daemon_s = self._crane_s = -math.inf
         self._daemon_there = self._crane_there = False
         models = [axis.config.sway for axis in deployment.axes.values()]
-        self._swing = Swing(model for model in models if model)
+        self._swing = Swing((m for m in models if m), deployment.config.still_deg)
         self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
         self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
         self._find_messages()
@@ -174,6 +174,7 @@ class CraneView:
 
     def values(self, now_s: float) -> dict[str, Any]:
         """Everything for the page."""
+        still_s, swings = self._swing.still_s(now_s)
         return {
             "daemon": self.daemon_there(now_s),
             "crane": self.crane_there(now_s),
@@ -183,6 +184,8 @@ class CraneView:
             "measured": self.sway_deg is not None and not self.simulated,
             "simulated": self.simulated,
             "swing": rounded(self._swing.largest_deg(now_s), 2),
+            "still": rounded(still_s, 1),
+            "swings": swings,
             "missed": self.missed,
             "fault": fault_words(self.fault),
             "late_us": self.late_us,
@@ -202,10 +205,13 @@ class CraneView:
 
     # -- messages ------------------------------------------------------------------------------
 
-    def _joystick(self, joystick: BoundJoystick, data: bytes, _now_s: float) -> None:
+    def _joystick(self, joystick: BoundJoystick, data: bytes, now_s: float) -> None:
         _, commands = joystick.decode(data)
         if commands:  # none in other frames of a multiplexed message
             self._joystick_at(joystick.name, commands)
+        axes = self._deployment.axes.items()
+        bands = ((self.axes[n].joystick, a.config.command.neutral_pct / 100.0) for n, a in axes)
+        self._swing.move(now_s, moved=any(abs(at or 0.0) > band for at, band in bands))
 
     def _joystick_at(self, joystick: str, commands: Mapping[str, float | Reason]) -> None:
         """Keep the commands of a joystick by signal; one that is invalid or missing is unknown."""

@@ -230,5 +230,5 @@ def test_files_with_other_axes_are_not_compared(tmp_path: Path) -> None:
 @pytest.mark.parametrize("more", [["--ranges", PLAIN], ["--seed", "1", "--crane", "left"]])
 def test_options_that_say_nothing_of_a_drive_are_refused(more: list[str]) -> None:
     refused = CliRunner().invoke(app, ["demo", PLAIN, *more])
-    expected = "--seed: expected with --ranges, and without --crane: it is the first one\n"
+    expected = "--seed: expected with --ranges, and without --crane or --rest\n"
     assert (refused.exit_code, refused.output) == (2, expected)

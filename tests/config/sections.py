@@ -5,8 +5,8 @@ from collections.abc import Callable
 Problems = Callable[[str | bytes], list[str]]
 TOP = (
     "version, tick_ms, tick, buses, dbc, joysticks, switches, axes, motion, hydraulics, gateway,"
-    " emergency_stop, load_state, profile, status, identity, control, assumed, uncertainty,"
-    " accept"
+    " emergency_stop, load_state, profile, status, identity, control, assumed, still_deg,"
+    " uncertainty, accept"
 )
 
 

@@ -49,7 +49,7 @@ def test_compare_known_reductions_over_different_time_bases(hand_made: HandMade)
     assert axis.cross_residual_reduction_pct is None
     lift = comparison["lift"]
     assert lift.peak_reduction_pct is lift.rms_reduction_pct is lift.residual_reduction_pct is None
-    assert lift.raw == AxisMetrics(*[None] * 9)
+    assert lift.raw == AxisMetrics(*[None] * 11)
 
 
 def test_a_swing_of_nothing_has_no_reduction_and_a_worse_one_is_negative(

@@ -88,7 +88,7 @@ def test_a_drive_that_is_never_let_go_has_no_residual_and_no_run_on(hand_made: H
     here = [(3.0, 0.0)] * len(recording.t_s)
     crane = CraneTrace(here, here, [5.0] * len(here))
     measures = crane_metrics(recording, crane)
-    assert measures == CraneMetrics(5.0, pytest.approx(5.0), None, None, None)
+    assert measures == CraneMetrics(None, None, 5.0, pytest.approx(5.0), None, None, None)
 
 
 def test_report_has_the_crane_where_the_drives_know_the_tip(hand_made: HandMade) -> None:
@@ -111,3 +111,29 @@ def test_aligned_drives_keep_the_crane_with_its_time(hand_made: HandMade) -> Non
     assert early.crane is not None
     assert early.crane == late.crane
     assert len(early.crane.tip_m) == len(early.crane.sway_deg) == len(early.t_s)
+
+
+@pytest.mark.parametrize(
+    ("still_deg", "still_s", "swings_on"),
+    [(2.0, 1.5, False), (4.0, 0.5, False), (0.5, 8.0, True), (9.0, 0.0, False)],
+)
+def test_still_after_is_the_last_time_at_which_it_swings_more(
+    hand_made: HandMade, still_deg: float, still_s: float, swings_on: bool
+) -> None:
+    """Swing of 5 degrees that falls by 2 in each second, to 1 that stays; it crosses zero."""
+
+    def sway(t: float) -> float:
+        return max(5.0 - 2.0 * (t - NEAR_FAR[1]), 1.0)
+
+    recording = both(hand_made, sway)
+    assert recording.crane is not None
+    metrics = crane_metrics(recording, recording.crane, still_deg)
+    assert metrics.still_s == pytest.approx(still_s, abs=0.021)
+    assert metrics.swings_on is swings_on
+
+
+def test_a_swing_that_just_passes_zero_at_the_end_goes_on(hand_made: HandMade) -> None:
+    recording = both(hand_made, lambda t: 0.0 if t > END_S - 0.5 else 8.0)
+    metrics = measured(recording)
+    assert metrics.still_s == pytest.approx(END_S - 0.5 - NEAR_FAR[1], abs=0.05)
+    assert metrics.swings_on is True

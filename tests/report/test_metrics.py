@@ -230,3 +230,15 @@ def test_a_malformed_recording_is_named(
     recording = Recording(t_s, {"slew": AxisTrace(joystick, [0.0] * 3, [0.0] * 3, None)})
     with pytest.raises(ValueError, match=message):
         axis_metrics(recording, "slew")
+
+
+def test_still_after_is_that_of_the_plane_of_the_axis(hand_made: HandMade) -> None:
+    recording = one_axis(
+        hand_made, lambda t: 6.0 if t < 5.0 else 1.0, lift=(zero, zero, zero, None)
+    )
+    metrics = axis_metrics(recording, "near_far")
+    assert metrics.still_s == pytest.approx(1.0, abs=0.021)
+    assert metrics.swings_on is False
+    assert axis_metrics(recording, "near_far", still_deg=0.5).swings_on is True
+    lift = axis_metrics(recording, "lift")
+    assert (lift.still_s, lift.swings_on) == (None, None)

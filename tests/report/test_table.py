@@ -114,3 +114,13 @@ def test_a_terminal_without_unicode(report: dict[str, Any]) -> None:
 def test_nearly_all_is_not_all(report: dict[str, Any], reduction: float, expected: str) -> None:
     report["axes"]["slew"]["residual_reduction_pct"] = reduction
     assert expected in printed(report)
+
+
+def test_still_after_comes_first_and_a_lower_bound_is_marked(report: dict[str, Any]) -> None:
+    axis = report["axes"]["near_far"]
+    axis["raw"] |= {"still_s": 4.93, "swings_on": True}
+    axis["shaped"] |= {"still_s": 1.71, "swings_on": False}
+    text = printed(report)
+    assert ">4.9 → 1.7" in text
+    assert text.index("still after") < text.index("peak sway")
+    assert "still: below 2 deg" in text

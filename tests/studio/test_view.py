@@ -135,6 +135,26 @@ def test_swing_is_the_largest_sway_of_the_last_period(watched: Watched) -> None:
     assert shown["sway"] == pytest.approx((1.0, 0.0), abs=0.01)
 
 
+def joystick(watched: Watched, slew: float) -> Frame:
+    bound = watched.deployment.joysticks["left"]
+    values = dict.fromkeys(bound.layout.decode(bytes(bound.message.length)), 0)
+    data = bound.message.encode({**values, "Slew": 100.0 * slew}, strict=False)
+    return Frame(*bound.key, data)
+
+
+def test_still_after_is_the_time_from_the_release_to_the_last_swing(watched: Watched) -> None:
+    assert watched.receive([joystick(watched, 0.5), *watched.sway(6.0)], 1.0)["still"] is None
+    shown = watched.receive([joystick(watched, 0.0), *watched.sway(6.0)], 2.0)
+    assert (shown["still"], shown["swings"]) == (0.0, True)
+    shown = watched.receive(watched.sway(2.5), 3.5)
+    assert (shown["still"], shown["swings"]) == (1.5, True)
+    shown = watched.receive(watched.sway(1.5), 6.0)  # longer than a period of 2.36 s
+    assert (shown["still"], shown["swings"]) == (1.5, False)
+    assert watched.receive([joystick(watched, -0.5)], 7.0)["still"] is None
+    watched.receive([joystick(watched, 0.0)], 8.0)
+    assert watched.receive(watched.sway(0.1), 9.0)["still"] == 0.0
+
+
 def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -> None:
     """Its lag is counted positive; across the boom the grapple then hangs to the other side."""
     shown = watched.receive(

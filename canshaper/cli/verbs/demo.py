@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,14 @@ def demo(
     file: str = typer.Argument(DEFAULT, help="Deployment file; by default a shipped one."),
     sensor: bool = SENSOR,
     script: str = typer.Option("demo", "--script", help="What the operator does."),
+    rest: float | None = typer.Option(
+        None,
+        "--rest",
+        min=1.0,
+        max=120.0,
+        metavar="S",
+        help="Seconds of rest at the end, to see when the grapple hangs still without filters too.",
+    ),
     out: Path = typer.Option(Path("out/demo"), "--out", help="Directory for picture and report."),
     lockstep: bool = typer.Option(
         False,
@@ -82,6 +91,8 @@ def demo(
 
       canshaper demo --lockstep --script loading
 
+      canshaper demo --lockstep --script pulse-slew --rest 20
+
       canshaper demo forwarder.yaml --lockstep  # the paper's filter
 
       canshaper demo --set grapple.l2_m=1.5
@@ -102,8 +113,8 @@ def demo(
     from canshaper_sim.parameters import changed_parameters
 
     nominal = changed_parameters(changes or [])  # wrong ones are named before anything begins
-    if (ranges is not None and seed is None) or (crane is not None and seed is not None):
-        raise UsageError("--seed: expected with --ranges, and without --crane: it is the first one")
+    if (ranges is not None and seed is None) or (seed is not None and (crane or rest) is not None):
+        raise UsageError("--seed: expected with --ranges, and without --crane or --rest")
     deployment = loader(sensed(file, DEFAULT, sensor))()
     results = Results("Drive without and with filters", deployment, report, picture)
     lockstep = lockstep or seed is not None
@@ -115,6 +126,9 @@ def demo(
     options: DriveOptions = {"parameters": nominal, "crane": crane}
     if seed is None:
         played = script_named(script, [axis for axis in ALL_AXES if axis in axes])
+        if rest is not None:
+            released_s = max((stroke.end_s for stroke in played.strokes), default=0.0)
+            played = replace(played, duration_s=released_s + rest)
     else:
         drawn = _drawn(deployment, seed, ranges, nominal)
         played, options = drawn.script, drawn.options
@@ -136,6 +150,7 @@ def demo(
         shaped,
         transport=way.description if way else LOCKSTEP,
         missed_deadlines=missed,
+        still_deg=deployment.config.still_deg,
         facts={"script": played.name, "deployment": str(deployment.path.name)},
     )
     out.mkdir(parents=True, exist_ok=True)

@@ -19,9 +19,10 @@ def profiles(
 ) -> None:
     """Measure what each profile of a deployment does with a full press of 3 s.
 
-    On the simulated crane, with the file's limits: how long and far the axis runs on after release,
-    the largest swing, and what is left of it with the right pendulum length and with one that is
-    15 % longer or shorter. "normal" is the axis' own filter.
+    On the simulated crane, with the file's limits: how long the grapple swings after release (until
+    still_deg of the file), how long and far the axis runs on, the
+    largest swing, and what is left of it with the right pendulum length and with one that is 15 %
+    longer or shorter. "normal" is the axis' own filter.
 
     Examples:
 
@@ -40,11 +41,12 @@ def profiles(
     if as_json:
         echo(json.dumps([asdict(one) for one in results], indent=2))
         return
-    heads = ("run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
+    heads = ("still, s", "run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
     table = new_table("axis, profile", *heads)
     for one in results:
         table.add_row(
             f"{one.axis}, {one.profile}",
+            f"{'>' * one.swings_on}{one.still_s:.1f}",
             f"{one.run_on_s:.2f}",
             f"{one.run_on_travel_s:.2f}",
             f"{one.peak_deg:.1f}",

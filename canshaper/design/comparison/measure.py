@@ -14,7 +14,7 @@ from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import axis_metrics
-from canshaper.report.stroke_metrics import integral
+from canshaper.report.stroke_metrics import crane_metrics, integral
 from canshaper.report.strokes import RESIDUAL_DWELL_S
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Grapple, Sway
@@ -35,6 +35,8 @@ class Outcome:
         travel: of a tap: way of the tip along the axis, in s of full speed.
         movements: of a tap: how often the tip began to move.
         rise_s: of a pulse: time to 95 % of the commanded speed.
+        still_s: of a pulse: from release until the tilt stays below ``still_deg`` of the file.
+        swings_on: of a pulse: whether that is a lower bound, since the drive ended before.
         stop_s: of a pulse: run-on after release until the tip stays below 5 % of full speed.
         run_on_m: of a pulse: travel after release; of slew on the largest radius.
         dip: of a pulse: largest fall of the command while the joystick is held.
@@ -51,6 +53,8 @@ class Outcome:
     path: float
     travel: float | None = None
     movements: int | None = None
+    still_s: float | None = None
+    swings_on: bool | None = None
     rise_s: float | None = None
     stop_s: float | None = None
     run_on_m: float | None = None
@@ -106,6 +110,8 @@ def _with_metrics(
 ) -> Outcome:
     """Add to the outcome what the operator feels of a pulse."""
     of_axis = axis_metrics(recording, axis)
+    assert recording.crane is not None  # of a tip with both planes
+    of_crane = crane_metrics(recording, recording.crane, deployment.config.still_deg)
     crane = CraneParameters()
     full_m_s = crane.near_far_full_speed_m_s
     if axis == "slew":
@@ -114,6 +120,8 @@ def _with_metrics(
         full_m_s = crane.slew_full_speed_rad_s * radius_m
     return replace(
         outcome,
+        still_s=of_crane.still_s,
+        swings_on=of_crane.swings_on,
         rise_s=of_axis.time_to_95_s,
         stop_s=of_axis.run_on_s,
         run_on_m=(of_axis.run_on_travel or 0.0) * full_m_s,

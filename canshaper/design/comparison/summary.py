@@ -28,6 +28,8 @@ class Row:
         mean_deg: by kind of work, its mean.
         worst_15_deg, worst_30_deg: largest residual at length errors up to 15 and 30 %.
         worst_case: manoeuvre and length error of the latter.
+        still_s: of both pulses, longest time from release until the grapple is still.
+        swings_on: whether that is a lower bound.
         stop_s, rise_s, run_on_m: of the pulse of near-far at the right length.
         slew_run_on_m: travel after release of the pulse of slew, on its largest radius.
         dip, re_rise: of both pulses.
@@ -44,6 +46,8 @@ class Row:
     worst_15_deg: float
     worst_30_deg: float
     worst_case: str
+    still_s: float
+    swings_on: bool
     stop_s: float
     rise_s: float
     run_on_m: float
@@ -83,6 +87,8 @@ def _row(candidate: Candidate, outcomes: list[Outcome], raw: list[Outcome]) -> R
         worst_case=f"{case.manoeuvre} {case.length_pct:+d} %"
         if case.length_pct
         else case.manoeuvre,
+        still_s=max(_number(o.still_s) for o in pulses.values()),
+        swings_on=any(o.swings_on for o in pulses.values()),
         stop_s=_number(pulse.stop_s),
         rise_s=_number(pulse.rise_s),
         run_on_m=_number(pulse.run_on_m),

@@ -49,10 +49,10 @@ export class Panel {
     }
     const swings = document.getElementById("swings");
     this.swings = Object.fromEntries(hello.cranes.map((crane) => [crane,
-      { number: make("b", { id: `swing-${crane}` }, "–"), from: make("span", { className: "quiet" }) }]));
+      { number: make("b", { id: `swing-${crane}` }, "–"), from: make("span", { className: "quiet" }), still: make("span", { id: `still-${crane}` }) }]));
     // In the order in which the cranes stand in the picture.
-    swings.replaceChildren(...Object.entries(this.swings).map(([crane, { number, from }]) => {
-      const box = make("div", { className: "swing" }, make("b", {}, nameOf("crane", crane)), number, from);
+    swings.replaceChildren(...Object.entries(this.swings).map(([crane, { number, from, still }]) => {
+      const box = make("div", { className: "swing" }, make("b", {}, nameOf("crane", crane)), number, from, still);
       box.style.setProperty("--color", `var(${hello.colors[crane]})`);
       return box;
     }));
@@ -111,11 +111,13 @@ export class Panel {
     this.shownAt = now;
     this.mine = mine;
     for (const [name, crane] of Object.entries(shown.cranes)) {
-      const { number, from } = this.swings[name];
+      const { number, from, still } = this.swings[name];
       const known = crane.swing != null && crane.sway;
       set(number, known ? `±${crane.swing.toFixed(1)}°` : "–");
       if (!known) set(from, text("swing.unknown"));
       else set(from, text(crane.measured ? "swing.measured" : crane.simulated ? "swing.simulated" : "swing.modelled"));
+      const s = crane.still?.toFixed(1);
+      set(still, known && s ? text(crane.swings ? "still.swings" : "still.after", { s }) : "");
       from.parentElement.classList.toggle("modelled", Boolean(known && !crane.measured));
       if (this.hello.machine) this.showSources(crane.sources);
       for (const [axis, values] of Object.entries(crane.axes)) {
