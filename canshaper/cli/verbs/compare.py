@@ -132,23 +132,14 @@ def _felt(table: "list[Row]") -> "Table":
     """Return a table of what the operator feels of each filter."""
     from canshaper.report.console import new_table
 
-    heads = [
-        "still\ns",
-        "rise\ns",
-        "stop\ns",
-        "stop\nm",
-        "slew\nm",
-        "dip\n%",
-        "re-\nrise",
-        "peak\ndeg",
-    ]
-    drawn = new_table("felt", *heads, "tap\n%", "mo-\nves", "way\n%")
+    heads = ["still\ns", "rise\ns", "stop\ns", "stop\nm", "slew\nm", "dip,re-\nrise %"]
+    drawn = new_table("felt", *heads, "peak\ndeg", "tap %,\nmoves", "way\n%")
     for row in table:
         seconds = [f"{'>' * row.swings_on}{row.still_s:.1f}"]
         seconds += [f"{value:.2f}" for value in (row.rise_s, row.stop_s)]
         metres = [f"{value:.2f}" for value in (row.run_on_m, row.slew_run_on_m)]
-        feel = [f"{100 * row.dip:.0f}", f"{100 * row.re_rise:.0f}", f"{row.peak_deg:.1f}"]
-        ways = [f"{100 * row.tap_part:.0f}", str(row.tap_movements), f"{100 * row.path_part:.0f}"]
+        feel = [f"{100 * row.dip:.0f}/{100 * row.re_rise:.0f}", f"{row.peak_deg:.1f}"]
+        ways = [f"{100 * row.tap_part:.0f}/{row.tap_movements}", f"{100 * row.path_part:.0f}"]
         cells = (*seconds, *metres, *feel, *ways)
         drawn.add_row(row.name, *cells, style="bold" if row.ours else None)
     return drawn
