@@ -81,7 +81,8 @@ class AxisState(Pending):
         asked_now, asked: something is asked of it or its partner: in this period; in this or the
             last one.
         due: it has its turn in this tick, and has sent nothing yet.
-        ticks: periods since its last frame; ``sent_at`` number of the deadline of that.
+        ticks: periods since its last frame; ``sent_at`` number of the deadline of that;
+            ``falling`` those of them in which it was beyond what may leave.
         flips: how often anti-sway was switched in its joystick, as this axis knows it.
         last: velocity of that frame; ``top`` what it may have been before it was rounded.
         way_back: velocity of a fall, at its rate, from what was asked last: it is no run-on, and
@@ -108,7 +109,7 @@ class AxisState(Pending):
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
         self.asked_now = self.asked = self.due = False
-        self.ticks = self.flips = self.sent_at = 0
+        self.ticks = self.falling = self.flips = self.sent_at = 0
         self.last, self.top, self.way_back = 0.0, axis.step, axis.step
         self.zero_at = NEVER
         self.way, self.alone = 0.0, 0
@@ -208,9 +209,10 @@ class AxisState(Pending):
         """A frame has left."""
         of, size = self.of, abs(velocity)
         passed, self.ticks, self.sent_at = self.ticks, 0, number
+        falling, self.falling = max(self.falling, passed > 0) if of.forwarded else passed, 0
         asked = self.forth if velocity > 0.0 else self.back
         reach = self.most if velocity > 0.0 else -self.least
-        fallen = self.top - of.fall * passed if velocity * self.last >= 0.0 else 0.0
+        fallen = self.top - of.fall * falling if velocity * self.last >= 0.0 else 0.0
         if not velocity:
             if self.last:
                 self.zero_at = made

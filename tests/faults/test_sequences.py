@@ -35,6 +35,11 @@ def test_no_sequence_makes_a_wrong_move(name: str) -> None:
         Sequence(name, seed).run()
 
 
+def test_a_gateway_whose_joystick_misses_a_cycle_falls_from_the_end_of_its_tail_on() -> None:
+    """The frame that came next was refused: its fall was counted from the last frame on."""
+    Sequence("gateway-forwarder", 2000807).run()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_they_move_and_work_again_behind_the_faults(name: str) -> None:
