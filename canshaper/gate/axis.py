@@ -81,10 +81,10 @@ class AxisState(Pending):
         asked_now, asked: something is asked of it or its partner: in this period; in this or the
             last one.
         due: it has its turn in this tick, and has sent nothing yet.
-        ticks: periods since its last frame; ``sent_at`` number of the deadline of that;
-            ``falling`` those of them in which it was beyond what may leave.
+        ticks: periods since its last frame; ``sent_at`` number of the deadline of that.
         flips: how often anti-sway was switched in its joystick, as this axis knows it.
-        last: velocity of that frame; ``top`` what it may have been before it was rounded.
+        last: velocity of that frame; ``top`` what it may have been before it was rounded, or may
+            be by now where no frame was passed on.
         way_back: velocity of a fall, at its rate, from what was asked last: it is no run-on, and
             what is no faster counts no distance.
         zero_at: ticks that were made before it came to rest, or lost the right to move.
@@ -109,7 +109,7 @@ class AxisState(Pending):
         self.forth, self.back = Asked(), Asked()
         self.least = self.most = 0.0
         self.asked_now = self.asked = self.due = False
-        self.ticks = self.falling = self.flips = self.sent_at = 0
+        self.ticks = self.flips = self.sent_at = 0
         self.last, self.top, self.way_back = 0.0, axis.step, axis.step
         self.zero_at = NEVER
         self.way, self.alone = 0.0, 0
@@ -205,11 +205,16 @@ class AxisState(Pending):
             return 1.0
         return 0.0 if partner.last else self.of.added
 
+    def skip(self) -> None:
+        """No frame was passed on in the period before: what was allowed in it may fall from now."""
+        reach = self.most if self.last > 0.0 else -self.least
+        self.top = max(self.top - self.of.fall, min(self.top, reach))
+
     def left(self, velocity: float, made: int, number: int) -> None:
         """A frame has left."""
         of, size = self.of, abs(velocity)
         passed, self.ticks, self.sent_at = self.ticks, 0, number
-        falling, self.falling = max(self.falling, passed > 0) if of.forwarded else passed, 0
+        falling = min(passed, 1) if of.forwarded else passed
         asked = self.forth if velocity > 0.0 else self.back
         reach = self.most if velocity > 0.0 else -self.least
         fallen = self.top - of.fall * falling if velocity * self.last >= 0.0 else 0.0

@@ -193,8 +193,9 @@ class Gate:
                 axis.asked_now, axis.asked = asked_now, asked_now or axis.asked_now
                 if not axis.asked or axis.forth.most or axis.back.most:
                     axis.way, axis.alone = 0.0, 0
-                axis.least, axis.most = least, most = rules.bounds(axis)
-                axis.falling += axis.top > (most if axis.last > 0.0 else -least)
+                if axis.ticks > 1 and axis.of.forwarded:
+                    axis.skip()
+                axis.least, axis.most = rules.bounds(axis)
 
     # --- what goes out ---------------------------------------------------------------------------
 

@@ -130,8 +130,7 @@ def distance(axis: AxisState, velocity: float) -> str:
 def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
     """Why a velocity that is not 0 may not leave: rules 3 to 7."""
     ticks = axis.ticks if axis.of.forwarded else 1
-    falling = max(axis.falling, ticks > 0) if axis.of.forwarded else 1
-    fallen = axis.top - axis.of.fall * falling if velocity * axis.last >= 0.0 else 0.0
+    fallen = axis.top - axis.of.fall * min(ticks, 1) if velocity * axis.last >= 0.0 else 0.0
     why = (
         neutral_first(axis)
         or direction_and_size(axis, velocity, fallen)

@@ -68,6 +68,7 @@ class Rules:
         self._oldest_ns = (shortest_ns if machine.gateway else machine.tick_ns) + SLACK_NS
         self._pending_ns: int | None = None
         self._ticked_ns = -1
+        self._late_ns = 0
         self._ticks: dict[Key, int] = dict.fromkeys(self._by_valve, 0)
         self._last: dict[Key, tuple[Frame, int]] = {}
         self.frames = self.moves = 0
@@ -108,8 +109,11 @@ class Rules:
 
     def failed(self, frame: Frame, now_ns: int) -> None:
         """A frame did not get onto its bus."""
+        _, sent_ns = self._last.get(frame[:3], (frame, now_ns))
         for one in self._by_valve.get(frame[:3], ()):
             one.lost += 1
+            if now_ns - sent_ns > one.axis.valve_timeout_ns:  # the valve has closed by itself
+                one.velocity = 0.0
             if one.velocity or one.axis.sent(frame.data)[0]:  # at rest nothing is lost
                 one.causes.add("the last frame was not sent")
 
@@ -120,6 +124,8 @@ class Rules:
             return
         if now_ns != self._ticked_ns:  # what waited behind a standstill is read in many rounds
             gap_ns = now_ns - self._ticked_ns if self._ticked_ns >= 0 else 0
+            # Silence counts when the loop has looked; in a standstill it did not.
+            self._late_ns = max(gap_ns - self.machine.tick_ns, 0)
             self._ticked_ns = now_ns
             for key in self._ticks:
                 self._ticks[key] += 1
@@ -129,9 +135,10 @@ class Rules:
                 one.after(gap_ns, now_ns, longest_ns=self._longest_gap_ns)
         for name, one in self.axes.items():
             if words := self._words.get(name):
-                one.causes |= words.causes(now_ns) | self._nodes[words.words.node].causes(now_ns)
+                node_causes = self._nodes[words.words.node].causes(now_ns - self._late_ns)
+                one.causes |= words.causes(now_ns) | node_causes
             if drive := self.machine.drives.get(name):
-                one.causes |= self._nodes[drive].causes(now_ns)
+                one.causes |= self._nodes[drive].causes(now_ns - self._late_ns)
             node = self.machine.joystick_nodes.get(one.axis.joystick.name)
             works = node is None or not self._nodes[node].seen(now_ns)
             if node and self._nodes[node].may_be_lost(now_ns):
