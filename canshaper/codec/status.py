@@ -94,6 +94,22 @@ class ReportedAxis(Protocol):
         """Length of the pendulum, as the sway sensor shows it; 0 where it is not known."""
 
 
+class ReportedAim(Protocol):
+    """Aim point of a crane."""
+
+    @property
+    def slew_deg(self) -> float:
+        """Angle that it still turns."""
+
+    @property
+    def radius_m(self) -> float:
+        """Way of its tip out or in."""
+
+    @property
+    def known(self) -> bool:
+        """Whether both are known."""
+
+
 def _command_pct(one: ReportedAxis) -> float:
     return 100.0 * one.axis.command
 
@@ -133,11 +149,17 @@ IDENTITY: list[StatusField[int]] = [
     StatusField("Digest", int, int, required=True, largest=(1 << DIGEST_BITS) - 1)
 ]
 """Digest of what runs."""
+AIM: list[StatusField[ReportedAim]] = [
+    StatusField("AimSlew", attrgetter("slew_deg"), required=True),
+    StatusField("AimRadius", attrgetter("radius_m"), required=True),
+    StatusField("AimKnown", attrgetter("known"), bool, True, 1),
+]
+"""Way that the tip still goes if the joysticks are let go now."""
 
 
 def _field(name: str) -> StatusField[Any]:
     """The field of that name, of the tables of this process."""
-    fields: list[StatusField[Any]] = [*AXIS_STATUS, *SERVICE_STATUS, *IDENTITY]
+    fields: list[StatusField[Any]] = [*AXIS_STATUS, *SERVICE_STATUS, *IDENTITY, *AIM]
     return next(field for field in fields if field.name == name)
 
 

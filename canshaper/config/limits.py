@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.origin import Origin
+from canshaper.config.protection import Status
 from canshaper.config.section import Section, number
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.sway import SwayMode
@@ -184,6 +185,8 @@ class Motion(Section):
     max_s: Annotated[
         float, number(0.5, 60, "s", "longest motion of an axis that its operator left alone")
     ] = 6.0
+    aim: Status | None = None
+    """Message with the way that the tip still goes if the joysticks are let go now."""
     waits: bool = Field(False, description="as if it were not there; commission takes this out")
     """As if it were not there, on the first day; the step motion of commission takes this out."""
 
@@ -191,8 +194,8 @@ class Motion(Section):
     def _one_radius(self) -> Self:
         if self.radius and self.radius_m:
             raise ValueError("expected one of radius and radius_m, got both")
-        if self.near_far is None and (self.radius or self.radius_m):
-            raise ValueError("expected near_far with a radius, got none")
+        if self.near_far is None and (self.radius or self.radius_m or self.aim):
+            raise ValueError("expected near_far with a radius or an aim, got none")
         return self
 
 

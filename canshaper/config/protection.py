@@ -154,3 +154,7 @@ class Protected(Section):
     multiplexor: Annotated[int, number(0, 2**32, "", "value of the multiplexor")] | None = None
     """Value of the multiplexor with which the message is meant; what we send carries it. Of frames
     with another value only checksum and counter are checked, where they have them too."""
+
+
+class Status(Protected):
+    """A status message for displays and tools."""

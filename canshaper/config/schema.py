@@ -21,7 +21,7 @@ from canshaper.config.inputs import (
     SwitchSection,
 )
 from canshaper.config.limits import Hydraulics, Limits, Motion, Slewing, Sway
-from canshaper.config.protection import Protected
+from canshaper.config.protection import Protected, Status
 from canshaper.config.section import VERSION, Section, number
 from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.shaping.registry import KINDS
@@ -199,10 +199,6 @@ class FeedbackSection(NamedCodes, InputSection):
     settle_ms: Annotated[
         int, number(20, 2000, "ms", "how long the valve, and its message, may take to follow")
     ] = 500
-
-
-class Status(Protected):
-    """A status message for displays and tools."""
 
 
 class AxisSection(Section):

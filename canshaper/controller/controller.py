@@ -6,7 +6,7 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.controller.ends import AxisEnds
+from canshaper.controller.ends import AimPoint, AxisEnds
 from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.hydraulics import SharedFlow
 from canshaper.controller.motion import motion_runners
@@ -232,8 +232,11 @@ class Controller:
                 if (transition := runner.hold(last, now)) is not None:
                     self._changed(name, runner, transition)
                     changed.append(runner)
+        for runner, run_on in self._followed:  # it held its last demand until now
+            if ticks := now // runner.period_ticks - last // runner.period_ticks:
+                run_on.add(runner.axis.command, ticks)
         for end in self._ends:
-            if (change := end.step(now_ns, last, now)) is not None:
+            if (change := end.step(now_ns)) is not None:
                 self.events.append(change)
         for motion in self.motions:
             if (event := motion.step(now_ns, last, now)) is not None:
@@ -254,6 +257,11 @@ class Controller:
             self._sensors[name] = SensorReport(name, self.axes[name])
         self._ends = [AxisEnds(self.axes[name], one) for name, one in inputs.positions.items()]
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
+        for motion in self.deployment.motions.values():
+            if motion.aim:
+                self.status.aims.append(AimPoint(motion, self.axes))
+        axes = self.axes.values()
+        self._followed = [(runner, runner.run_on) for runner in axes if runner.run_on]
         oil = self.deployment.config.hydraulics
         self._flow = None
         if oil:

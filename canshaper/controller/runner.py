@@ -17,6 +17,7 @@ from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import ShapedAxis
+from canshaper.shaping.end_stops import RunOn
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
@@ -55,6 +56,7 @@ class AxisControl:
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.
+        run_on: what its filter lets run on, where that is followed.
         chooser: which sway data and filter are in force, where there is a choice.
     """
 
@@ -93,6 +95,7 @@ class AxisControl:
         self.add_velocity(0.0, damps=False)
         self.room = -math.inf, math.inf
         self.displaced = 0.0
+        self.run_on: RunOn | None = None
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
@@ -146,6 +149,13 @@ class AxisControl:
         config, period_s = self.bound.config, self.period_s
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         return _shaper(config, period_s, sway), sway
+
+    def follow_run_on(self) -> RunOn:
+        """Return what its filter lets run on; it is followed from now on."""
+        if self.run_on is None:
+            tail_s = self.bound.config.limits.tail_s
+            self.run_on = RunOn(*self.new_filter(), self.period_s, tail_s)
+        return self.run_on
 
     def add_interlock(self, interlock: Interlock) -> None:
         """Add an interlock: it has to agree before the axis may move."""

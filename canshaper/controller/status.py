@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
 from canshaper.codec.status import StatusCodec
+from canshaper.controller.ends import AimPoint
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.controller.valve_messages import Counters
@@ -25,6 +26,9 @@ class StatusMessages:
         deployment: the machine.
         axes: its axes.
         senders: what sends each of its messages.
+
+    Attributes:
+        aims: aim points of its cranes that are sent.
     """
 
     def __init__(
@@ -34,11 +38,12 @@ class StatusMessages:
         senders: Mapping[MessageKey, Sender],
     ) -> None:
         self._deployment, self._axes, self._senders = deployment, list(axes), senders
+        self.aims: list[AimPoint] = []
 
     def frames(
         self, changed: Collection[AxisControl], counters: Counters, last: int, now: int
     ) -> Iterator[Frame]:
-        """Yield the status of the axes that have changed or are due, and of the service.
+        """Yield the status of the axes that have changed or are due, of cranes and service.
 
         Args:
             changed: axes whose state has just changed.
@@ -51,6 +56,10 @@ class StatusMessages:
                 frame := runner.status_frame()
             ):
                 yield frame
+        for aim in self.aims:
+            if _due(last, now, aim.ticks):
+                aim.update()
+                yield self._senders[aim.codec.message.key].frame(aim.codec.values(aim))
         status = self._deployment.status
         if status and _due(last, now, self._deployment.status_ticks):
             yield self._senders[status.message.key].frame(status.values(counters.status()))

@@ -279,7 +279,8 @@ def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozen
     """Messages besides those of valves: status, and what our nodes say about themselves."""
     anything, config = frozenset[bytes](), deployment.config
     of_axes = (one.status for one in config.axes.values())
-    for status in filter(None, (config.status, config.identity, *of_axes)):
+    aims = (one.aim for one in config.motion.values())
+    for status in filter(None, (config.status, config.identity, *of_axes, *aims)):
         message, node = deployment.messages.find(status.message)[1], config.buses[status.bus].j1939
         source = node.address if message.protocol == "j1939" and node else None
         key = status.bus, _from(message.frame_id, source), message.is_extended_frame

@@ -134,9 +134,11 @@ class Deployment:
         axes = {
             name: replace(axis, status=None, status_ticks=0) for name, axis in self.axes.items()
         }
-        return replace(self, axes=axes, status=None, identity_status=None)
+        motions = {name: replace(one, aim=None) for name, one in self.motions.items()}
+        return replace(self, axes=axes, motions=motions, status=None, identity_status=None)
 
     def _statuses(self) -> list[StatusCodec[Any]]:
         """Every status message that is sent."""
         of_axes = [axis.status for axis in self.axes.values()]
-        return [s for s in (self.status, self.identity_status, *of_axes) if s]
+        aims = [motion.aim for motion in self.motions.values()]
+        return [s for s in (self.status, self.identity_status, *of_axes, *aims) if s]

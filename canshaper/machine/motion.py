@@ -2,18 +2,28 @@
 
 from dataclasses import dataclass
 
+from canshaper.codec.status import AIM, ReportedAim, StatusCodec
 from canshaper.config.limits import Motion, Radius
 from canshaper.config.source import Place
+from canshaper.machine.identity import bind_status
 from canshaper.machine.inputs import BoundValue, bind_radius
 from canshaper.machine.lookup import Lookup
 
 
 @dataclass(frozen=True)
 class BoundMotion:
-    """A motion with the message of its radius, where that is measured."""
+    """A motion with its messages.
+
+    Attributes:
+        config: the motion.
+        radius: of its radius, where that is measured.
+        aim: of its aim point, where that is sent, every so many ticks.
+    """
 
     config: Motion
     radius: BoundValue[Radius] | None = None
+    aim: StatusCodec[ReportedAim] | None = None
+    aim_ticks: int = 0
 
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
@@ -30,7 +40,8 @@ def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
             text = f"expected up to largest_radius_m of {motion.slew}, {slewing.largest_radius_m:g}"
             lookup.diagnostics.add((*place, "radius_m"), f"{text}, got {motion.radius_m:g}")
         radius = bind_radius(lookup, (*place, "radius"), motion.radius) if motion.radius else None
-        motions[name] = BoundMotion(motion, radius)
+        aim = bind_status(lookup, (*place, "aim"), motion.aim, AIM)
+        motions[name] = BoundMotion(motion, radius, *aim)
     return motions
 
 

@@ -96,9 +96,10 @@ class RunOn:
 
     def add(self, demand: float, ticks: int) -> None:
         """Take the demand of the last ticks, [-1, 1]."""
-        ticks = min(ticks, len(self._left))
-        self._negative.extendleft([min(demand, 0.0)] * ticks)
-        self._positive.extendleft([max(demand, 0.0)] * ticks)
+        back, ahead = (demand, 0.0) if demand < 0.0 else (0.0, demand)
+        for _ in range(min(ticks, len(self._left))):
+            self._negative.appendleft(back)
+            self._positive.appendleft(ahead)
 
     def travel(self) -> tuple[float, float]:
         """Return what negative and what positive demands still ask for, each by itself.

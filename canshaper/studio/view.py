@@ -55,6 +55,7 @@ class CraneView:
         self.sway_deg: tuple[float, float] | None = None
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
+        self.aim: tuple[float, float] | None = None  # slewed, degrees, and radius, m
         self.simulated = False
         self.missed = 0
         self.fault = 0
@@ -82,6 +83,9 @@ class CraneView:
         if deployment.status and service:
             key = deployment.status.message.key
             self._on(key, self._service_status, deployment.status, service.message)
+        for motion in deployment.motions.values():
+            if motion.aim and motion.config.aim:
+                self._on(motion.aim.message.key, self._aim, motion.aim, motion.config.aim.message)
         for message_name, handler in (
             ("GrappleSway", self._sway),
             ("TipPosition", self._position),
@@ -180,6 +184,7 @@ class CraneView:
             "crane": self.crane_there(now_s),
             "pose": self.pose,
             "joints": self.joints,
+            "aim": self.aim if self.daemon_there(now_s) else None,
             "sway": self.sway_deg or self._predicted(),
             "measured": self.sway_deg is not None and not self.simulated,
             "simulated": self.simulated,
@@ -264,6 +269,12 @@ class CraneView:
             self._report(said("fault", fault=fault_words(fault)), "warn")
         self.fault, self.missed = fault, int(values["MissedDeadlines"])
         self._daemon_s = now_s
+
+    def _aim(self, codec: StatusCodec[Any], data: bytes, _now_s: float) -> None:
+        if (values := codec.decode(data)) is not None:
+            self.aim = None
+            if values["AimKnown"] and self.pose:
+                self.aim = self.pose[0] + values["AimSlew"], self.pose[1] + values["AimRadius"]
 
     def _sway(self, message: Message, data: bytes, now_s: float) -> None:
         values: Any = message.decode(data)

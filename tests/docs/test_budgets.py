@@ -20,7 +20,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 700,
+    "CHANGELOG.md": 770,
     "CONTRIBUTING.md": 560,
     "README.md": 600,
     "SECURITY.md": 430,
@@ -47,7 +47,7 @@ BUDGET = {
     "docs/safety.md": 2300,
     "docs/sensor.md": 1170,
     "docs/service.md": 790,
-    "docs/states.md": 230,
+    "docs/states.md": 300,
     "docs/studio.md": 690,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
@@ -63,7 +63,7 @@ LINES = {
         4_830,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (56_600, "a new ability takes the room of an old one"),
+    "canshaper": (56_700, "a new ability takes the room of an old one"),
     "tests": (89_700, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.

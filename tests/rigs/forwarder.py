@@ -24,7 +24,7 @@ SLOW_VALVE = {"BO_ 512 20;": "BO_ 512 200;"}
 # For the YAML: joysticks that are believed for longer than a valve waits.
 PATIENT = {"timeout_ms: 100 #": "timeout_ms: 900 #", "timeout_ms: 100\n": "timeout_ms: 900\n"}
 NAMES = (*JOYSTICKS, "SlewCommand", "NearFarCommand", "LiftCommand", "ShaperStatus")
-NAMES += ("SlewStatus", "NearFarStatus", "LiftStatus")
+NAMES += ("SlewStatus", "NearFarStatus", "LiftStatus", "AimPoint")
 
 
 class Rig:

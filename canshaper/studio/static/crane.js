@@ -60,6 +60,10 @@ export class Crane {
     this.trail.geometry.setAttribute("position", new THREE.BufferAttribute(this.path, 3));
     this.trail.frustumCulled = false;
     this.group.add(this.trail);
+    // Where the tool will hang if the joysticks are let go now.
+    this.aim = new THREE.Mesh(new THREE.SphereGeometry(0.35, 20, 14),
+      new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.35 }));
+    this.group.add(this.aim);
   }
 
   /** The forwarder it stands on, and a few logs. */
@@ -109,7 +113,7 @@ export class Crane {
     this.steel.color = own;
     this.tool.color = own.clone().lerp(new THREE.Color(0xffffff), 0.35);
     this.dark.color = css("--quiet").lerp(new THREE.Color(0x000000), 0.45);
-    this.trail.material.color = own;
+    this.trail.material.color = this.aim.material.color = own;
     this.plumb.material.color = css("--quiet");
     this.write();
   }
@@ -188,6 +192,12 @@ export class Crane {
     const line = this.plumb.geometry.attributes.position;
     line.array.set([tip.x, 0, tip.z, tip.x, 0, 0.02]);
     line.needsUpdate = true;
+    this.aim.visible = Boolean(crane.aim);
+    if (crane.aim) {
+      const [angle, radius] = [crane.aim[0] * RAD, crane.aim[1]];
+      const down = grapplePoints(hello.grapple).grapple[2];
+      this.aim.position.set(radius * Math.cos(angle), radius * Math.sin(angle), tip.z + down);
+    }
     const over = end.applyAxisAngle(UP, this.slew.rotation.z);
     this.shade.position.set(over.x, over.y, 0.01);
   }

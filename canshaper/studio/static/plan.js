@@ -12,22 +12,27 @@ const FREE_M = 0.8; // around what is drawn
 const DRAW_MS = 50;
 
 /** Tip and grapple from above, [x, y]; the boom that has not slewed lies along x. */
-export function fromAbove(hello, { pose, joints, sway }) {
+export function fromAbove(hello, { pose, joints, sway, aim }) {
   const [s, c] = [Math.sin(pose[0] * RAD), Math.cos(pose[0] * RAD)];
   const at = (out, side) => [out * c - side * s, out * s + side * c];
   const radius = boomPoints(hello.boom, pose, joints).tip[0];
   const [out, side] = grapplePoints(hello.grapple, sway).grapple;
-  return { tip: at(radius, 0), grapple: sway ? at(radius + out, side) : null };
+  return { tip: at(radius, 0), grapple: sway ? at(radius + out, side) : null, aim: aimAt(aim) };
+}
+
+/** Where the tip will stop if the joysticks are let go now; nothing where that is not known. */
+function aimAt(aim) {
+  return aim && [aim[1] * Math.cos(aim[0] * RAD), aim[1] * Math.sin(aim[0] * RAD)];
 }
 
 /** The way of one crane, and its overshoot. */
 export class Way {
   constructor() { this.points = []; this.overshoot = null; }
 
-  add(t, { tip, grapple }) {
+  add(t, { tip, grapple, aim }) {
     const last = this.points.at(-1);
     if (last && !(t >= last.t && t < last.t + LEAP_S)) [this.points, this.overshoot] = [[], null];
-    this.points.push({ t, tip, grapple });
+    this.points.push({ t, tip, grapple, aim });
     while (this.points[0].t < t - KEPT_S) this.points.shift();
     const before = this.points.findLast((point) => point.t <= t - STANDS_S);
     this.stands = Boolean(before) && distance(before.tip, tip) < STANDS_M;
@@ -115,6 +120,7 @@ export class Plan {
     this.line(way.points.filter((p) => p.grapple).map((p) => at(p.grapple)));
     const [x, y] = at(last.tip);
     pen.strokeRect(x - 4, y - 4, 8, 8);
+    if (last.aim) this.cross(at(last.aim));
     if (!last.grapple) return;
     pen.beginPath();
     pen.arc(...at(last.grapple), 6, 0, 2 * Math.PI);
@@ -126,6 +132,12 @@ export class Plan {
     pen.arc(x, y, Math.abs(at([way.overshoot, 0])[0] - at([0, 0])[0]), 0, 2 * Math.PI);
     pen.stroke();
     pen.setLineDash([]);
+  }
+
+  /** The aim point. */
+  cross([x, y]) {
+    this.line([[x - 9, y], [x + 9, y]]);
+    this.line([[x, y - 9], [x, y + 9]]);
   }
 
   line(points, dash = []) {
@@ -140,7 +152,10 @@ export class Plan {
 
 function said(way) {
   if (!way.points.length) return text("above.nopose");
-  if (way.overshoot === null) return text("above.moves");
+  const { tip, aim } = way.points.at(-1);
+  if (way.overshoot === null) {
+    return aim ? text("above.aim", { m: distance(tip, aim).toFixed(1) }) : text("above.moves");
+  }
   return text("above.overshoot", { cm: Math.round(100 * way.overshoot) });
 }
 
