@@ -205,12 +205,9 @@ class AxisControl:
             self._trip = self._trip or Reason.EMERGENCY_STOP
 
     def copy_state(self, before: Self) -> None:
-        """Stay latched, and trip for what the same axis has not acted on: a reload is no reset.
-
-        After a lost address a reload is the way back.
-        """
+        """Stay latched, and trip for what the same axis has not acted on: a reload is no reset."""
         latched = before.axis
-        if latched.state is State.TRIPPED and latched.reason is not Reason.ADDRESS_LOST:
+        if latched.state is State.TRIPPED:
             self.axis.restore(latched.state, latched.reason)
         self._trip = before._trip or self._trip
         self._foreign_ns = before._foreign_ns or self._foreign_ns

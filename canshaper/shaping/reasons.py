@@ -228,7 +228,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.ADDRESS_LOST: ReasonText(
         "another node has our address",
         "another node has claimed our address; we are silent",
-        "end it, or change address or NAME; reload",
+        "end it, or change address or NAME; reload, then reset",
     ),
     Reason.VALVE_FAULT: ReasonText(
         "the valve reports a fault",

@@ -60,7 +60,7 @@ def test_e2e_is_made_again(tmp_path: Path) -> None:
              f"signal: NearFar, timeout_ms: 200, {e2e}"),
         ),
         dbc=(
-            ("Slew : 0|16@1-", "Slew : 16|16@1-"),
+            (" Slew : 0|16@1-", " Slew : 16|16@1-"),
             ("NearFar : 16|16@1-", "NearFar : 40|16@1-"),
         ),
     )  # fmt: skip
