@@ -151,7 +151,7 @@ IDENTITY: list[StatusField[int]] = [
 """Digest of what runs."""
 AIM: list[StatusField[ReportedAim]] = [
     StatusField("AimSlew", attrgetter("slew_deg"), required=True),
-    StatusField("AimRadius", attrgetter("radius_m"), required=True),
+    StatusField("AimReach", attrgetter("radius_m"), required=True),
     StatusField("AimKnown", attrgetter("known"), bool, True, 1),
 ]
 """Way that the tip still goes if the joysticks are let go now."""

@@ -9,7 +9,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.signals import LEAST_STEPS, command_fault, raw_limits, symmetrical_range
-from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
+from canshaper.codec.status import AIM, AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
 from canshaper.machine.contraries import ENABLE as CONTRARY_ENABLE
 from canshaper.machine.contraries import contrary_fault
 from canshaper.machine.corrections import bit_of
@@ -217,7 +217,7 @@ def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
     return [
         f"{message.name}.{signal.name}"
         for message in messages
-        if message.cycle_time and 2 * message.cycle_time <= timeout_ms
+        if message.cycle_time and 2 * message.cycle_time <= timeout_ms and not is_status(message)
         for signal in message.signals
         if signal.unit == "m" and RADIUS.search(signal.name)
     ]
@@ -240,8 +240,9 @@ def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Mess
 
 
 def is_status(message: Message) -> bool:
-    """Whether a message carries the status of an axis."""
-    return {s.name for s in message.signals} >= required_names(AXIS_STATUS)
+    """Whether a message carries the status of an axis, or the aim point of a crane."""
+    names = {signal.name for signal in message.signals}
+    return names >= required_names(AXIS_STATUS) or names >= required_names(AIM)
 
 
 def status_of(messages: Sequence[Message], axis: str) -> Message | None:

@@ -274,7 +274,7 @@ class CraneView:
         if (values := codec.decode(data)) is not None:
             self.aim = None
             if values["AimKnown"] and self.pose:
-                self.aim = self.pose[0] + values["AimSlew"], self.pose[1] + values["AimRadius"]
+                self.aim = self.pose[0] + values["AimSlew"], self.pose[1] + values["AimReach"]
 
     def _sway(self, message: Message, data: bytes, now_s: float) -> None:
         values: Any = message.decode(data)

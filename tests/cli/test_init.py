@@ -138,7 +138,8 @@ def test_a_first_deployment_is_of_the_kind_that_is_recommended(tmp_path: Path) -
         assert (ours.slewing is None) == (theirs.slewing is None)
     assert config.motion == {}, "not on the first day"
     file.write_text(file.read_text().replace("    waits: true\n", ""))
-    assert load_deployment(file).config.motion == shipped.motion
+    crane = shipped.motion["crane"].model_copy(update={"aim": None})  # a display's; not asked for
+    assert load_deployment(file).config.motion == {"crane": crane}
 
 
 @pytest.mark.slow

@@ -90,5 +90,5 @@ def test_a_motion_of_one_axis_has_none(changed_rig: Make) -> None:
 def test_a_message_that_cannot_carry_it_is_refused(changed_rig: Make) -> None:
     aim = "aim: { bus: crane, message: ShaperStatus }"
     motion = f"motion: {{ crane: {{ slew: slew, near_far: near_far, {aim} }} }}\n"
-    with pytest.raises(ConfigError, match="lacks the signals AimSlew, AimRadius, AimKnown"):
+    with pytest.raises(ConfigError, match="lacks the signals AimSlew, AimReach, AimKnown"):
         changed_rig({"axes:\n": f"{motion}axes:\n"})

@@ -66,8 +66,11 @@ class Machine:
         self.drives = self._nodes(valves)  # without CiA 408
         self.sensors = self._sensors(data, messages)
         self.radius: tuple[Key, int, Field] | None = None
+        self.aims: set[Key] = set()
         for motion in data.get("motion", {}).values():
             self._motion(motion, messages)
+            if aim := motion.get("aim"):
+                self.aims.add(self._sent(aim["bus"], messages[aim["message"]]))
         self.hydraulics: dict[str, Any] | None = data.get("hydraulics")
         limits = {name: section.get("limits", {}) for name, section in data["axes"].items()}
         self.ends = {

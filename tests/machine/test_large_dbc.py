@@ -35,7 +35,7 @@ def test_only_its_messages_are_parsed(machine: Machine, text: str) -> None:
     machine.dbc = text
     messages = machine.load().messages
     assert {m.name for m in messages.all()} == few
-    assert len(messages.ids()) == COUNT + 15
+    assert len(messages.ids()) == COUNT + 16
     assert (0x0CF00000 + COUNT - 1, True) in messages.ids()
 
 
