@@ -45,8 +45,8 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
             "fallback: neutral", "fallback: neutral\n  blocked: [Nobody]",
             "gateway.blocked.0: expected a message of the DBC files, got 'Nobody'; there are"
             " AimPoint, GrappleSway, JointPosition, JointVelocity, JoystickLeft, JoystickRight,"
-            " LiftCommand, LiftStatus, NearFarCommand, NearFarStatus, ShaperIdentity, ShaperStatus, SlewCommand,"
-            " SlewStatus, TipPosition, TipVelocity",
+            " LiftCommand, LiftStatus, NearFarCommand, NearFarStatus, ShaperIdentity, ShaperStatus,"
+            " SlewCommand, SlewStatus, TipPosition, TipVelocity",
         ),
         (
             SLEW, SLEW.replace("Slew", "NearFar"),
