@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.commissioning.assumed import confirmed, origins, write_numbers
-from canshaper.commissioning.file_warnings import warnings_of
+from canshaper.commissioning.likely_mistakes import warnings_of
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.state import Context, Record, State, Status
 from canshaper.commissioning.procedure.steps import check, report

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from canshaper.commissioning.file_warnings import warnings_of
+from canshaper.commissioning.likely_mistakes import warnings_of
 from canshaper.errors import ConfigError
 from tests.rigs.files import Machine
 
