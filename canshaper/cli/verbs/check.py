@@ -176,10 +176,9 @@ def _of_axis(config: "DeploymentConfig", name: str) -> "Iterator[str]":
         text = f"end stops by {ends.message}.{ends.signal}: {ends.lowest:g} to {ends.highest:g}"
         yield f"{text}, margin {ends.margin:g}"
     if oil := config.hydraulics:
-        text = (
-            f"takes {oil.shares.get(name, 1.0):g} of the flow of the pump, {oil.flow:g} full axis"
-        )
-        yield f"{text} flows, of which others take {oil.others:g}"
+        others = "measured" if oil.others_measured else f"{oil.others:g}"
+        text = f"takes {oil.shares.get(name, 1.0):g} of {oil.flow:g} full axis flows of the pump"
+        yield f"{text}, others {others}"
 
 
 def _print_codes(codes: "Sequence[NamedCode]") -> None:

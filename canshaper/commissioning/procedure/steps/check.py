@@ -110,7 +110,7 @@ def figure(axes: list[Stopping]) -> Figure:
 CHECK = Step(
     "check",
     "Check",
-    "as `canshaper check`: stopping distances, bus load, what does not fit",
+    "as `canshaper check`: stopping distances, bus load, what does not fit, oil not yet measured",
     run,
     writes="`max_pct: 40`, for the first motion; `stop_distance_m` as allowed by you",
     needs=(FILE,),
