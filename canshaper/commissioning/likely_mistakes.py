@@ -24,9 +24,8 @@ def warnings_of(deployment: Deployment) -> list[Problem]:
     source = Source(deployment.path)
     config = deployment.config
     numbers = (*unfit(config), *unstated(deployment), *rehearsed(config), *assumptions(config))
-    return [
-        source.problem(*one) for one in (*_pump(deployment), *numbers, *likely_mistakes(deployment))
-    ]
+    every = (*_pump(deployment), *numbers, *likely_mistakes(deployment))
+    return [source.problem(*one) for one in every]
 
 
 def _pump(deployment: Deployment) -> Mistakes:

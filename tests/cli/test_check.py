@@ -57,7 +57,8 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     assert rows["limits allow"] == ["4.70", "m", "28", "deg", "1.00", "m", "0.33", "s"]
     assert rows["stop_distance_m"] == ["4.7", "m", "1", "m", "-"]
     assert "WARNING" not in "".join(lines)
-    assert warning == f"WARNING: {SHIPPED}:5: hydraulics: missing: {NO_PUMP}"
+    assert warning.startswith(f"WARNING: {SHIPPED}:")
+    assert warning.endswith(f": hydraulics: missing: {NO_PUMP}")
     assert "lift: in seconds of full speed" in "".join(lines)
     assert "slewing: of one that slews" not in "".join(lines)
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 GROUP = "measure"
 
 EXIT_TOO_POOR = 1
+TITLES = ("Swing, identified", "Pump, measured")
 
 
 def identify(
@@ -129,14 +130,7 @@ def identify(
         raise UsageError("--write: expected --file too, the deployment to write to, got none")
     if write and file:
         refuse_shipped(file)
-    results = Results(
-        "Pump, measured" if together else "Swing, identified",
-        deployment,
-        report,
-        picture,
-        quiet=as_json,
-        soft_wrap=True,
-    )
+    results = Results(TITLES[together], deployment, report, picture, quiet=as_json, soft_wrap=True)
     options: dict[str, Any] = {"axis": axis, "channel": channel, "about_s": about_s}
     if logs and Path(logs[0]).is_dir():
         of_one = {"--write": write, "--json": as_json, "--picture": picture}
@@ -147,7 +141,7 @@ def identify(
     if together:
         if deployment is None or as_json or picture:
             raise UsageError("--together: expected --file, and neither --json nor --picture")
-        results.print("\n".join(pump_in(deployment, logs, signal, channel, write=write)))
+        results.print(pump_in(deployment, logs or [], signal or [], write=write, channel=channel))
         results.write()
         return
     with os_errors(out):

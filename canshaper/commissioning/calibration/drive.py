@@ -25,6 +25,8 @@ from canshaper.shaping.states import MOVING, CommandInput, Reason, State
 
 # A command below this is neutral: the ramp begins there.
 NEUTRAL_BAND = 1e-4
+Name = tuple[str, str]
+Names = Mapping[str, Name]
 
 
 class _RampJoystick:
@@ -82,12 +84,7 @@ class CalibrationDrive:
     """
 
     def __init__(
-        self,
-        deployment: Deployment,
-        axis: str,
-        speed: tuple[str, str],
-        ramp: Ramp,
-        also: Mapping[str, tuple[str, str]] | None = None,
+        self, deployment: Deployment, axis: str, speed: Name, ramp: Ramp, also: Names | None = None
     ) -> None:
         speeds = {axis: speed, **(also or {})}
         for name in speeds:
@@ -95,6 +92,7 @@ class CalibrationDrive:
         # What may be set while the daemon runs bounds no measurement: the numbers of the file do.
         config = deployment.config.model_copy(update={"control": None})
         deployment = replace(deployment, config=config)
+        feedback = {name: SpeedFeedback(deployment, name, *one) for name, one in speeds.items()}
         self._controller = Controller(deployment)
         self._guarded = Guarded(self._controller)
         # Nothing moves but these axes: no other one gets its joystick, nor moves for another one.
@@ -115,14 +113,8 @@ class CalibrationDrive:
             )
             one.isolate(joystick, measured if name in speeds else None)
             self._joysticks[name] = joystick
-        self._driven = {
-            name: (
-                self._controller.axes[name],
-                self._joysticks.pop(name),
-                SpeedFeedback(deployment, name, *of_axis),
-            )
-            for name, of_axis in speeds.items()
-        }
+        of, ramped = self._controller.axes, self._joysticks
+        self._driven = {name: (of[name], ramped.pop(name), feedback[name]) for name in speeds}
         self.axis, self.ramp = axis, ramp
         self.turns = [(name,) for name in speeds] + [tuple(speeds)] * (len(speeds) > 1)
         self.duration_s = len(self.turns) * ramp.duration_s
@@ -168,17 +160,14 @@ class CalibrationDrive:
         waits = [one.axis for one, *_ in driven if one.axis.state is not State.READY]
         if self._begun_ns is None and not waits and valid and not self._moved:
             self._begun_ns = now_ns
+        command, turn = 0.0, self.turns[-1]
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
             self.progress = min(1.0, time_s / self.duration_s)
             done, into_s = divmod(time_s, self.ramp.duration_s)
-            turn = self.turns[int(done)] if self.progress < 1.0 else ()
-            stops = State.STOPPING in [one.state for one in waits]  # then no other moves on
-            for name, (_, joystick, _) in self._driven.items():
-                moves = name in turn and not stops
-                joystick.deflection = self.ramp.command(into_s) if moves else 0.0
+            turn = self.turns[min(int(done), len(self.turns) - 1)]
             self._sample(time_s)
-            if not turn:
+            if time_s >= self.duration_s:
                 self.ended = "done"
             elif stopped := [one.reason.name for one in waits if one.state not in MOVING]:
                 self.ended = f"stopped: {stopped[0]}"
@@ -190,9 +179,10 @@ class CalibrationDrive:
                 text = f"at {abs(self.ramp.command(into_s)):.0%} of the command it moves no more"
                 room = f"give it room for {self.ramp.travel_s:.1f} s at full deflection"
                 self.ended = f"stopped: {text}: its end? {room}"
-            for _, joystick, _ in driven if self.ended else ():
-                joystick.deflection = 0.0
+            if not self.ended and State.STOPPING not in [one.state for one in waits]:
+                command = self.ramp.command(into_s)  # where one stops no other moves on
         for name, (_, joystick, _) in self._driven.items():
+            joystick.deflection = command if name in turn else 0.0
             self._guarded.demand(name, joystick.deflection)
         yield from self._guarded.tick(now_ns, missed)
         self._controller.events.clear()

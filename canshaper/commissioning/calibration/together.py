@@ -22,22 +22,20 @@ SETTLING_S, BIN_S, LEAST_BINS, ERRORS, LEAST_HALF = 0.5, 0.1, 5, 3.0, 0.01
 # alone shows whether it still gets faster up to the largest.
 LOWER, SLOW, SLOW_S, SATURATED = (0.7, 0.85), 0.2, 0.3, 0.9
 # An axis that is not slowed down keeps so much of its speed.
-KEPT = 0.97
+KEPT = 0.95
 # States of an axis; the last three times its direction.
 STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
 
 Moment = Sequence[float]
 """Time in s, rising; of each of two axes demand on its valve, part of full speed, and speed."""
 
+Drives = Sequence[Sequence[Moment]]
 Mean = tuple[float, float]
 """A value and half the width of its interval of 95 %."""
 
 
 class Direction(NamedTuple):
-    """Both axes at once: ways, 1 or -1, and which part each keeps of the speed that it has alone.
-
-    They ask for and get full axis flows.
-    """
+    """Both at once: ways, 1 or -1; parts kept of the speeds alone; flows in full axis flows."""
 
     ways: tuple[int, int]
     kept: list[Mean]
@@ -50,9 +48,7 @@ Bins = list[tuple[float, float]]
 Seen = Mapping[tuple[int, ...], tuple[Bins, Bins]]
 
 
-def measured(
-    drives: Sequence[Sequence[Moment]], axes: Sequence[str], shares: Mapping[str, float]
-) -> list[Direction]:
+def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[Direction]:
     """Measure what a pump delivers, in each direction of both axes; first where it is least.
 
     Args:
@@ -87,10 +83,10 @@ def _direction(
         if abs(own) <= 2.0 * own_half:
             text = f"{name} alone: expected a steady speed, got {own:.3g} ± {own_half:.2g} of full"
             raise CalibrationError(f"{text}; is that its feedback, and is it at no end?")
-        rises = rises and all(alone)
         # A lag makes it slower on the way up, and faster on the way down.
         lower = [_gain(bins, zero)[0] for bins in alone[1:] if bins]
-        if all(alone) and abs(own) < SATURATED * abs(statistics.fmean(lower)):
+        rises = rises and len(lower) == 2
+        if len(lower) == 2 and abs(own) < SATURATED * abs(statistics.fmean(lower)):
             low, high, top = (100.0 * abs(alone[0][0][0]) * part for part in (*LOWER, 1.0))
             text = f"{name} alone hardly gets faster from {high:.0f} to {top:.0f} % of full speed"
             why = "its valve saturates, or the pump gives less than it takes, so no flow is known"
@@ -115,7 +111,7 @@ def _gain(bins: Bins, zero: float) -> Mean:
     return statistics.fmean(gains), ERRORS * spread / math.sqrt(len(gains))
 
 
-def _seen(drives: Sequence[Sequence[Moment]]) -> Seen:
+def _seen(drives: Drives) -> Seen:
     every = list(zip([0.0] * 5, *chain(*drives), strict=True))
     most = [{1: max(one), -1: -min(one)} for one in every[1::2]]
     bins: dict[tuple[int, ...], list[Moment]] = defaultdict(list)

@@ -6,7 +6,7 @@ from typing import Any
 
 from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.calibration.fit import Calibration
-from canshaper.commissioning.calibration.together import KEPT, Moment, measured
+from canshaper.commissioning.calibration.together import KEPT, Drives, measured
 from canshaper.config.origin import note, written_by
 from canshaper.edit.edit import Change, change
 from canshaper.errors import UsageError
@@ -97,17 +97,9 @@ def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
 
 
 def pump_lines(
-    deployment: Deployment,
-    axes: Sequence[str],
-    drives: Sequence[Sequence[Moment]],
-    origin: dict[str, Any] | None,
+    deployment: Deployment, axes: Sequence[str], drives: Drives, origin: dict[str, Any] | None
 ) -> list[str]:
-    """Measure the pump, write its flow where an origin is given, and return lines for people.
-
-    Raises:
-        CalibrationError: nothing can be told of it; see ``measured``.
-        ConfigError: the file cannot be changed.
-    """
+    """Lines on the pump, whose flow is written where an origin is given; errors of ``measured``."""
     oil = deployment.config.hydraulics
     shares = {name: oil.shares.get(name, 1.0) if oil else 1.0 for name in deployment.axes}
     directions, lines = measured(drives, axes, shares), []
@@ -118,7 +110,7 @@ def pump_lines(
         lines.append(f"at once, of the speed alone: {', '.join(parts)}: {of}")
     # A budget that is too small costs speed, one that is too large leaves swing.
     least = math.floor(100.0 * (flow - half)) / 100.0
-    if all(part >= KEPT - half for direction in directions for part, half in direction.kept):
+    if all(part >= KEPT for direction in directions for part, _ in direction.kept):
         if asked < KEPT * sum(shares[name] for name in axes):
             cure = "measure again with a larger --top, or limits.max_pct"
             return [*lines, f"flow at least {least:g}: that little does not load the pump; {cure}"]

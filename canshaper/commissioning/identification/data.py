@@ -158,20 +158,14 @@ def logged(
 
 
 def pump_in(
-    deployment: Deployment,
-    logs: list[str] | None,
-    signals: list[str] | None,
-    channel: str | None,
-    *,
-    write: bool,
-) -> list[str]:
+    deployment: Deployment, logs: Sequence[str], signals: Sequence[str], *, write: bool, **of: Any
+) -> str:
     """What the pump delivers, by logs with the speeds of two axes; see ``pump_lines``."""
-    speeds, drives = signals_named(signals or [], deployment), []
+    speeds, drives = signals_named(signals, deployment), []
     axes = pair_of(deployment, [*speeds])
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
-    for _, path in map(_labelled, logs or []):
-        known: dict[str, Any] = {"deployment": deployment, "channel": channel}
-        shown = read_can(path, "", names, deployment.messages, **known)
+    for _, path in map(_labelled, logs):
+        shown = read_can(path, "", names, deployment.messages, deployment=deployment, **of)
         time_s = shown[axes[0]].time_s
         columns = [time_s]
         for name, one in shown.items():
@@ -180,8 +174,8 @@ def pump_in(
             columns.append(np.interp(time_s, one.command.time_s, one.command.speed))
             columns.append(np.interp(time_s, one.time_s, one.value))
         drives.append(np.stack(columns, axis=1).tolist())
-    origin = measured_in(logs or [], deployment.messages) if write else None
-    return pump_lines(deployment, axes, drives, origin)
+    origin = measured_in(logs, deployment.messages) if write else None
+    return "\n".join(pump_lines(deployment, axes, drives, origin))
 
 
 def measured_in(logs: Sequence[str], messages: Messages) -> dict[str, Any]:
