@@ -69,9 +69,8 @@ def calibrate(
     The simulated axis is brought to where it has room for its ramp. Beyond the top of the ramp the
     curve is a straight line, and says so.
 
-    With --together two axes (by default the first two with a filter) are driven so up to max_pct:
-    each alone, then both at once. What they lose of their speeds is the flow of the section
-    hydraulics.
+    With --together two axes (by default the first two with a filter) go up to max_pct, each alone,
+    then both at once: what they lose of their speeds shows the flow of the pump (hydraulics).
 
     Examples:
 
@@ -103,8 +102,7 @@ def calibrate(
         raise UsageError(f"{wrong} with --together, got {picture or ', '.join(axes) or 'none'}")
     title = "Pump, measured" if together else f"Valve of {axes[0]}, calibrated"
     results = Results(title, deployment, report, picture)
-    named = zip_longest(axes, speed or [])
-    signals = {one: speed_signal(deployment, one, signal) for one, signal in named}
+    signals = {a: speed_signal(deployment, a, s) for a, s in zip_longest(axes, speed or [])}
     limits = [deployment.axes[one].config.limits for one in axes]
     usual = min(one.max_pct for one in limits) / 100.0 if together else usual_top(limits[0])
     rate_per_s = TOGETHER_PER_S if together else RATE_PER_S

@@ -167,6 +167,9 @@ class CalibrationDrive:
             done, into_s = divmod(time_s, self.ramp.duration_s)
             turn = self.turns[min(int(done), len(self.turns) - 1)]
             self._sample(time_s)
+            # One that another takes the oil of stands too, and had that room before, alone.
+            ramp, part = self.ramp.command(into_s), self.ramp.part(into_s)
+            speed = self._driven[turn[0]][2].value
             if time_s >= self.duration_s:
                 self.ended = "done"
             elif stopped := [one.reason.name for one in waits if one.state not in MOVING]:
@@ -175,12 +178,12 @@ class CalibrationDrive:
                 self.ended = f"stopped: the joystick of {self._moved} was moved"
             elif not valid:
                 self.ended = "stopped: the feedback fell silent, or reports an error"
-            elif len(turn) == 1 and self._is_at_end(turn[0], into_s):
-                text = f"at {abs(self.ramp.command(into_s)):.0%} of the command it moves no more"
+            elif len(turn) == 1 and self._ends[turn[0]].reached(part, into_s, ramp, speed):
+                text = f"at {abs(ramp):.0%} of the command it moves no more"
                 room = f"give it room for {self.ramp.travel_s:.1f} s at full deflection"
                 self.ended = f"stopped: {text}: its end? {room}"
             if not self.ended and State.STOPPING not in [one.state for one in waits]:
-                command = self.ramp.command(into_s)  # where one stops no other moves on
+                command = ramp  # where one stops no other moves on
         for name, (_, joystick, _) in self._driven.items():
             joystick.deflection = command if name in turn else 0.0
             self._guarded.demand(name, joystick.deflection)
@@ -208,11 +211,6 @@ class CalibrationDrive:
             limits = one.bound.config.limits.output_limits()
             moment += (speed_of(limits, sample.command), sample.speed)
         self.moments.append(moment)
-
-    def _is_at_end(self, axis: str, time_s: float) -> bool:
-        """Alone only: one that another takes the oil of stands too, and had that room before."""
-        part, command = self.ramp.part(time_s), self.ramp.command(time_s)
-        return self._ends[axis].reached(part, time_s, command, self._driven[axis][2].value)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve."""

@@ -13,16 +13,15 @@ from typing import NamedTuple
 
 from canshaper.errors import CalibrationError
 
-# Below that part of full speed an axis stands; from that part of its largest demand on it is held.
-STANDS, HELD = 0.01, 0.95
+# Parts: of full speed, below which an axis stands; of its largest demand, from which it is held; of
+# its speed alone, which it keeps where it is not slowed down.
+STANDS, HELD, KEPT = 0.01, 0.95, 0.95
 # A held speed has settled after so long; then its means over BIN_S count as independent. Of five
 # of them 2.8 standard errors are an interval of 95 %, but commands and speeds have steps.
 SETTLING_S, BIN_S, LEAST_BINS, ERRORS, LEAST_HALF = 0.5, 0.1, 5, 3.0, 0.01
 # Between these parts of its largest demand, which changes by no more than SLOW in SLOW_S, an axis
 # alone shows whether it still gets faster up to the largest.
 LOWER, SLOW, SLOW_S, SATURATED = (0.7, 0.85), 0.2, 0.3, 0.9
-# An axis that is not slowed down keeps so much of its speed.
-KEPT = 0.95
 # States of an axis; the last three times its direction.
 STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
 
@@ -87,11 +86,14 @@ def _direction(
         lower = [_gain(bins, zero)[0] for bins in alone[1:] if bins]
         rises = rises and len(lower) == 2
         if len(lower) == 2 and abs(own) < SATURATED * abs(statistics.fmean(lower)):
-            low, high, top = (100.0 * abs(alone[0][0][0]) * part for part in (*LOWER, 1.0))
-            text = f"{name} alone hardly gets faster from {high:.0f} to {top:.0f} % of full speed"
-            why = "its valve saturates, or the pump gives less than it takes, so no flow is known"
-            cure = f"drive both up to {low:.0f} % only (--top), or calibrate the valve first"
-            raise CalibrationError(f"{text}: {why}; {cure}")
+            most = 100.0 * abs(alone[0][0][0])
+            text = (
+                f"{name} alone hardly gets faster up to {most:.0f} % of full speed: the valve is at"
+            )
+            cure = (
+                f"its end, or the pump; drive both up to {LOWER[0] * most:.0f} % only (--top), or"
+            )
+            raise CalibrationError(f"{text} {cure} calibrate the valve first: no flow is known")
         half = math.hypot(both_half, both / own * own_half) / abs(own)
         kept.append((both / own, max(half, LEAST_HALF)))
         asked.append(shares[name] * statistics.fmean(abs(demand) for demand, _ in seen[ways][i]))
@@ -105,7 +107,6 @@ def _direction(
 
 
 def _gain(bins: Bins, zero: float) -> Mean:
-    """Speed for a demand of full speed."""
     gains = [(speed - zero) / demand for demand, speed in bins]
     spread = statistics.stdev(gains) if len(gains) > 1 else 0.0
     return statistics.fmean(gains), ERRORS * spread / math.sqrt(len(gains))
