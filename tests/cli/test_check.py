@@ -253,7 +253,7 @@ def test_check_shows_pump_and_end_stops(tmp_path: Path) -> None:
     lines = invoke("check", str(pump)).stdout.splitlines()
     near_far = next(k for k, line in enumerate(lines) if line.startswith("  axis near_far"))
     of_pump = "    takes 1 of 1.2 full axis flows of the pump, others 0"
-    ends = "    end stops by TipPosition.Radius: 1.8 to 8, margin 0.05"
+    ends = "    end stops TipPosition.Radius 1.8 to 8, margin 0.05"
     assert lines[near_far + 1 : near_far + 3] == [ends, of_pump]
     assert lines.count(of_pump) == 3
     found = json.loads(invoke("check", str(pump), "--json").stdout)

@@ -173,7 +173,7 @@ def _of_axis(config: "DeploymentConfig", name: str) -> "Iterator[str]":
         does = "damps" if sensor.use == "damp" else "is watched"
         yield f"sway sensor {sensor.message}.{sensor.signal} {does}"
     if e := axis.limits.ends:
-        yield f"end stops by {e.message}.{e.signal}: {e.lowest:g} to {e.highest:g}, margin {e.margin:g}"
+        yield f"end stops {e.message}.{e.signal} {e.lowest:g} to {e.highest:g}, margin {e.margin:g}"
     if oil := config.hydraulics:
         others = "measured" if oil.others_measured else f"{oil.others:g}"
         text = f"takes {oil.shares.get(name, 1.0):g} of {oil.flow:g} full axis flows of the pump"

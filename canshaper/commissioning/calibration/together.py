@@ -86,14 +86,10 @@ def _direction(
         lower = [_gain(bins, zero)[0] for bins in alone[1:] if bins]
         rises = rises and len(lower) == 2
         if len(lower) == 2 and abs(own) < SATURATED * abs(statistics.fmean(lower)):
-            most = 100.0 * abs(alone[0][0][0])
-            text = (
-                f"{name} alone hardly gets faster up to {most:.0f} % of full speed: the valve is at"
-            )
-            cure = (
-                f"its end, or the pump; drive both up to {LOWER[0] * most:.0f} % only (--top), or"
-            )
-            raise CalibrationError(f"{text} {cure} calibrate the valve first: no flow is known")
+            full, part = 100.0 * abs(alone[0][0][0]), 100.0 * LOWER[0]
+            text = f"{name} alone hardly gets faster up to {full:.0f} % of full speed: its valve or"
+            cure = f"drive both up to {part:.0f} % of that only (--top), or calibrate the valve"
+            raise CalibrationError(f"{text} the pump gives no more, so no flow is known; {cure}")
         half = math.hypot(both_half, both / own * own_half) / abs(own)
         kept.append((both / own, max(half, LEAST_HALF)))
         asked.append(shares[name] * statistics.fmean(abs(demand) for demand, _ in seen[ways][i]))

@@ -134,7 +134,7 @@ def test_drives_of_a_driver_may_be_opposite_and_in_several_logs() -> None:
 
 @pytest.mark.parametrize("what", [{"most": 0.8}, {"flow": 0.8}], ids=["valve", "pump"])
 def test_an_axis_that_gets_no_faster_alone_is_refused(what: dict[str, float]) -> None:
-    says = r"slew alone hardly gets faster up to 100 % .* up to 70 % only \(--top\)"
+    says = r"slew alone hardly gets faster up to 100 % .* up to 70 % of that only \(--top\)"
     with pytest.raises(CalibrationError, match=says):
         found(drive(ramped(), **({"flow": 1.2} | what)))
     within = found(drive(ramped(0.7), **({"flow": 0.8} | what)))
