@@ -124,7 +124,7 @@ def _seen(drives: Drives) -> Seen:
             if now != states:
                 states, since_s, number = now, time_s, number + 1
             settled = time_s - since_s >= SETTLING_S or {UP, DOWN} & {*map(abs, now)}
-            if settled and BETWEEN not in now:
+            if settled:
                 bins[*now, number, int((time_s - since_s) / BIN_S)].append(moment)
     seen: Seen = defaultdict(lambda: ([], []))
     for (one, other, *_), part in bins.items():

@@ -145,6 +145,13 @@ def test_a_pump_that_one_axis_may_empty_is_not_believed_unseen() -> None:
     strokes = (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)
     with pytest.raises(CalibrationError, match=r"flow at most 1\.00, what one axis takes"):
         found(drive(driven(*strokes), 0.8))
+    quick = [0.1 * k for k in range(11)]
+    rows = [
+        [(v * a, v * b) for v in [*quick, *[1.0] * 100, *quick[::-1], *[0.0] * 50]]
+        for a, b in strokes
+    ]
+    with pytest.raises(CalibrationError, match=r"flow at most 1\.00"):
+        found(drive([*rows[0], *rows[1], *rows[2]], 0.8))
     assert found(drive(ramped(), 1.0))[0].flow[0] == pytest.approx(1.0, abs=0.01)
     assert found(drive(driven(*strokes), 1.1))[0].flow[0] == pytest.approx(1.1, abs=0.01)
 
