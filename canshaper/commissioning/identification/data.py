@@ -166,8 +166,7 @@ def pump_in(
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
     for _, path in map(_labelled, logs):
         shown = read_can(path, "", names, deployment.messages, deployment=deployment, **of)
-        time_s = shown[axes[0]].time_s
-        columns = [time_s]
+        columns = [time_s := shown[axes[0]].time_s]
         for name, one in shown.items():
             if one.command is None or not len(one.time_s):
                 raise IdentificationError(f"{path}: expected commands and speeds of {name}")
