@@ -24,7 +24,7 @@
      |    +-- WorkerError           a process that drives is not the program that asks it to
      +-- MeasurementError       a measurement failed, or says nothing
           +-- IdentificationError   of the swing
-          +-- CalibrationError      of a valve
+          +-- CalibrationError      of a valve or the pump
 
 Those about data (``UsageError``, ``LogError``, ``DesignError``, ``IdentificationError``,
 ``PageMessageError``) are ``ValueError`` too.
@@ -184,7 +184,7 @@ class IdentificationError(MeasurementError, ValueError):
 
 
 class CalibrationError(MeasurementError):
-    """The measurement makes no curve of a valve; says why and what to do."""
+    """The measurement makes no curve of a valve, or flow of a pump; says why and what to do."""
 
 
 def raised(error: BaseException) -> str:

@@ -1,11 +1,15 @@
-"""Warnings of settings that a machine may have, and that are more often a mistake."""
+"""Warnings about a valid deployment file, whose numbers may be meant otherwise."""
 
 from collections.abc import Iterator
 
 from canshaper.codec.sense import turned
 from canshaper.codec.signals import find_signal
-from canshaper.config.source import Place
+from canshaper.commissioning.assumed import assumptions
+from canshaper.config.source import Place, Source
+from canshaper.errors import Problem
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import unfit
+from canshaper.machine.stopping import rehearsed, unstated
 from canshaper.machine.valves import BoundAxis
 
 # Full deflection, part of the DBC range of a joystick; ratio of two speeds of one crane; radius of
@@ -13,6 +17,25 @@ from canshaper.machine.valves import BoundAxis
 LEAST_FULL, MOST_RATIO, LEAST_REACH = 0.2, 10.0, 0.1
 
 Mistakes = Iterator[tuple[Place, str]]
+
+
+def warnings_of(deployment: Deployment) -> list[Problem]:
+    """Filters that do not fit, travel that no one has stated, guesses, likely mistakes."""
+    source = Source(deployment.path)
+    config = deployment.config
+    numbers = (*unfit(config), *unstated(deployment), *rehearsed(config), *assumptions(config))
+    every = (*_pump(deployment), *numbers, *likely_mistakes(deployment))
+    return [source.problem(*one) for one in every]
+
+
+def _pump(deployment: Deployment) -> Mistakes:
+    """Nothing says whether the pump has the oil that two axes ask for at once."""
+    axes = deployment.config.axes
+    shaped = [name for name, axis in axes.items() if axis.filter.kind != "off"]
+    if len(shaped) > 1 and not deployment.config.hydraulics:
+        text = f"missing: where the pump lacks oil for {' and '.join(shaped[:2])} at once, swing is"
+        cure = f"left; measure flow (canshaper calibrate {deployment.path} --together), or write"
+        yield ("hydraulics",), f"{text} {cure} {{ flow: {len(axes)} }} where the oil is enough"
 
 
 def likely_mistakes(deployment: Deployment) -> Mistakes:

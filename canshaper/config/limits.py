@@ -221,6 +221,7 @@ class Hydraulics(Section):
     shares: dict[str, Annotated[float, number(0, 100, "full axis flows", "of an axis")]] = Field(
         {}, description="what an axis takes at full speed, by name; without an entry 1"
     )
+    origin: Origin | None = Field(None, description="where the flow comes from")
 
     @model_validator(mode="after")
     def _some_left(self) -> Self:

@@ -143,7 +143,7 @@ def _up(distance_m: float) -> str:
 
 def rehearsed(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
     """Sections with numbers of a simulated crane: where, and what to do."""
-    for place in simulated(config.axes, ("axes",)):
+    for place in simulated(config):
         yield place, "measured on a simulated crane; measure it on the machine"
 
 

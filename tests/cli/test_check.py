@@ -1,5 +1,6 @@
 """``canshaper check``: what it shows of a deployment, and every problem with its line."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,10 @@ import pytest
 from canshaper.machine.binding import load_deployment
 from tests.cli.invocation import ROOT, SHIPPED, invoke
 
+NO_PUMP = (
+    "where the pump lacks oil for slew and near_far at once, swing is left; measure flow (canshaper"
+    f" calibrate {SHIPPED} --together), or write {{ flow: 3 }} where the oil is enough"
+)
 ROBUST = Path(__file__).parents[2] / "config" / "forwarder-robust.yaml"
 
 
@@ -41,7 +46,7 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
 
 def test_check_shows_how_far_every_axis_travels_on() -> None:
     lines = invoke("check", str(SHIPPED)).stdout.splitlines()
-    lines = lines[next(i for i, line in enumerate(lines) if "stops from" in line) :]
+    *lines, warning = lines[next(i for i, line in enumerate(lines) if "stops from" in line) :]
     assert max(map(len, lines)) <= 80
     rows = {line[:26].strip(): line[26:].split() for line in lines if line.startswith(" ")}
     # 0.5 rad/s at 9.6 m; lift has no speed
@@ -52,6 +57,8 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     assert rows["limits allow"] == ["4.70", "m", "28", "deg", "1.00", "m", "0.33", "s"]
     assert rows["stop_distance_m"] == ["4.7", "m", "1", "m", "-"]
     assert "WARNING" not in "".join(lines)
+    assert warning.startswith(f"WARNING: {SHIPPED}:")
+    assert warning.endswith(f": hydraulics: missing: {NO_PUMP}")
     assert "lift: in seconds of full speed" in "".join(lines)
     assert "slewing: of one that slews" not in "".join(lines)
 
@@ -221,3 +228,43 @@ def test_check_names_an_axis_that_slews_in_no_motion(file: str, slews: list[str]
     named = [line.split()[0] for line in lines if "is in no motion" in line]
     assert named == slews
     assert sum("which joints are not" in line for line in lines) == len(slews)
+
+
+PUMP = "hydraulics: { flow: 3 }"
+
+
+@pytest.mark.parametrize("more", [PUMP, "    filter: { kind: off }"])
+def test_a_pump_that_is_stated_and_one_filter_alone_are_no_warning(
+    tmp_path: Path, more: str
+) -> None:
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    if more != PUMP:
+        before, _, after = text.partition("  near_far:")
+        filters = [row for row in after.splitlines() if row.lstrip().startswith("filter:")]
+        text = f"{before}  near_far:{after.replace(filters[0], more, 1)}"
+    (file := tmp_path / "machine.yaml").write_text(text + f"{more}\n" * (more == PUMP))
+    shown = invoke("check", str(file))
+    assert shown.exit_code == 0, shown.output
+    assert "hydraulics" not in shown.stdout
+
+
+def test_check_shows_pump_and_end_stops(tmp_path: Path) -> None:
+    pump = ROOT / "config" / "forwarder-pump.yaml"
+    lines = invoke("check", str(pump)).stdout.splitlines()
+    near_far = next(k for k, line in enumerate(lines) if line.startswith("  axis near_far"))
+    of_pump = "    takes 1 of 1.2 full axis flows of the pump, others 0"
+    ends = "    end stops TipPosition.Radius 1.8 to 8, margin 0.05"
+    assert lines[near_far + 1 : near_far + 3] == [ends, of_pump]
+    assert lines.count(of_pump) == 3
+    found = json.loads(invoke("check", str(pump), "--json").stdout)
+    assert found["hydraulics"]["flow"] == 1.2
+    assert found["axes"]["near_far"]["ends"]["highest"] == 8.0
+    assert found["axes"]["slew"]["ends"] is None
+    others = "{ bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200, full: 9 }"
+    text = pump.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    (file := tmp_path / "machine.yaml").write_text(
+        text.replace("{ flow: 1.2 }", f"{{ flow: 1.2, others_measured: {others} }}")
+    )
+    assert f"{of_pump[:-1]}measured" in invoke("check", str(file)).stdout
+    plain = json.loads(invoke("check", str(SHIPPED), "--json").stdout)
+    assert plain["hydraulics"] is None

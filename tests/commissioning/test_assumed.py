@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.commissioning.assumed import confirmed, origins, write_numbers
-from canshaper.commissioning.file_warnings import warnings_of
+from canshaper.commissioning.likely_mistakes import warnings_of
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.state import Context, Record, State, Status
 from canshaper.commissioning.procedure.steps import check, report
@@ -24,7 +24,8 @@ def guessed(machine: Machine) -> Machine:
 
 
 def test_a_check_shows_them_by_axis_and_what_is_no_number(guessed: Machine) -> None:
-    warnings = [str(one).partition("assumed")[2] for one in warnings_of(guessed.load())]
+    every = [str(one).partition("assumed")[2] for one in warnings_of(guessed.load())]
+    warnings = [*filter(None, every)]
     assert warnings[0] == ".2: expected a key of this file with a number, got 'axes.lift.speed'"
     assert warnings[1].startswith(
         ".0: slew moves by sway.period_s 2.356, valve.timeout_ms 200: a guess; measure it"

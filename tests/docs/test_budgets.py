@@ -26,7 +26,7 @@ BUDGET = {
     "SECURITY.md": 430,
     "docs/api.md": 150,
     "docs/architecture.md": 310,
-    "docs/calibration.md": 370,
+    "docs/calibration.md": 420,
     "docs/campaign.md": 945,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
@@ -63,8 +63,8 @@ LINES = {
         4_830,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (56_700, "a new ability takes the room of an old one"),
-    "tests": (89_700, "one level for each behaviour"),
+    "canshaper": (57_000, "a new ability takes the room of an old one"),
+    "tests": (90_200, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}

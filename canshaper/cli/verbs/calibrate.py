@@ -1,5 +1,6 @@
-"""``canshaper calibrate``: dead band, gain and asymmetry of a valve, measured and written."""
+"""``canshaper calibrate``: the curve of a valve, or the flow of the pump, measured and written."""
 
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,28 +17,36 @@ from canshaper.cli.common import (
     loader,
     refuse_shipped,
 )
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
+    from canshaper.machine.deployment import Deployment
 
 GROUP = "setup"
 
 
 def calibrate(
     file: str = FILE,
-    axis: str = typer.Option(..., "--axis", help="Axis whose valve is measured."),
-    speed: str | None = typer.Option(
+    axis: list[str] | None = typer.Option(None, "--axis", help="Axis whose valve is measured."),
+    together: bool = typer.Option(
+        False, "--together", help="Measure the pump: two axes, each alone and then at once."
+    ),
+    speed: list[str] | None = typer.Option(
         None, "--speed", metavar="MESSAGE.SIGNAL", help="Feedback of its speed in the DBC files."
     ),
-    rate_pct_s: float = typer.Option(10.0, "--rate", min=0.5, max=20.0, help="Ramp, % per s."),
+    rate_pct_s: float | None = typer.Option(
+        None, "--rate", min=0.5, max=20.0, help="Ramp, % per s; by default 10, for the pump 50."
+    ),
     top: float | None = typer.Option(
         None,
         "--top",
         min=1.0,
         max=100.0,
-        help="Largest command, %, up to the axis' max_pct; by default 40, or max_pct.",
+        help="Largest command, %, up to max_pct; by default 40, for the pump max_pct.",
     ),
     live: bool = typer.Option(False, "--live", help="On the machine, not on the simulated crane."),
     yes: bool = typer.Option(False, "--yes", help="With --live: do not ask."),
@@ -49,7 +58,7 @@ def calibrate(
     picture: Path | None = PICTURE,
     report: Path | None = REPORT,
 ) -> None:
-    """Measure at which command a valve opens, and what it gives, in each direction.
+    """Measure at which command a valve opens, and what it gives; or what the pump delivers.
 
     Drives one axis slowly up and down, first with positive, then with negative commands, and
     compares with the feedback of its speed. By default on the simulated crane; with --live on the
@@ -60,6 +69,9 @@ def calibrate(
     The simulated axis is brought to where it has room for its ramp. Beyond the top of the ramp the
     curve is a straight line, and says so.
 
+    With --together two axes (by default the first two with a filter) go up to max_pct, each alone,
+    then both at once: what they lose of their speeds shows the flow of the pump (hydraulics).
+
     Examples:
 
       canshaper calibrate config/forwarder-robust.yaml --axis slew
@@ -68,49 +80,75 @@ def calibrate(
 
       canshaper calibrate config/forwarder-robust.yaml --axis slew --report slew.html
 
+      canshaper calibrate config/forwarder-robust.yaml --together --set pump_flow=1.2
+
       canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.commissioning.calibration.ramp import Ramp, usual_top
-    from canshaper.commissioning.calibration.run import run_live
-    from canshaper.commissioning.calibration.write import curve_lines, speed_signal, write_curve
+    from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOGETHER_PER_S, Ramp, usual_top
+    from canshaper.commissioning.calibration.run import run_live, run_simulated
+    from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
+    from canshaper.config.origin import written_by
     from canshaper.report.console import progress_bar
+    from canshaper_sim.parameters import changed_parameters
 
     deployment = loader(file, interface, channel, network=network)()
     if write:
         refuse_shipped(file)
-    results = Results(f"Valve of {axis}, calibrated", deployment, report, picture)
-    of_speed = speed_signal(deployment, axis, speed)
-    usual = usual_top(deployment.axes[axis].config.limits)
-    ramp = Ramp(rate_pct_s / 100.0, usual if top is None else top / 100.0)
-    top_pct = 100.0 * ramp.top
-    drive = CalibrationDrive(deployment, axis, of_speed, ramp)
+    axes = pair_of(deployment, axis or []) if together else tuple(axis or ())
+    if len(axes) != 1 + together or (together and picture):
+        wrong = "--picture: expected none" if picture else "--axis: expected one, or two"
+        raise UsageError(f"{wrong} with --together, got {picture or ', '.join(axes) or 'none'}")
+    title = "Pump, measured" if together else f"Valve of {axes[0]}, calibrated"
+    results = Results(title, deployment, report, picture)
+    signals = {a: speed_signal(deployment, a, s) for a, s in zip_longest(axes, speed or [])}
+    limits = [deployment.axes[one].config.limits for one in axes]
+    usual = min(one.max_pct for one in limits) / 100.0 if together else usual_top(limits[0])
+    rate_per_s = TOGETHER_PER_S if together else RATE_PER_S
+    ramp = Ramp(rate_pct_s / 100.0 if rate_pct_s else rate_per_s, top / 100.0 if top else usual)
+    also = {one: signals[one] for one in axes[1:]}
+    drive = CalibrationDrive(deployment, axes[0], signals[axes[0]], ramp, also)
     if live and not yes:
+        who = f"Axes {' and '.join(axes)}, alone, then at once," if together else f"Axis {axes[0]}"
         typer.confirm(
-            f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"
-            f" {top_pct:.0f} % of its command: in positive direction, at most as far as in"
+            f"{who} will move by itself for {drive.duration_s:.0f} s, up to"
+            f" {100.0 * ramp.top:.0f} % of its command: in positive direction, at most as far as in"
             f" {ramp.travel_s:.1f} s at full deflection, and as far back. Has it that room, is"
             " everybody away, and the enable switch held?",
             abort=True,
         )
-    with progress_bar(axis) as on_progress:
+    with progress_bar(" and ".join(axes)) as on_progress:
 
         def show(now: "CalibrationDrive") -> None:
             waits = f" waits for {now.waiting_for}" if now.waiting_for else ""
-            on_progress(now.progress, f"{axis}{waits}")
+            on_progress(now.progress, f"{' and '.join(axes)}{waits}")
 
         if live:
             run_live(drive, deployment, show)
         else:
-            from canshaper.commissioning.calibration.run import run_simulated
-            from canshaper_sim.parameters import changed_parameters
-
             run_simulated(drive, deployment, changed_parameters(changes or []), show)
-    result = drive.result()
-    if write:  # first: what reads the output may end before its last line
-        bus = deployment.config.buses[deployment.axes[axis].config.valve.bus]
-        write_curve(deployment, axis, result, simulated=not live or bus.is_virtual)
+    drive.check_ended()
+    bus = deployment.config.buses[deployment.axes[axes[0]].config.valve.bus]
+    simulated = not live or bus.is_virtual
+    if together:
+        origin = written_by("calibrate", simulated=simulated) if write else None
+        lines = pump_lines(deployment, axes, [drive.moments], origin)
+        results.print("\n".join(lines), soft_wrap=True)
+    else:
+        _valve(drive, deployment, results, simulated=simulated if write else None)
+    results.write()
+
+
+def _valve(
+    drive: "CalibrationDrive", deployment: "Deployment", results: "Results", simulated: bool | None
+) -> None:
+    """Show the curve of a valve, and write it where it is known whether it is a simulated one."""
+    from canshaper.commissioning.calibration.write import curve_lines, write_curve
+
+    axis, result, top_pct = drive.axis, drive.result(), 100.0 * drive.ramp.top
+    if simulated is not None:  # first: what reads the output may end before its last line
+        write_curve(deployment, axis, result, simulated=simulated)
     results.print("\n".join(curve_lines(deployment, axis, result, top_pct)), soft_wrap=True)
 
     def figure() -> "Figure":
@@ -120,6 +158,5 @@ def calibrate(
 
     if path := results.picture(None, figure):
         results.picture_line(path)
-    if write:
+    if simulated is not None:
         results.print(f"written: {deployment.path}", soft_wrap=True)
-    results.write()

@@ -11,10 +11,11 @@ from canshaper.cli.common import EXIT_WRONG, FILE, echo, loader, print_warnings
 from canshaper.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from canshaper.config.bus import Bus
     from canshaper.config.limits import Motion
+    from canshaper.config.schema import DeploymentConfig
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.used_message import NamedCode
 
@@ -72,7 +73,7 @@ def check(
 
 def _as_dict(deployment: "Deployment") -> dict[str, Any]:
     """Everything as plain data; travel in seconds of full speed."""
-    from canshaper.commissioning.file_warnings import warnings_of
+    from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import stopping
 
     config, loads = (
@@ -97,6 +98,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
             }
             for name, bus in config.buses.items()
         },
+        "hydraulics": config.hydraulics and config.hydraulics.model_dump(exclude_none=True),
         "codes": [code._asdict() for code in deployment.codes],
         "start_values": [one._asdict() for one in deployment.starts],
         "axes": {
@@ -108,6 +110,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
                 "needed_s": one.needed_s,
                 "allowed_s": one.allowed_s,
                 "stop_distance_m": one.stated_m,
+                "ends": (ends := config.axes[one.name].limits.ends) and ends.model_dump(),
             }
             for one in stopping(deployment)
         },
@@ -116,7 +119,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
 
 def _print(deployment: "Deployment") -> None:
     """Everything for people."""
-    from canshaper.commissioning.file_warnings import warnings_of
+    from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import print_stopping
     from canshaper.gate.build import record_of
     from canshaper.report.console import SafeConsole
@@ -138,9 +141,8 @@ def _print(deployment: "Deployment") -> None:
             f"  axis {name}: {config.joysticks[joystick.joystick].message}.{joystick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
-        if sensor := axis.config.sway_sensor:
-            does = "damps" if sensor.use == "damp" else "is watched"
-            echo(f"    sway sensor {sensor.message}.{sensor.signal} {does}")
+        for line in _of_axis(config, name):
+            echo(f"    {line}")
     for motion in config.motion.values():
         echo(_motion(deployment, motion))
     moved = {motion.slew for motion in config.motion.values()}
@@ -162,6 +164,20 @@ def _print(deployment: "Deployment") -> None:
         echo(f"  the gate does not know the checksum of {names}: it is of another package")
     for warning in warnings_of(deployment):
         echo(f"WARNING: {warning}")
+
+
+def _of_axis(config: "DeploymentConfig", name: str) -> "Iterator[str]":
+    """What else is known of an axis, in words."""
+    axis = config.axes[name]
+    if sensor := axis.sway_sensor:
+        does = "damps" if sensor.use == "damp" else "is watched"
+        yield f"sway sensor {sensor.message}.{sensor.signal} {does}"
+    if e := axis.limits.ends:
+        yield f"end stops {e.message}.{e.signal} {e.lowest:g} to {e.highest:g}, margin {e.margin:g}"
+    if oil := config.hydraulics:
+        others = "measured" if oil.others_measured else f"{oil.others:g}"
+        text = f"takes {oil.shares.get(name, 1.0):g} of {oil.flow:g} full axis flows of the pump"
+        yield f"{text}, others {others}"
 
 
 def _print_codes(codes: "Sequence[NamedCode]") -> None:

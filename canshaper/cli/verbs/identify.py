@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 GROUP = "measure"
 
 EXIT_TOO_POOR = 1
+TITLES = ("Swing, identified", "Pump, measured")
 
 
 def identify(
@@ -65,6 +66,9 @@ def identify(
         None, "--first", help="Stopwatch: amplitude at the start, degrees to one side."
     ),
     last_deg: float | None = typer.Option(None, "--last", help="Stopwatch: amplitude at the end."),
+    together: bool = typer.Option(
+        False, "--together", help="Measure the pump; each --signal is the speed of an axis."
+    ),
     out: Path = typer.Option(Path("out/identify"), "--out", help="Directory for the picture."),
     write: bool = typer.Option(False, "--write", help="Write the sway data into the deployment."),
     as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
@@ -83,6 +87,9 @@ def identify(
     compared. A label that is a number is the value of the grapple's signal. Of a folder every log
     in it and below is identified by itself, a folder in it is a machine, and one table says it of
     all and where a period has drifted; exit code 1 where a log cannot be read.
+
+    With --together the logs show two axes alone and at once, without anti-sway, each held for two
+    seconds at full deflection: the flow of the pump, as of canshaper calibrate --together.
 
     Examples:
 
@@ -110,6 +117,7 @@ def identify(
         logged,
         measured_in,
         messages_of,
+        pump_in,
         signals_named,
         timed_by_hand,
     )
@@ -122,15 +130,19 @@ def identify(
         raise UsageError("--write: expected --file too, the deployment to write to, got none")
     if write and file:
         refuse_shipped(file)
-    results = Results(
-        "Swing, identified", deployment, report, picture, quiet=as_json, soft_wrap=True
-    )
+    results = Results(TITLES[together], deployment, report, picture, quiet=as_json, soft_wrap=True)
     options: dict[str, Any] = {"axis": axis, "channel": channel, "about_s": about_s}
     if logs and Path(logs[0]).is_dir():
         of_one = {"--write": write, "--json": as_json, "--picture": picture}
         check_only_folders([*map(Path, logs)], of_one)
         work = partial(identified, file, signal or [], dbc or [], options)
         _fleet([*map(Path, logs)], work, engine(processes, scheduler), out, results)
+        return
+    if together:
+        if deployment is None or as_json or picture:
+            raise UsageError("--together: expected --file, and neither --json nor --picture")
+        results.print(pump_in(deployment, logs or [], signal or [], write=write, channel=channel))
+        results.write()
         return
     with os_errors(out):
         timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}

@@ -1,4 +1,4 @@
-"""Drives one axis through a ramp with the daemon's own controller, and listens to its speed.
+"""Drives axes through a ramp with the daemon's own controller, and listens to their speeds.
 
 Everything that may stop the daemon stops this too: enable, timeouts, emergency stop, a second
 sender, the gate, for which the ramp is the demand. The joystick has to stay in neutral; moving it
@@ -6,12 +6,13 @@ ends the measurement.
 """
 
 import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
+from canshaper.commissioning.calibration.fit import Calibration, Sample, fit, speed_of
 from canshaper.commissioning.calibration.ramp import EndStopDetector, Ramp, SpeedFeedback
+from canshaper.commissioning.calibration.together import Moment
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import CalibrationError, ConfigError
@@ -24,6 +25,8 @@ from canshaper.shaping.states import MOVING, CommandInput, Reason, State
 
 # A command below this is neutral: the ramp begins there.
 NEUTRAL_BAND = 1e-4
+Name = tuple[str, str]
+Names = Mapping[str, Name]
 
 
 class _RampJoystick:
@@ -66,10 +69,13 @@ class CalibrationDrive:
         axis: name of one of its axes.
         speed: (message, signal) of the feedback of its speed.
         ramp: the command.
+        also: the same of another axis by its name: driven alone after the first, then both at once.
 
     Attributes:
         axis: as above.
         ramp: as above.
+        turns, duration_s: axes that each run of the ramp drives, and the time of all runs.
+        moments: demands and speeds of the axes, tick by tick.
         ended: why it is over; empty while it goes on.
         progress: how much of the ramp is done, 0 to 1.
 
@@ -78,53 +84,57 @@ class CalibrationDrive:
     """
 
     def __init__(
-        self, deployment: Deployment, axis: str, speed: tuple[str, str], ramp: Ramp
+        self, deployment: Deployment, axis: str, speed: Name, ramp: Ramp, also: Names | None = None
     ) -> None:
-        _check_top(deployment, axis, ramp)
+        speeds = {axis: speed, **(also or {})}
+        for name in speeds:
+            _check_top(deployment, name, ramp)
         # What may be set while the daemon runs bounds no measurement: the numbers of the file do.
         config = deployment.config.model_copy(update={"control": None})
         deployment = replace(deployment, config=config)
-        self._speed = SpeedFeedback(deployment, axis, *speed)
+        feedback = {name: SpeedFeedback(deployment, name, *one) for name, one in speeds.items()}
         self._controller = Controller(deployment)
         self._guarded = Guarded(self._controller)
-        self._runner = runner = self._controller.axes[axis]
-        period_s = deployment.config.tick_ms / 1000.0 * runner.bound.period_ticks
-        limits = runner.bound.config.limits
-        measured = ShapedAxis(
-            period_s,
-            OutputLimits(
-                limits.max_pct / 100.0, 0.0, limits.rise_per_s, limits.fall_per_s, tail_s=0.0
-            ),
-            sway=None,
-            shaper=Off(),
-            neutral_band=NEUTRAL_BAND,
-            stop_s=1.0,
-            grid_steps=runner.bound.valve.steps,
-        )
-        # Nothing moves but this axis: no other one gets its joystick, nor moves for another one.
+        # Nothing moves but these axes: no other one gets its joystick, nor moves for another one.
         self._joysticks: dict[str, _RampJoystick] = {}
         for name, one in self._controller.axes.items():
             joystick = _RampJoystick(self._controller.joysticks[one.bound.config.command.joystick])
-            one.isolate(joystick, measured if one is runner else None)
+            limits = one.bound.config.limits
+            measured = ShapedAxis(
+                deployment.config.tick_ms / 1000.0 * one.bound.period_ticks,
+                OutputLimits(
+                    limits.max_pct / 100.0, 0.0, limits.rise_per_s, limits.fall_per_s, tail_s=0.0
+                ),
+                sway=None,
+                shaper=Off(),
+                neutral_band=NEUTRAL_BAND,
+                stop_s=1.0,
+                grid_steps=one.bound.valve.steps,
+            )
+            one.isolate(joystick, measured if name in speeds else None)
             self._joysticks[name] = joystick
-        self._joystick = self._joysticks.pop(axis)
+        of, ramped = self._controller.axes, self._joysticks
+        self._driven = {name: (of[name], ramped.pop(name), feedback[name]) for name in speeds}
         self.axis, self.ramp = axis, ramp
+        self.turns = [(name,) for name in speeds] + [tuple(speeds)] * (len(speeds) > 1)
+        self.duration_s = len(self.turns) * ramp.duration_s
+        self.moments: list[Moment] = []
         self._begun_ns: int | None = None
         self._samples: dict[str, list[Sample]] = {}
         self.ended = ""
         self.progress = 0.0
-        self._end = EndStopDetector()
+        self._ends = {name: EndStopDetector() for name in speeds}
 
     @property
     def waiting_for(self) -> str:
         """Condition that the axis still waits for before the ramp begins; empty afterwards."""
         if self._begun_ns is not None:
             return ""
-        axis = self._runner.axis
-        if self._joystick.moved:
-            return Reason.JOYSTICK_NOT_NEUTRAL.name
-        if axis.state is not State.READY:
-            return axis.reason.name
+        for runner, joystick, _ in self._driven.values():
+            if joystick.moved:
+                return Reason.JOYSTICK_NOT_NEUTRAL.name
+            if runner.axis.state is not State.READY:
+                return runner.axis.reason.name
         return f"the joystick of {moved}" if (moved := self._moved) else "feedback"
 
     @property
@@ -139,36 +149,44 @@ class CalibrationDrive:
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; return the frame for the other bus of a gateway, or None."""
-        self._speed.receive(frame, arrived_ns)
+        for *_, speed in self._driven.values():
+            speed.receive(frame, arrived_ns)
         return self._guarded.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run one tick, and yield the frames to send."""
-        axis = self._runner.axis
-        state = axis.state
-        valid = self._speed.valid(now_ns)
-        if self._begun_ns is None and state is State.READY and valid and not self._moved:
+        driven = self._driven.values()
+        valid = all(speed.valid(now_ns) for *_, speed in driven)
+        waits = [one.axis for one, *_ in driven if one.axis.state is not State.READY]
+        if self._begun_ns is None and not waits and valid and not self._moved:
             self._begun_ns = now_ns
+        command, turn = 0.0, self.turns[-1]
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
-            self.progress = min(1.0, time_s / self.ramp.duration_s)
-            self._joystick.deflection = self.ramp.command(time_s)
+            self.progress = min(1.0, time_s / self.duration_s)
+            done, into_s = divmod(time_s, self.ramp.duration_s)
+            turn = self.turns[min(int(done), len(self.turns) - 1)]
             self._sample(time_s)
-            if time_s >= self.ramp.duration_s:
+            # One that another takes the oil of stands too, and had that room before, alone.
+            ramp, part = self.ramp.command(into_s), self.ramp.part(into_s)
+            speed = self._driven[turn[0]][2].value
+            if time_s >= self.duration_s:
                 self.ended = "done"
-            elif state not in MOVING and state is not State.READY:
-                self.ended = f"stopped: {axis.reason.name}"
+            elif stopped := [one.reason.name for one in waits if one.state not in MOVING]:
+                self.ended = f"stopped: {stopped[0]}"
             elif self._moved:
                 self.ended = f"stopped: the joystick of {self._moved} was moved"
             elif not valid:
                 self.ended = "stopped: the feedback fell silent, or reports an error"
-            elif self._is_at_end(time_s):
-                text = f"at {abs(self.ramp.command(time_s)):.0%} of the command it moves no more"
+            elif len(turn) == 1 and self._ends[turn[0]].reached(part, into_s, ramp, speed):
+                text = f"at {abs(ramp):.0%} of the command it moves no more"
                 room = f"give it room for {self.ramp.travel_s:.1f} s at full deflection"
                 self.ended = f"stopped: {text}: its end? {room}"
-            if self.ended:
-                self._joystick.deflection = 0.0
-        self._guarded.demand(self.axis, self._joystick.deflection)
+            if not self.ended and State.STOPPING not in [one.state for one in waits]:
+                command = ramp  # where one stops no other moves on
+        for name, (_, joystick, _) in self._driven.items():
+            joystick.deflection = command if name in turn else 0.0
+            self._guarded.demand(name, joystick.deflection)
         yield from self._guarded.tick(now_ns, missed)
         self._controller.events.clear()
 
@@ -185,17 +203,23 @@ class CalibrationDrive:
         self._guarded.stalled()
 
     def _sample(self, time_s: float) -> None:
-        sent = self._runner.axis.raw / self._runner.bound.valve.steps
-        part = self.ramp.part(time_s)
-        self._samples.setdefault(part, []).append(Sample(sent, self._speed.value))
-
-    def _is_at_end(self, time_s: float) -> bool:
-        part, command = self.ramp.part(time_s), self.ramp.command(time_s)
-        return self._end.reached(part, time_s, command, self._speed.value)
+        moment = [time_s]
+        for name, (one, _, speed) in self._driven.items():
+            sample = Sample(one.axis.raw / one.bound.valve.steps, speed.value)
+            if name == self.axis:
+                self._samples.setdefault(self.ramp.part(time_s), []).append(sample)
+            limits = one.bound.config.limits.output_limits()
+            moment += (speed_of(limits, sample.command), sample.speed)
+        self.moments.append(moment)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve."""
         return self._guarded.neutral_frames()
+
+    def check_ended(self) -> None:
+        """Raise CalibrationError where the ramp was not driven to its end."""
+        if self.ended != "done":
+            raise CalibrationError(f"the measurement was not taken to its end: {self.ended}")
 
     def result(self) -> Calibration:
         """Return the measured valve.
@@ -203,8 +227,7 @@ class CalibrationDrive:
         Raises:
             CalibrationError: it did not go to its end, or makes no curve.
         """
-        if self.ended != "done":
-            raise CalibrationError(f"the measurement was not taken to its end: {self.ended}")
+        self.check_ended()
         rest = [s.speed for s in self._samples.get("rest", [])]
         if len(rest) < 2:
             raise CalibrationError("no feedback came while the axis was at rest")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from canshaper.commissioning.calibration.fit import FULL, Calibration
+from canshaper.commissioning.calibration.fit import FULL, Calibration, speed_of
 from canshaper.report.style import (
     DASHED,
     HEAD_PT,
@@ -20,19 +20,14 @@ from canshaper.report.style import (
     zero_line,
 )
 from canshaper.report.table import axis_title
-from canshaper.shaping.limits import OutputLimits, without_deadband
+from canshaper.shaping.limits import OutputLimits
 
 _HEIGHT_PX = 1250
 
 
 def in_file(limits: OutputLimits, commands_pct: Sequence[float]) -> list[float]:
     """Speed in % of full that the file expects at commands in %."""
-    curve = limits.curve
-    return [
-        100.0
-        * (curve.velocity(c / 100.0) if curve else without_deadband(c / 100.0, limits.deadband))
-        for c in commands_pct
-    ]
+    return [100.0 * speed_of(limits, c / 100.0) for c in commands_pct]
 
 
 def figure(axis: str, limits: OutputLimits, measured: Calibration, top_pct: float) -> Figure:

@@ -20,6 +20,8 @@ from canshaper.machine.inputs import BoundInput
 
 # Slow enough for a lag of 0.3 s, quick enough for a joint that has room for 2 s of full speed.
 RATE_PER_S, TOP = 0.1, 0.4
+# Of two axes at once, which go up to full speed: they have room for 3 s of it.
+TOGETHER_PER_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)

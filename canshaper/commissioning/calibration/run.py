@@ -108,15 +108,16 @@ def run_simulated(
     parameters: CraneParameters | None,
     on_progress: Callable[[CalibrationDrive], None],
 ) -> None:
-    """Drive the axis of the simulated crane, with the enable switch held, to the end.
+    """Drive the axes of the simulated crane, with the enable switch held, to the end.
 
-    Before that it is brought to where it has room for its ramp.
+    Before that they are brought to where they have room for their ramp.
 
     Raises:
         ConfigError: the deployment does not fit the machine.
     """
     plant = PlantNode(deployment, parameters)
-    _give_room(plant, deployment, drive)
+    for axis in drive.turns[-1]:
+        _give_room(plant, deployment, axis, drive.ramp.travel_s)
     joysticks = JoystickNode(deployment, Script("held", (), 1e9))
     lock_step = LockStep(deployment, drive, plant, [joysticks])
     while not drive.ended:
@@ -127,11 +128,11 @@ def run_simulated(
             on_progress(drive)
 
 
-def _give_room(plant: PlantNode, deployment: Deployment, drive: CalibrationDrive) -> None:
+def _give_room(plant: PlantNode, deployment: Deployment, axis: str, travel_s: float) -> None:
     """Bring the axis back with its joystick, as a person does on request."""
-    actuator = plant.crane.boom.axes[drive.axis]
-    back = Script("back", (Stroke(drive.axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
+    actuator = plant.crane.boom.axes[axis]
+    back = Script("back", (Stroke(axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)
     lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand])
-    while actuator.room_s < drive.ramp.travel_s and lock_step.time_ms < 1000 * LONGEST_BACK_S:
+    while actuator.room_s < travel_s and lock_step.time_ms < 1000 * LONGEST_BACK_S:
         lock_step.step()

@@ -1,12 +1,19 @@
-"""A measured valve curve in the file."""
+"""A measured valve curve, or the flow of the pump, in the file."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
 
 from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.calibration.fit import Calibration
+from canshaper.commissioning.calibration.together import KEPT, Drives, measured
 from canshaper.config.origin import note, written_by
 from canshaper.edit.edit import Change, change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 
+# Axes whose speeds are so near to each other slow down alike.
+ALIKE = 0.1
 # Speed of each axis as `canshaper sim` sends it.
 SIMULATED = {
     "slew": "TipVelocity.SlewRate",
@@ -77,3 +84,50 @@ def write_curve(deployment: Deployment, axis: str, result: Calibration, *, simul
     written: Change = (("axes", axis, "limits"), values, note("calibrate"))
     measured = (f"axes.{axis}.limits.{key}" for key in values)
     change(deployment.path, [written, *confirmed(deployment.path, measured)])
+
+
+def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
+    """The two axes that are named, or the first two with a filter; UsageError for others."""
+    filtered = [n for n, one in deployment.config.axes.items() if one.filter.kind != "off"]
+    names = tuple(dict.fromkeys(axes)) or tuple(filtered[:2])
+    if len(names) != 2 or not {*names} <= deployment.axes.keys():
+        got, there = ", ".join(names) or "none", ", ".join(deployment.axes)
+        raise UsageError(f"--together: expected two axes, got {got}; there are {there}")
+    return names
+
+
+def pump_lines(
+    deployment: Deployment, axes: Sequence[str], drives: Drives, origin: dict[str, Any] | None
+) -> list[str]:
+    """Lines on the pump, whose flow is written where an origin is given; errors of ``measured``."""
+    oil = deployment.config.hydraulics
+    shares = {name: oil.shares.get(name, 1.0) if oil else 1.0 for name in deployment.axes}
+    directions, lines = measured(drives, axes, shares), []
+    for ways, kept, asked, (flow, half) in reversed(directions):
+        each = zip(axes, ways, kept, strict=True)
+        parts = (f"{name} {'-+'[way > 0]} {v:.0%} ± {h:.0%}" for name, way, (v, h) in each)
+        of = f"flow {flow:.2f} ± {half:.2f} of {asked:.2f} full axis flows"
+        lines.append(f"at once, of the speed alone: {', '.join(parts)}: {of}")
+    # A budget that is too small costs speed, one that is too large leaves swing.
+    least = math.floor(100.0 * (flow - half)) / 100.0
+    if all(part >= KEPT for direction in directions for part, _ in direction.kept):
+        if asked < KEPT * sum(shares[name] for name in axes):
+            cure = "measure again with a larger --top, or limits.max_pct"
+            return [*lines, f"flow at least {least:g}: that little does not load the pump; {cure}"]
+        every = f"hydraulics: {{ flow: {sum(shares.values()):g} }}"
+        lines.append(f"enough oil for both: flow at least {least:g}; no hydraulics section needed")
+        return [*lines, f"  where all axes have enough, {every} tells canshaper check so"]
+    (low, slower), (high, faster) = sorted(zip((part for part, _ in kept), axes, strict=True))
+    how = "neither alike nor one alone: does something else take oil, or move the load?"
+    if high - low <= ALIKE:
+        how = "the valve shares the flow: both slow down alike"
+    elif high >= KEPT:
+        how = f"plain load sensing: {slower} starves, {faster} keeps its speed"
+    by = ", ".join(f"{name} {shares[name]:g}" for name in axes)
+    lines += [how, f"hydraulics: {{ flow: {least:g} }} # lower end; shares: {by}"]
+    if origin:
+        values: dict[str, Any] = {"flow": least, "origin": origin}
+        written = (("hydraulics",), values, "") if oil else ((), {"hydraulics": values}, "")
+        change(deployment.path, [written, *confirmed(deployment.path, ["hydraulics.flow"])])
+        lines.append(f"written: {deployment.path}")
+    return lines

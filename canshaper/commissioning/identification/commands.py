@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
+from canshaper.commissioning.calibration.fit import speed_of
 from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.series import (
     Array,
@@ -22,7 +23,6 @@ from canshaper.commissioning.identification.series import (
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.limits import without_deadband
 
 # Commands, part of full speed, below which an axis stands.
 STANDS = 0.01
@@ -94,10 +94,7 @@ class Commands:
         """Take a frame that was received."""
         for axis, layout in self._by_valve.get(key, ()):
             if (part := valve_part(axis, layout, data)) is not None:
-                limits = self._limits[axis.name]
-                curve, deadband = limits.curve, limits.deadband
-                speed = curve.velocity(part) if curve else without_deadband(part, deadband)
-                self._valves[axis.name].add(time_s, speed)
+                self._valves[axis.name].add(time_s, speed_of(self._limits[axis.name], part))
         for bus in self._joystick_buses:  # no one has said which channel of the log it is
             if joystick := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
                 for name, value in joystick_commands(joystick, self._axes, data)[1].items():

@@ -7,6 +7,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
 from canshaper.commissioning.identification.canlog import is_simulated, read_can
 from canshaper.commissioning.identification.phone import series_of
 from canshaper.commissioning.identification.series import Series, Value
@@ -152,6 +155,26 @@ def logged(
                 finding.at = float(label)
         findings.append(finding)
     return findings
+
+
+def pump_in(
+    deployment: Deployment, logs: Sequence[str], signals: Sequence[str], *, write: bool, **of: Any
+) -> str:
+    """What the pump delivers, by logs with the speeds of two axes; see ``pump_lines``."""
+    speeds, drives = signals_named(signals, deployment), []
+    axes = pair_of(deployment, [*speeds])
+    names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
+    for _, path in map(_labelled, logs):
+        shown = read_can(path, "", names, deployment.messages, deployment=deployment, **of)
+        columns = [time_s := shown[axes[0]].time_s]
+        for name, one in shown.items():
+            if one.command is None or not len(one.time_s):
+                raise IdentificationError(f"{path}: expected commands and speeds of {name}")
+            columns.append(np.interp(time_s, one.command.time_s, one.command.speed))
+            columns.append(np.interp(time_s, one.time_s, one.value))
+        drives.append(np.stack(columns, axis=1).tolist())
+    origin = measured_in(logs, deployment.messages) if write else None
+    return "\n".join(pump_lines(deployment, axes, drives, origin))
 
 
 def measured_in(logs: Sequence[str], messages: Messages) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from canshaper.commissioning.assumed import confirmed
-from canshaper.commissioning.file_warnings import warnings_of
+from canshaper.commissioning.likely_mistakes import warnings_of
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
 from canshaper.config.source import Source
@@ -110,7 +110,7 @@ def figure(axes: list[Stopping]) -> Figure:
 CHECK = Step(
     "check",
     "Check",
-    "as `canshaper check`: stopping distances, bus load, what does not fit",
+    "as `canshaper check`: stopping distances, bus load, what does not fit, oil not yet measured",
     run,
     writes="`max_pct: 40`, for the first motion; `stop_distance_m` as allowed by you",
     needs=(FILE,),

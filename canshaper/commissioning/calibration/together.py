@@ -1,0 +1,146 @@
+"""The oil of one pump: two axes are driven alone, then at once.
+
+What each keeps of its own speed says what the pump delivers, and how the valve shares that. Speeds
+stand for flows: the file's valve curve says which part of full speed a command asks for.
+"""
+
+import math
+import statistics
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+from canshaper.errors import CalibrationError
+
+# Parts: of full speed, below which an axis stands; of its largest demand, from which it is held; of
+# its speed alone, which it keeps where it is not slowed down.
+STANDS, HELD, KEPT = 0.01, 0.95, 0.95
+# A held speed has settled after so long; then its means over BIN_S count as independent. Of five
+# of them 2.8 standard errors are an interval of 95 %, but commands and speeds have steps.
+SETTLING_S, BIN_S, LEAST_BINS, ERRORS, LEAST_HALF = 0.5, 0.1, 5, 3.0, 0.01
+# Between these parts of its largest demand, which changes by no more than SLOW in SLOW_S, an axis
+# alone shows whether it still gets faster up to the largest.
+LOWER, SLOW, SLOW_S, SATURATED = (0.7, 0.85), 0.2, 0.3, 0.9
+# States of an axis; the last three times its direction.
+STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
+
+Moment = Sequence[float]
+"""Time in s, rising; of each of two axes demand on its valve, part of full speed, and speed."""
+
+Drives = Sequence[Sequence[Moment]]
+Mean = tuple[float, float]
+"""A value and half the width of its interval of 95 %."""
+
+
+class Direction(NamedTuple):
+    """Both at once: ways, 1 or -1; parts kept of the speeds alone; flows in full axis flows."""
+
+    ways: tuple[int, int]
+    kept: list[Mean]
+    asked: float
+    flow: Mean
+
+
+# Demands and speeds of each axis, means over BIN_S, by the states of both.
+Bins = list[tuple[float, float]]
+Seen = Mapping[tuple[int, ...], tuple[Bins, Bins]]
+
+
+def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[Direction]:
+    """Measure what a pump delivers, in each direction of both axes; first where it is least.
+
+    Args:
+        drives: of each axis alone, and of both at once.
+        axes: the two.
+        shares: what each takes at full speed, full axis flows.
+
+    Raises:
+        CalibrationError: a drive is missing, or nothing can be told of them.
+    """
+    seen = _seen(drives)
+    directions = []
+    for one, other in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
+        needed = seen[one, STANDING][0], seen[STANDING, other][1], *seen[one, other]
+        if min(map(len, needed)) >= LEAST_BINS:
+            directions.append(_direction(axes, (one, other), seen, shares))
+    if not directions:
+        text = f"expected {axes[0]} alone, {axes[1]} alone and both at once, in the same directions"
+        raise CalibrationError(f"{text}, each held for two seconds at its largest command")
+    return sorted(directions, key=lambda one: one.flow)
+
+
+def _direction(
+    axes: Sequence[str], ways: tuple[int, int], seen: Seen, shares: Mapping[str, float]
+) -> Direction:
+    kept, asked, rises = [], [], True
+    for i, (name, way) in enumerate(zip(axes, ways, strict=True)):
+        alone = [seen[(s * way, 0) if i == 0 else (0, s * way)][i] for s in (AT_MOST, UP, DOWN)]
+        zero = statistics.fmean([speed for _, speed in seen[STANDING, STANDING][i]] or [0.0])
+        own, own_half = _gain(alone[0], zero)
+        both, both_half = _gain(seen[ways][i], zero)
+        if abs(own) <= 2.0 * own_half:
+            text = f"{name} alone: expected a steady speed, got {own:.3g} ± {own_half:.2g} of full"
+            raise CalibrationError(f"{text}; is that its feedback, and is it at no end?")
+        # A lag makes it slower on the way up, and faster on the way down.
+        lower = [_gain(bins, zero)[0] for bins in alone[1:] if bins]
+        rises = rises and len(lower) == 2
+        if len(lower) == 2 and abs(own) < SATURATED * abs(statistics.fmean(lower)):
+            full, part = 100.0 * abs(alone[0][0][0]), 100.0 * LOWER[0]
+            text = f"{name} alone hardly gets faster up to {full:.0f} % of full speed: its valve or"
+            cure = f"drive both up to {part:.0f} % of that only (--top), or calibrate the valve"
+            raise CalibrationError(f"{text} the pump gives no more, so no flow is known; {cure}")
+        half = math.hypot(both_half, both / own * own_half) / abs(own)
+        kept.append((both / own, max(half, LEAST_HALF)))
+        asked.append(shares[name] * statistics.fmean(abs(demand) for demand, _ in seen[ways][i]))
+    got = [(share * part, share * half) for share, (part, half) in zip(asked, kept, strict=True)]
+    flow, half = sum(part for part, _ in got), math.hypot(*(half for _, half in got))
+    if not rises and flow - half <= max(asked) / KEPT:
+        text = f"flow at most {flow:.2f}, what one axis takes, which may lack oil alone too"
+        cure = "drive each alone slowly up to its largest command and back, as calibrate does"
+        raise CalibrationError(f"{text}; {cure}")
+    return Direction(ways, kept, sum(asked), (flow, half))
+
+
+def _gain(bins: Bins, zero: float) -> Mean:
+    gains = [(speed - zero) / demand for demand, speed in bins]
+    spread = statistics.stdev(gains) if len(gains) > 1 else 0.0
+    return statistics.fmean(gains), ERRORS * spread / math.sqrt(len(gains))
+
+
+def _seen(drives: Drives) -> Seen:
+    every = list(zip([0.0] * 5, *chain(*drives), strict=True))
+    most = [{1: max(one), -1: -min(one)} for one in every[1::2]]
+    bins: dict[tuple[int, ...], list[Moment]] = defaultdict(list)
+    number = 0
+    for drive in drives:
+        states: tuple[int, ...] = ()
+        since_s, before = 0.0, 0
+        for moment in drive:
+            time_s = moment[0]
+            while time_s - drive[before][0] > SLOW_S:
+                before += 1
+            now = tuple(map(_state, moment[1::2], drive[before][1::2], most))
+            if now != states:
+                states, since_s, number = now, time_s, number + 1
+            settled = time_s - since_s >= SETTLING_S or {UP, DOWN} & {*map(abs, now)}
+            if settled:
+                bins[*now, number, int((time_s - since_s) / BIN_S)].append(moment)
+    seen: Seen = defaultdict(lambda: ([], []))
+    for (one, other, *_), part in bins.items():
+        _, *means = map(statistics.fmean, zip(*part, strict=True))
+        for axis, demand, speed in zip(seen[one, other], means[::2], means[1::2], strict=True):
+            axis.append((demand, speed))
+    return seen
+
+
+def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
+    """State of an axis by its demand, and by that of SLOW_S before."""
+    way, change = 1 if demand > 0.0 else -1, abs(demand) - abs(before)
+    if abs(demand) < STANDS:
+        return STANDING
+    if abs(demand) >= HELD * most[way]:
+        return AT_MOST * way
+    if LOWER[0] <= abs(demand) / most[way] <= LOWER[1] and abs(change) <= SLOW:
+        return (DOWN if change < 0.0 else UP) * way
+    return BETWEEN

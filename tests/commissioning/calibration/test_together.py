@@ -1,0 +1,410 @@
+"""The flow of a pump, and how its valve shares it, out of drives of two axes; in the file."""
+
+import math
+import random
+import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.codec.frame import Frame
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.ramp import TOGETHER_PER_S, Ramp
+from canshaper.commissioning.calibration.together import Direction, Moment, measured
+from canshaper.commissioning.calibration.write import pump_lines
+from canshaper.commissioning.simulated import log_simulated
+from canshaper.config.origin import Origin, written_by
+from canshaper.errors import CalibrationError, ConfigError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.hand import Hand, Held
+from canshaper_sim.operator import Script, Stroke
+from canshaper_sim.parameters import changed_parameters
+from tests.cli.invocation import invoke
+
+ROOT = Path(__file__).parents[3]
+AXES = ("slew", "near_far")
+ONE = {"slew": 1.0, "near_far": 1.0}
+SPEEDS = {"slew": ("TipVelocity", "SlewRate"), "near_far": ("TipVelocity", "RadialSpeed")}
+TICK_S, LAG_S = 0.02, 0.1
+FULL = (0.5, -1.2)  # speeds of the feedback, of which one counts the other way round
+RESTS = (0.03, 0.0)  # what it shows at rest
+Demands = list[tuple[float, float]]
+Sharing = Callable[[Sequence[float], float], list[float]]
+
+
+def alike(asked: Sequence[float], flow: float) -> list[float]:
+    part = min(1.0, flow / max(sum(map(abs, asked)), 1e-9))
+    return [part * one for one in asked]
+
+
+def starving(asked: Sequence[float], flow: float) -> list[float]:
+    """The second axis takes what it needs, the first one gets the rest."""
+    last = math.copysign(min(abs(asked[1]), flow), asked[1])
+    return [math.copysign(min(abs(asked[0]), flow - abs(last)), asked[0]), last]
+
+
+def ramped(top: float = 1.0) -> Demands:
+    """As calibrate drives: the first axis, the second, both."""
+    ramp = Ramp(TOGETHER_PER_S, top)
+    ticks = [ramp.command(TICK_S * k) for k in range(round(ramp.duration_s / TICK_S))]
+    return [(v, 0.0) for v in ticks] + [(0.0, v) for v in ticks] + [(v, v) for v in ticks]
+
+
+def driven(*strokes: tuple[float, float]) -> Demands:
+    """As a driver does: each held for two seconds at once, and a second of rest."""
+    return [demands for one in strokes for demands in [(0.0, 0.0)] * 50 + [one] * 100]
+
+
+def drive(
+    demands: Demands,
+    flow: float,
+    shares: Sharing = alike,
+    *,
+    noise: float = 0.0,
+    most: float = 1.0,
+    takes: tuple[float, float] = (1.0, 1.0),
+    seed: int = 1,
+) -> list[Moment]:
+    """A drive of valves that give no more than ``most``, with the lag and the noise of speeds."""
+    hand, speeds, moments = random.Random(seed), [0.0, 0.0], []
+    for k, asked in enumerate(demands):
+        flows = [t * max(-most, min(most, one)) for t, one in zip(takes, asked, strict=True)]
+        got = [one / t for t, one in zip(takes, shares(flows, flow), strict=True)]
+        moment = [TICK_S * k]
+        for i in range(2):
+            speeds[i] += TICK_S / LAG_S * (got[i] - speeds[i])
+            shown = FULL[i] * (speeds[i] + hand.gauss(0.0, noise)) + RESTS[i]
+            moment += [asked[i], shown]
+        moments.append(moment)
+    return moments
+
+
+def found(moments: list[Moment]) -> list[Direction]:
+    return measured([moments], AXES, ONE)
+
+
+@pytest.mark.parametrize(
+    ("shares", "kept"), [(alike, (0.6, 0.6)), (starving, (0.2, 1.0))], ids=["alike", "starving"]
+)
+def test_flow_and_sharing_are_found_in_both_directions(
+    shares: Sharing, kept: tuple[float, float]
+) -> None:
+    directions = found(drive(ramped(), 1.2, shares))
+    assert {one.ways for one in directions} == {(1, 1), (-1, -1)}
+    for one in directions:
+        assert [part for part, _ in one.kept] == pytest.approx(kept, abs=0.01)
+        assert one.flow == pytest.approx((1.2, 0.015), abs=0.01)
+        assert one.asked == pytest.approx(2.0, abs=0.03)
+
+
+def test_the_truth_lies_in_the_interval() -> None:
+    hits = widths = 0.0
+    for seed in range(12):
+        for one in found(drive(ramped(), 1.2, noise=0.1, seed=seed)):
+            flow, half = one.flow
+            hits += abs(flow - 1.2) <= half
+            widths += half / 24
+    assert hits >= 22
+    assert 0.03 <= widths <= 0.3
+
+
+def test_an_axis_counts_by_its_share() -> None:
+    moments = drive(ramped(), 1.2, takes=(1.0, 0.5))
+    both = measured([moments], AXES, {"slew": 1.0, "near_far": 0.5})[0]
+    assert both.flow[0] == pytest.approx(1.2, abs=0.02)
+    assert both.asked == pytest.approx(1.5, abs=0.02)
+
+
+def test_the_least_direction_comes_first() -> None:
+    def weaker(asked: Sequence[float], flow: float) -> list[float]:
+        return alike(asked, flow if sum(asked) > 0.0 else 0.8 * flow)
+
+    assert [one.ways for one in found(drive(ramped(), 1.4, weaker))] == [(-1, -1), (1, 1)]
+
+
+def test_drives_of_a_driver_may_be_opposite_and_in_several_logs() -> None:
+    alone, both = driven((1.0, 0.0), (0.0, -1.0)), driven((0.99, -1.0))
+    logs = [drive(alone, 1.5), drive(both, 1.5)]
+    [one] = measured(logs, AXES, ONE)
+    assert (one.ways, one.flow[0]) == ((1, -1), pytest.approx(1.5, abs=0.01))
+
+
+@pytest.mark.parametrize("what", [{"most": 0.8}, {"flow": 0.8}], ids=["valve", "pump"])
+def test_an_axis_that_gets_no_faster_alone_is_refused(what: dict[str, float]) -> None:
+    says = r"slew alone hardly gets faster up to 100 % .* up to 70 % of that only \(--top\)"
+    with pytest.raises(CalibrationError, match=says):
+        found(drive(ramped(), **({"flow": 1.2} | what)))
+    within = found(drive(ramped(0.7), **({"flow": 0.8} | what)))
+    assert within[0].flow[0] == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_pump_that_one_axis_may_empty_is_not_believed_unseen() -> None:
+    strokes = (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)
+    with pytest.raises(CalibrationError, match=r"flow at most 1\.00, what one axis takes"):
+        found(drive(driven(*strokes), 0.8))
+    quick = [0.1 * k for k in range(11)]
+    rows = [
+        [(v * a, v * b) for v in [*quick, *[1.0] * 100, *quick[::-1], *[0.0] * 50]]
+        for a, b in strokes
+    ]
+    with pytest.raises(CalibrationError, match=r"flow at most 1\.00"):
+        found(drive([*rows[0], *rows[1], *rows[2]], 0.8))
+    assert found(drive(ramped(), 1.0))[0].flow[0] == pytest.approx(1.0, abs=0.01)
+    assert found(drive(driven(*strokes), 1.1))[0].flow[0] == pytest.approx(1.1, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "strokes",
+    [
+        [(1.0, 0.0), (1.0, 1.0)],
+        [(1.0, 0.0), (0.0, 1.0)],
+        [(1.0, 0.0), (0.0, -1.0), (1.0, 1.0)],
+        [(1.0, 0.0), (0.0, 0.9), (1.0, 1.0)],  # not so far as at once
+    ],
+)
+def test_a_drive_that_is_missing_is_named(strokes: list[tuple[float, float]]) -> None:
+    with pytest.raises(CalibrationError, match="expected slew alone, near_far alone and both"):
+        found(drive(driven(*strokes), 1.2))
+
+
+def test_a_feedback_of_nothing_is_refused() -> None:
+    still = [[*moment[:4], RESTS[1]] for moment in drive(ramped(), 1.2)]
+    with pytest.raises(CalibrationError, match="near_far alone: expected a steady speed, got 0 "):
+        found(still)
+
+
+def lines(
+    moments: list[Moment], file: Path = ROOT / "config/forwarder-robust.yaml", **origin: Any
+) -> list[str]:
+    return pump_lines(load_deployment(file), AXES, [moments], origin or None)
+
+
+@pytest.mark.parametrize(
+    ("moments", "says"),
+    [
+        (drive(ramped(), 1.2), "the valve shares the flow: both slow down alike"),
+        (drive(ramped(), 1.2, starving), "plain load sensing: slew starves, near_far keeps its"),
+        (
+            drive(ramped(), 1.2, lambda asked, _: [0.5 * asked[0], 0.8 * asked[1]]),
+            "neither alike nor one alone",
+        ),
+    ],
+    ids=["alike", "starving", "neither"],
+)
+def test_the_lines_say_how_it_is_shared(moments: list[Moment], says: str) -> None:
+    if says.startswith("neither"):  # alone nothing is lost
+        alone = [(a, b) if bool(a) != bool(b) else None for _, a, _, b, _ in moments]
+        full = drive(ramped(), 2.0)
+        moments = [f if a else m for a, f, m in zip(alone, full, moments, strict=True)]
+    assert says in "\n".join(lines(moments))
+
+
+def test_enough_oil_and_a_pump_that_was_not_loaded_are_no_flow() -> None:
+    enough = lines(drive(ramped(), 3.0), **written_by("calibrate", simulated=True))
+    assert enough[2].startswith("enough oil for both: flow at least 1.9")
+    assert "hydraulics: { flow: 3 } tells canshaper check so" in enough[3]
+    few = lines(drive(ramped(0.4), 1.2))
+    assert few[2].startswith("flow at least 0.7")
+    assert few[2].endswith(
+        "does not load the pump; measure again with a larger --top, or limits.max_pct"
+    )
+    assert not [line for line in enough + few if line.startswith(("hydraulics", "written"))]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    text = (ROOT / "config/forwarder-robust.yaml").read_text(encoding="utf-8")
+    (copy := tmp_path / "machine.yaml").write_text(text.replace("../dbc", str(ROOT / "dbc")))
+    return copy
+
+
+@pytest.mark.parametrize("before", ["", "hydraulics: { flow: 3, shares: { lift: 0.5 } } # guess\n"])
+def test_the_flow_goes_into_the_file_rounded_down(file: Path, before: str) -> None:
+    file.write_text(file.read_text() + before + "assumed: [hydraulics.flow]\n" * bool(before))
+    origin = written_by("calibrate", simulated=False)
+    said = lines(drive(ramped(), 1.2), file, **origin)
+    assert said[-2:] == [
+        "hydraulics: { flow: 1.17 } # lower end; shares: slew 1, near_far 1",
+        f"written: {file}",
+    ]
+    config = load_deployment(file).config
+    assert config.hydraulics
+    assert (config.hydraulics.flow, config.hydraulics.origin) == (1.17, Origin(**origin))
+    assert config.hydraulics.shares == ({"lift": 0.5} if before else {})
+    assert not config.assumed
+
+
+# --- the drive ------------------------------------------------------------------------------------
+
+RAMP = Ramp(rate_per_s=1.0, top=0.2, rest_s=0.5)
+
+
+def sent(deployment: Deployment, moved_s: float = math.inf) -> tuple[CalibrationDrive, list[Any]]:
+    """Frames of slew, near-far and lift, tick by tick; near-far's joystick is moved at a time."""
+    drive = CalibrationDrive(deployment, "slew", SPEEDS["slew"], RAMP, {AXES[1]: SPEEDS[AXES[1]]})
+    hand, ticks = Hand(deployment), []
+    for tick in range(round(drive.duration_s / TICK_S) + 60):
+        joysticks = {"near_far": 0.5} if tick * TICK_S >= moved_s else {}
+        for frame in hand.frames(tick * 20, Held(joysticks, enable=True)):
+            drive.receive(frame, tick * 20_000_000)
+        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * 20_000_000)
+        frames = {frame.can_id: frame.data[0] for frame in drive.tick(tick * 20_000_000)}
+        ticks.append([frames[can_id] for can_id in (0x200, 0x201, 0x202)])
+    return drive, ticks
+
+
+def test_each_is_driven_alone_and_then_both() -> None:
+    drive, ticks = sent(load_deployment(ROOT / "config/forwarder-robust.yaml"))
+    assert drive.ended == "done"
+    moves = [tuple(map(bool, tick)) for tick in ticks]
+    order = [one for k, one in enumerate(moves) if any(one) and one != moves[k - 1]]
+    assert (
+        order == [(True, False, False)] * 2 + [(False, True, False)] * 2 + [(True, True, False)] * 2
+    )
+    assert not any(map(any, moves[-30:]))
+    most = [max(moment[i] for moment in drive.moments) for i in (1, 3)]
+    assert most == pytest.approx([(0.2 - 0.05) / 0.95] * 2, abs=0.01)  # of full speed
+
+
+def test_a_joystick_that_is_moved_stops_both() -> None:
+    at_s = 2.0 * RAMP.duration_s + 1.2
+    drive, ticks = sent(load_deployment(ROOT / "config/forwarder-robust.yaml"), at_s)
+    number = round(at_s / TICK_S)
+    assert all(ticks[number - 10][:2])
+    assert not any(map(any, ticks[number + 8 :]))
+    assert drive.ended == "stopped: STOP_DONE"
+
+
+def test_the_limits_of_both_axes_bound_the_ramp(file: Path) -> None:
+    text = file.read_text().partition("  near_far:")
+    slower = text[2].replace("deadband_pct: 5", "max_pct: 15, deadband_pct: 5", 1)
+    file.write_text("".join((*text[:2], slower)))
+    with pytest.raises(ConfigError, match=r"near_far\.limits\.max_pct: expected a ramp"):
+        sent(load_deployment(file))
+
+
+@pytest.mark.slow
+def test_the_pump_of_the_simulated_crane_is_measured_and_written(file: Path) -> None:
+    options = ("--together", "--top", "20", "--set", "pump_flow=0.2", "--write")
+    shown = invoke("calibrate", str(file), *options)
+    assert shown.exit_code == 0, shown.output
+    config = load_deployment(file).config
+    assert config.hydraulics
+    assert config.hydraulics.flow == pytest.approx(0.195, abs=0.01)
+    warned = invoke("check", str(file)).stdout
+    assert "hydraulics.origin: measured on a simulated crane; measure it on the machine" in warned
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["forwarder-robust", "forwarder-pump"])
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (["pump_flow=1.2"], "flow: 1.18"),
+        (["pump_flow=1.2", "pump.shares_flow=0", "slew.lag_s=0.2"], "slew starves"),
+        (["pump_flow=1.5", "pump.lag_s=0.2"], "flow: 1.4"),
+        (["pump_flow=3"], "enough oil for both"),
+        (["pump_flow=0.8"], "hardly gets faster"),
+        (["slew.flow_limit=0.7"], "slew alone hardly gets faster"),
+    ],
+)
+def test_simulated_pumps_are_told_apart(name: str, changes: list[str], says: str) -> None:
+    options = [word for change in changes for word in ("--set", change)]
+    shown = invoke("calibrate", str(ROOT / f"config/{name}.yaml"), "--together", *options)
+    assert says in shown.output
+    assert shown.exit_code == ("hardly" in says)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ((), "--axis: expected one, or two with --together, got none"),
+        (("--axis", "slew", "--axis", "lift"), "or two with --together, got slew, lift"),
+        (("--together", "--axis", "slew"), "--together: expected two axes, got slew; there are"),
+        (("--together", "--axis", "slew", "--axis", "boom"), "got slew, boom; there are slew,"),
+        (("--together", "--picture", "a.png"), "--picture: expected none with --together"),
+        (("--together", *("--speed", "A.B") * 3), "--axis: expected an axis, got None"),
+    ],
+)
+def test_wrong_options_are_reported(options: tuple[str, ...], says: str) -> None:
+    shown = invoke("calibrate", str(ROOT / "config/forwarder-robust.yaml"), *options)
+    assert shown.exit_code == 2
+    assert says in shown.output
+
+
+# --- a log ----------------------------------------------------------------------------------------
+
+
+def logged(path: Path, moments: list[Moment], *, commands: bool = True) -> Path:
+    """The drive in frames of valves and speeds, as the forwarder sends them."""
+    rows = []
+    for time_s, slew, slew_speed, near_far, near_far_speed in moments:
+        at = f"({time_s:.6f}) vcan0"
+        raws = [
+            round(125 * math.copysign(0.05 + 0.95 * abs(v), v)) if v else 0
+            for v in (slew, near_far)
+        ]
+        for can_id, raw in zip((0x200, 0x201), raws, strict=True):
+            rows += [f"{at} {can_id:03X}#{raw & 0xFF:02X}00"] * commands
+        data = struct.pack("<hhh", round(1e4 * slew_speed), round(1e3 * near_far_speed), 0)
+        rows.append(f"{at} 402#{data.hex()}")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def test_a_log_of_a_driver_shows_the_pump(tmp_path: Path, file: Path) -> None:
+    alone, both = driven((-1.0, 0.0), (0.0, 1.0)), driven((-1.0, 1.0))
+    logs = [
+        str(logged(tmp_path / "alone.log", drive(alone, 1.2, starving))),
+        str(logged(tmp_path / "both.log", drive(both, 1.2, starving))),
+    ]
+    shown = invoke("identify", *logs, "--file", str(file), "--together", "--write")
+    assert shown.exit_code == 0, shown.output
+    assert "slew - 20% ± 1%, near_far + 100% ± 1%: flow 1.20 ± 0.01 of 2.00" in shown.output
+    assert "slew starves, near_far keeps its speed" in shown.output
+    oil = load_deployment(file).config.hydraulics
+    assert oil is not None
+    assert oil.origin is not None
+    assert (oil.flow, oil.origin.log) == (pytest.approx(1.18, abs=0.011), "alone.log, both.log")
+    named = [f"--signal={axis}={'.'.join(SPEEDS[axis])}" for axis in reversed(AXES)]
+    again = invoke("identify", *logs, "--file", str(file), "--together", *named)
+    assert "near_far + 100% ± 1%, slew - 20% ± 1%" in again.output
+    lacks = invoke("identify", logs[1], "--file", str(file), "--together")
+    assert (lacks.exit_code, "expected near_far" in lacks.output) == (1, False)
+    assert "expected slew alone, near_far alone and both at once" in lacks.output
+
+
+def test_a_log_without_commands_and_without_a_file_says_so(tmp_path: Path, file: Path) -> None:
+    log = str(logged(tmp_path / "a.log", drive(driven((1.0, 0.0)), 2.0), commands=False))
+    shown = invoke("identify", log, "--file", str(file), "--together")
+    assert shown.exit_code == 2
+    assert "a.log: expected commands and speeds of slew" in shown.output
+    for wrong in ([], ["--file", str(file), "--json"], ["--file", str(file), "--picture", "a.png"]):
+        shown = invoke("identify", log, "--together", *wrong)
+        assert "--together: expected --file, and neither --json nor --picture" in shown.output
+        assert shown.exit_code == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (["pump_flow=1.2"], "both slow down alike"),
+        (["pump_flow=1.2", "pump.shares_flow=0"], "slew starves, near_far keeps its speed"),
+        (["pump_flow=3"], "enough oil for both"),
+        (["pump_flow=0.9"], "flow at most 1.00"),
+    ],
+)
+def test_a_drive_of_the_simulated_crane_shows_its_pump(
+    tmp_path: Path, file: Path, changes: list[str], says: str
+) -> None:
+    strokes = [("near_far", 1.0, -0.8), ("slew", 6.0, 1.0), ("near_far", 11.0, 1.0)]
+    strokes += [("near_far", 16.0, -1.0), ("slew", 21.0, 1.0), ("near_far", 21.0, 1.0)]
+    script = Script("pump", tuple(Stroke(n, at, 2.5, v) for n, at, v in strokes), 26.0)
+    log, crane = tmp_path / "drive.log", changed_parameters(changes)
+    log_simulated(log, load_deployment(file), crane, script, bypass=True)
+    shown = invoke("identify", str(log), "--file", str(file), "--together")
+    assert says in shown.output
