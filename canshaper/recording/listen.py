@@ -3,7 +3,8 @@
 import select
 import socket
 import time
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -21,12 +22,15 @@ from canshaper.bus.packet import (
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can
 from canshaper.bus.socketcan import dropped_frames, open_sockets
+from canshaper.bus.waiting import MOST_FAILURES, waiting
 from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 
 # Frames read from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
+# So many errors of an interface with no frame and no silence between them: the bus is gone.
+MOST_ERRORS = 10 * MOST_FAILURES
 # Of every signal that asks us to end, the next one must not wait for a frame.
 LOOK_S = 0.2
 # How often an interface is polled that has no file to wait for.
@@ -74,13 +78,17 @@ class Listener:
 
     Attributes:
         lost: frames that the kernel could not keep for us.
+        errors: what interfaces of python-can raised in place of a frame, by bus.
+        last_error: the last of them, with its bus.
 
     Raises:
         BusError: a bus cannot be opened.
     """
 
     def __init__(self, buses: Iterable[tuple[str, Bus]]) -> None:
-        self.lost = 0
+        self.lost, self.last_error = 0, ""
+        self.errors: Counter[str] = Counter()
+        self._failing: Counter[str] = Counter()  # those without anything since, by bus
         self._sockets: dict[Any, tuple[str, str]] = {}
         self._files: list[Any] = []
         for name, bus in buses:
@@ -116,28 +124,59 @@ class Listener:
             raise BusError(f"cannot read: {error}") from error
         received: list[ReceivedFrame] = []
         for one, (name, channel) in self._sockets.items():
-            try:
-                receive = _raw if isinstance(one, socket.socket) else _python_can
-                for _ in range(MOST_AT_ONCE):
-                    frame = receive(one, name, channel)
-                    if frame is None:
-                        break
-                    received.append(frame)
-            except (OSError, can.CanError) as error:
-                text = getattr(error, "strerror", None) or str(error)
-                raise BusError(f"bus {name}: cannot read {channel}: {text}") from error
+            if isinstance(one, socket.socket):
+                received += self._raw(one, name, channel)
+            else:
+                received += self._python_can(one, name, channel)
         raw = [one for one in self._sockets if isinstance(one, socket.socket)]
         self.lost = dropped_frames(raw)
         received.sort(key=lambda frame: frame.time_ns)
         return received
 
+    def _raw(self, one: socket.socket, name: str, channel: str) -> Iterator[ReceivedFrame]:
+        """Frames of SocketCAN.
+
+        Raises:
+            BusError: the interface is down or gone.
+        """
+        try:
+            for _ in range(MOST_AT_ONCE):
+                if (frame := _raw(one, name, channel)) is None:
+                    return
+                yield frame
+        except OSError as error:
+            raise _unreadable(name, channel, error) from error
+
+    def _python_can(self, one: can.BusABC, name: str, channel: str) -> Iterator[ReceivedFrame]:
+        """Frames of python-can; an error of its interface is counted.
+
+        Raises:
+            BusError: it raises nothing but errors.
+        """
+        for message in waiting(one, MOST_AT_ONCE):
+            if not isinstance(message, Exception):
+                self._failing[name] = 0
+                if message is not None:
+                    yield _python_can(message, name, channel)
+                continue
+            self.errors[name] += 1
+            self._failing[name] += 1
+            self.last_error = f"bus {name}: {type(message).__name__} {message}".rstrip()
+            if self._failing[name] == MOST_ERRORS:
+                raise _unreadable(name, channel, message) from message
+
     def close(self) -> None:
         """Close the buses."""
         for one in self._sockets:
-            with suppress(can.CanError, OSError):
+            with suppress(Exception):  # each interface raises its own kinds
                 one.close() if isinstance(one, socket.socket) else one.shutdown()
         self._sockets.clear()
         self._files.clear()
+
+
+def _unreadable(name: str, channel: str, error: Exception) -> BusError:
+    text = getattr(error, "strerror", None) or str(error)
+    return BusError(f"bus {name}: cannot read {channel}: {text}")
 
 
 def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
@@ -157,11 +196,8 @@ def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
     return ReceivedFrame(time_ns, bus, channel, can_id, extended, payload, remote, flags)
 
 
-def _python_can(one: can.BusABC, bus: str, channel: str) -> ReceivedFrame | None:
-    """The next frame of python-can; None when none waits."""
-    message = one.recv(0)
-    if message is None:
-        return None
+def _python_can(message: can.Message, bus: str, channel: str) -> ReceivedFrame:
+    """A frame of python-can."""
     time_ns = round(message.timestamp * 1e6) * 1000
     can_id, extended, kind = message.arbitration_id, message.is_extended_id, ""
     flags = None

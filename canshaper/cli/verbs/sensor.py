@@ -142,8 +142,7 @@ def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
     with Live(console=SafeConsole(stderr=True), refresh_per_second=4) as shown:
 
         def report(so_far: Recording) -> bool:
-            text = f"{so_far.seconds:.0f} s, {so_far.frames.total()} frames"
-            shown.update(f"listening, drive now: {text} (Ctrl-C ends it)")
+            shown.update(f"listening, drive now: {so_far} (Ctrl-C ends it)")
             return not stop.requested
 
         recording.run(log, seconds, report)

@@ -1,0 +1,131 @@
+"""Interfaces that fail now and then: each error costs a line, is counted, and ends nothing."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import pytest
+
+from canshaper.bus.port import open_port
+from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.commissioning.monitor.run import run_plain
+from canshaper.commissioning.nodes.parameters import _connected
+from canshaper.config.bus import Bus
+from canshaper.errors import BusError
+from canshaper.recording.listen import Listener
+from canshaper.recording.log import read_log
+from canshaper.recording.record import Recording
+from tests.bus.lines import SerialLine, until
+
+GARBLED = [
+    b"t1108ZZ00000001000000\r",  # no digits
+    b"boot: hello\r",  # of the adapter's own program
+    b"t11\r",  # the end is missing
+    b"\xfft1101AA\r",  # no text: slcan keeps it
+    b"t9\xe9\xe9\r",
+]
+GOOD = b"t1102%02X00\r"
+
+
+@pytest.fixture
+def line() -> Iterator[SerialLine]:
+    made = SerialLine()
+    yield made
+    made.close()
+
+
+def slcan(line: SerialLine) -> Bus:
+    return Bus(interface="slcan", channel=line.path, options={"sleep_after_open": 0.0})
+
+
+@contextmanager
+def listening(line: SerialLine) -> Iterator[Listener]:
+    listener = Listener([("crane", slcan(line))])
+    try:
+        yield listener
+    finally:
+        listener.close()
+
+
+@pytest.mark.parametrize("text", GARBLED)
+def test_a_garbled_line_costs_that_line(line: SerialLine, text: bytes) -> None:
+    frames = []
+    with listening(line) as listener:
+        line.write(GOOD % 1 + text + GOOD % 2)
+        until(lambda: frames.extend(listener.frames(0.0)) or len(frames) == 2)
+    assert [frame.data[0] for frame in frames] == [1, 2]
+    assert listener.errors == {"crane": 1}
+    assert listener.last_error.startswith("bus crane: ")
+    assert "Error" in listener.last_error
+
+
+@pytest.mark.processes
+def test_a_daemon_reads_on_behind_what_is_no_text(line: SerialLine) -> None:
+    faults: list[FrameFault] = []
+    port = open_port("crane", slcan(line), faults.append)
+    frames: list[Frame] = []
+    try:
+        line.write(b"".join(GARBLED) + GOOD % 2)
+        until(lambda: frames.extend(port.frames()) or frames)
+    finally:
+        port.close()
+    assert [frame.data[0] for frame in frames] == [2]
+    assert faults == [FrameFault.BUS_ERROR] * len(GARBLED)
+
+
+def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path) -> None:
+    deployment = loader("forwarder.yaml", "slcan", [line.path])()
+    deployment.config.buses["crane"].options["sleep_after_open"] = 0.0
+    recording, written = Recording(deployment), iter((*GARBLED, *(GOOD % i for i in range(3))))
+
+    def going(so_far: Recording) -> bool:
+        line.write(next(written, b""))
+        return so_far.frames.total() < 3
+
+    recording.run(tmp_path / "drive.log", 30.0, going)
+    assert [frame.data[0] for frame in read_log(tmp_path / "drive.log")] == [0, 1, 2]
+    assert f"3 frames, {len(GARBLED)} ERRORS of the interface, the last bus crane: " in str(
+        recording
+    )
+
+
+def test_a_monitor_says_it(line: SerialLine) -> None:
+    deployment = loader("forwarder.yaml", "slcan", [line.path])()
+    deployment.config.buses["crane"].options["sleep_after_open"] = 0.0
+    said: list[str] = []
+
+    def going() -> bool:
+        line.write(GARBLED[0] * (not said))
+        return not said
+
+    run_plain(deployment, said.append, going)
+    assert "bus crane: ValueError" in said[0]
+
+
+def test_a_bus_that_does_nothing_but_fail_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Gone:
+        def recv(self, _timeout_s: float) -> None:
+            raise OSError(5, "Input/output error")
+
+        def shutdown(self) -> None:
+            raise RuntimeError("closed twice")
+
+    monkeypatch.setattr(can, "Bus", lambda **_: Gone())
+    listener = Listener([("crane", Bus(interface="kvaser", channel="0"))])
+    with pytest.raises(BusError, match="bus crane: cannot read 0: Input/output error"):
+        for _ in range(100):
+            assert listener.frames(0.0) == []
+    assert listener.errors["crane"] == 200
+    listener.close()
+
+
+@pytest.mark.processes
+def test_nodes_answer_behind_a_garbled_line(line: SerialLine) -> None:
+    with _connected(slcan(line)) as network:
+        received: list[int] = []
+        network.subscribe(0x110, lambda _id, data, _time: received.append(data[0]))
+        line.write(b"".join(GARBLED[:3]) + GOOD % 7)
+        until(lambda: received)
+    assert received == [7]
