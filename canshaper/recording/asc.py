@@ -49,6 +49,7 @@ _ASC = re.compile(
 )
 _ASC_ERROR = re.compile(r"\s*\d+\.\d+\s+(?:\d+|CANFD\s+\d+\s+\S+)\s+ErrorFrame", re.IGNORECASE)
 _ASC_FD = re.compile(r"\s*(\d+)\.(\d{1,9})\s+CANFD\s+(\d+)\s+(Rx|Tx|TxRq)\s+(\S+)\s+(.*)", re.ASCII)
+_BEFORE = re.compile(r"\s*-\d+\.\d+\s+(?:\d+|CANFD)\s", re.ASCII)
 _STAMP = re.compile(r"\s*(\d{1,10})\.(\d{1,9})\s", re.ASCII)
 ASC_NUMBERS = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with numbers"
 
@@ -73,9 +74,7 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             on_fd = True
             kind = "r" if count == "R" else "d"
         else:
-            if header := _BASE.match(line):
-                base = 10 if header[1].lower() == "dec" else 16
-                relative = bool(header[2]) and header[2].lower() == "relative"
+            base, relative = _read_on(line, base, relative, place)
             continue
         if direction == "TxRq":  # asked for, not yet on the bus; its Tx follows
             continue
@@ -93,6 +92,16 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         if not fits(can_id, extended=extended):
             raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with an x behind")
         yield TimedFrame(time_ns, channel, can_id, extended, payload)
+
+
+def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, bool]:
+    """Base of the numbers, and whether times are relative, behind a line without a frame."""
+    if header := _BASE.match(line):
+        base = 10 if header[1].lower() == "dec" else 16
+        relative = bool(header[2]) and header[2].lower() == "relative"
+    elif _BEFORE.match(line):
+        place.left_out["before the start"] += 1
+    return base, relative
 
 
 def _numbers(

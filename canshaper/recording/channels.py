@@ -127,13 +127,15 @@ class Place:
         path: the log.
         unit: what is counted: lines or frames.
         number: the one that is being read, from 1.
-        left_out: frames that are no data frames, by kind.
+        left_out: frames that are no data frames, and lines of tools among them, by kind.
+        notes: what else one has to know of the log.
     """
 
     path: Path
     unit: str = "line"
     number: int = 0
     left_out: Counter[str] = field(default_factory=Counter)
+    notes: list[str] = field(default_factory=list)
 
     def error(self, got: str, expected: str) -> LogError:
         """Return an error at this place of the log."""

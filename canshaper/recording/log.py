@@ -5,11 +5,12 @@ A million lines take no more memory than a hundred.
 
 import gzip
 import zlib
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE, getincrementaldecoder
 from collections import Counter
 from collections.abc import Callable, Iterator
 from io import BufferedReader, RawIOBase
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from canshaper.errors import CutOffError, LogError
 from canshaper.recording import asc, binary, blf, candump, tables, trc
@@ -17,7 +18,7 @@ from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 
-READERS: dict[str, Callable[[BinaryIO, Place], Iterator[TimedFrame]]] = {
+READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
     ".log": candump.candump,
     ".asc": asc.asc,
     ".blf": blf.blf,
@@ -46,7 +47,8 @@ class LogFile:
         progress: called now and then with the part that is read, 0 to 1.
 
     Attributes:
-        left_out: frames that are no data frames, by kind; of the last iteration.
+        left_out: frames that are no data frames, and lines of tools among them, by kind; of the
+            last iteration.
         disordered: frames that stand behind a later one, by up to ``OUT_OF_ORDER_NS``; they are
             handed out in the order of the file, with the time of that later one.
     """
@@ -54,6 +56,7 @@ class LogFile:
     def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
         self.left_out: Counter[str] = Counter()
         self.disordered = 0
+        self._notes: list[str] = []
         self._path = path
         self._progress = progress
 
@@ -65,7 +68,7 @@ class LogFile:
             LogError: the log cannot be used.
         """
         place = Place(self._path)
-        self.left_out, self.disordered = place.left_out, 0
+        self.left_out, self._notes, self.disordered = place.left_out, place.notes, 0
         try:
             yield from self._frames(place)
         except EOFError:
@@ -78,6 +81,15 @@ class LogFile:
         except zlib.error as error:
             raise place.error(f"damaged packing ({error})", "a log that is whole") from None
 
+    def warnings(self) -> Iterator[str]:
+        """Yield what to know of the last iteration, before its frames are believed."""
+        yield from self._notes
+        if self.left_out:
+            counts = ", ".join(f"{count} {kind}" for kind, count in self.left_out.items())
+            yield f"what is no data frame is left out: {counts}"
+        if self.disordered:
+            yield f"{self.disordered} frames stand behind later ones; the log's order counts"
+
     def _frames(self, place: Place) -> Iterator[TimedFrame]:
         """Its frames, whose times never go back."""
         packed, suffix = _format(place)
@@ -86,9 +98,11 @@ class LogFile:
         with self._path.open("rb", buffering=0) as raw:
             size = raw.seek(0, 2)
             raw.seek(0)
-            file: BinaryIO = BufferedReader(raw, BUFFER_BYTES)
+            file: BufferedReader[Any] = BufferedReader(raw, BUFFER_BYTES)
             if packed:
                 file = BufferedReader(_Unpacked(file), BUFFER_BYTES)
+            if suffix not in BINARY:
+                file = _utf8(file)
             last_ns: int | None = None
             latest_ns = 0
             for frame in READERS[suffix](file, place):
@@ -141,7 +155,7 @@ class _UnpackedWithoutEndError(Exception):
 class _Unpacked(RawIOBase):
     """Unpacked content of a gzip file; of a file that is cut off, all of it before the error."""
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, file: BufferedReader) -> None:
         self._packed = file
         self._file = gzip.GzipFile(fileobj=file)
         self._count = 0
@@ -165,6 +179,41 @@ class _Unpacked(RawIOBase):
 
     def tell(self) -> int:
         return self._file.tell()
+
+
+def _utf8(file: BufferedReader) -> BufferedReader:
+    """A text without its byte order mark, in UTF-8 where that is one of UTF-16."""
+    head = file.peek(4)[:4]
+    if head.startswith(BOM_UTF8):
+        file.read(len(BOM_UTF8))
+    # PowerShell writes such a log with ">"; without a mark the zeros of its letters show it.
+    little, big = head[1:2] == b"\0", head[:1] == b"\0"
+    if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return BufferedReader(_FromUtf16(file, "utf-16"), BUFFER_BYTES)
+    if little or big:
+        return BufferedReader(_FromUtf16(file, "utf-16-le" if little else "utf-16-be"))
+    return file
+
+
+class _FromUtf16(RawIOBase):
+    """UTF-8 of a text in UTF-16."""
+
+    def __init__(self, file: BufferedReader, encoding: str) -> None:
+        self._file = file
+        self._decoder = getincrementaldecoder(encoding)("replace")
+        self._text, self._ended = b"", False
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        while not (self._text or self._ended):
+            data = self._file.read1()
+            self._ended = not data
+            self._text = self._decoder.decode(data, self._ended).encode("utf-8", "replace")
+        count = min(len(buffer), len(self._text))
+        buffer[:count], self._text = self._text[:count], self._text[count:]
+        return count
 
 
 def read_log(path: Path, progress: Callable[[float], None] | None = None) -> Iterator[TimedFrame]:

@@ -190,11 +190,7 @@ class Replay:
             yield f"{self.cut_off}; replayed up to there"
         for name in self._missing():
             yield f"no joystick frame of {name}"
-        if self.log.left_out:
-            counts = ", ".join(f"{count} {kind}" for kind, count in self.log.left_out.items())
-            yield f"frames that are no data frames are left out: {counts}"
-        if self.log.disordered:
-            yield f"{self.log.disordered} frames stand behind later ones; the log's order counts"
+        yield from self.log.warnings()
 
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
         """Frames of the log on the buses of the deployment, but those that no daemon sees."""

@@ -3,7 +3,7 @@
 import re
 from base64 import b64decode
 from binascii import unhexlify
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from decimal import Decimal
 from typing import BinaryIO, TextIO
 
@@ -21,13 +21,12 @@ CSV_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 # SavvyCAN before 2018 had no column for the direction.
 GVRET_HEADERS = ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1", "Time Stamp,ID,Extended,Bus,LEN,D1")
 _GVRET = re.compile(
-    rb"(\d{1,19}),([0-9A-Fa-f]{1,8}),(true|false|[01]),(?:[RT]x,)?(\d+),(\d{1,2}),"
+    rb"(-?\d{1,19}),([0-9A-Fa-f]{1,8}),(true|false|[01]),(?:[RT]x,)?(\d+),(\d{1,2}),"
     rb"((?:[0-9A-Fa-f]{1,2},)*[0-9A-Fa-f]{0,2})\s*",
     re.IGNORECASE,
 )
+WRAP_NS = (1 << 32) * 1000  # of a clock of 32 bits that counts microseconds
 _TRUE = frozenset((b"true", b"1"))
-Reader = Callable[[bytes, Place], TimedFrame | None]
-
 _new = tuple.__new__  # TimedFrame(...) in half the time
 
 
@@ -39,17 +38,27 @@ def is_log(header: str) -> bool:
 def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     """A table by its header."""
     rows = lines(file, place)
-    header = next(rows, b"").strip().decode("utf-8", "replace").removeprefix("\ufeff")
+    header = next(rows, b"").strip().decode("utf-8", "replace")
     if header == CSV_HEADER:
-        read: Reader = _python_can
+        yield from filter(None, (_python_can(row, place) for row in rows))
     elif header.startswith(GVRET_HEADERS):
-        read = _gvret
+        yield from _unwrapped(filter(None, (_gvret(row, place) for row in rows)))
     else:
         expected = f"the header of python-can, {CSV_HEADER}, or of GVRET, {GVRET_HEADERS[0]}..."
         raise place.error(shown(header.encode()), expected)
-    for row in rows:
-        if (frame := read(row, place)) is not None:
-            yield frame
+
+
+def _unwrapped(frames: Iterator[TimedFrame]) -> Iterator[TimedFrame]:
+    """Frames of a clock of 32 bits, signed or not: from 0 where it began below, and on over it."""
+    offset_ns: int | None = None
+    before_ns = 0
+    for frame in frames:
+        if offset_ns is None:
+            offset_ns = before_ns = max(0, -frame.time_ns)
+        elif before_ns - frame.time_ns - offset_ns > WRAP_NS // 2:
+            offset_ns += WRAP_NS
+        before_ns = frame.time_ns + offset_ns
+        yield frame._replace(time_ns=before_ns) if offset_ns else frame
 
 
 def _python_can(row: bytes, place: Place) -> TimedFrame | None:
