@@ -5,13 +5,14 @@ A million lines take no more memory than a hundred.
 
 import gzip
 import zlib
-from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE, getincrementaldecoder
+from codecs import getincrementaldecoder
 from collections import Counter
 from collections.abc import Callable, Iterator
 from io import BufferedReader, RawIOBase
 from pathlib import Path
 from typing import Any
 
+from canshaper.config.source import encoding_of
 from canshaper.errors import CutOffError, LogError
 from canshaper.recording import asc, binary, blf, candump, tables, trc
 from canshaper.recording.channels import LATEST_S, Place, TimedFrame
@@ -101,8 +102,9 @@ class LogFile:
             file: BufferedReader[Any] = BufferedReader(raw, BUFFER_BYTES)
             if packed:
                 file = BufferedReader(_Unpacked(file), BUFFER_BYTES)
-            if suffix not in BINARY:
-                file = _utf8(file)
+            # PowerShell writes UTF-16 with ">".
+            if suffix not in BINARY and (encoding := encoding_of(file.peek(4)[:4])):
+                file = BufferedReader(_Utf8(file, encoding), BUFFER_BYTES)
             last_ns: int | None = None
             latest_ns = 0
             for frame in READERS[suffix](file, place):
@@ -181,22 +183,8 @@ class _Unpacked(RawIOBase):
         return self._file.tell()
 
 
-def _utf8(file: BufferedReader) -> BufferedReader:
-    """A text without its byte order mark, in UTF-8 where that is one of UTF-16."""
-    head = file.peek(4)[:4]
-    if head.startswith(BOM_UTF8):
-        file.read(len(BOM_UTF8))
-    # PowerShell writes such a log with ">"; without a mark the zeros of its letters show it.
-    little, big = head[1:2] == b"\0", head[:1] == b"\0"
-    if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
-        return BufferedReader(_FromUtf16(file, "utf-16"), BUFFER_BYTES)
-    if little or big:
-        return BufferedReader(_FromUtf16(file, "utf-16-le" if little else "utf-16-be"))
-    return file
-
-
-class _FromUtf16(RawIOBase):
-    """UTF-8 of a text in UTF-16."""
+class _Utf8(RawIOBase):
+    """UTF-8, without a mark, of a text in another encoding."""
 
     def __init__(self, file: BufferedReader, encoding: str) -> None:
         self._file = file
