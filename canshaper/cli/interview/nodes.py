@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from cantools.database.can import Message
 
     from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
+    from canshaper.commissioning.nodes.eds import Eds
     from canshaper.commissioning.nodes.node import Node, Pdo
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.commissioning.nodes.use import MessageTiming
@@ -40,17 +41,15 @@ class Nodes:
         self.named: dict[str, Node] = {}
         self.messages: list[Message] = []
         self._pdos: dict[str, tuple[str, Pdo]] = {}
-        for path in files:
-            self._add(path)
+        for eds in _read(files):
+            self._add(eds)
 
-    def _add(self, path: Path) -> None:
+    def _add(self, eds: "Eds") -> None:
         from canshaper.commissioning.nodes import messages
-        from canshaper.commissioning.nodes.eds import Eds
         from canshaper.commissioning.nodes.node import Node
 
-        eds = Eds(path)
-        likely = _likely_name(path.stem, self.named)
-        name = ask(f"{path.name}: name of the node", _name(self.named), likely)
+        likely = _likely_name(eds.path.stem, self.named)
+        name = ask(f"{eds.path.name}: name of the node", _name(self.named), likely)
         ids = [node.id for node in self.named.values()]
         free = next(number for number in range(_FIRST, _LAST + 1) if number not in ids)
         node_id = ask(f"{name}: node id", _node_id(ids), str(eds.node or free))
@@ -184,6 +183,19 @@ def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str
         if axis.sensor:
             add(axis.sensor.message, axis.sensor.timeout_ms)
     return uses
+
+
+def _read(files: Sequence[Path]) -> "list[Eds]":
+    """Read files; one that cannot be used is said before there is any question."""
+    if not files:
+        return []
+    from canshaper.commissioning.nodes.eds import Eds
+    from canshaper.commissioning.nodes.node import Node
+
+    read = [Eds(path) for path in files]
+    for eds in read:
+        Node(eds, eds.node or _FIRST)
+    return read
 
 
 def _label(pdo: "Pdo", key: tuple[int, int]) -> str | None:

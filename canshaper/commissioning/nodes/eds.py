@@ -13,15 +13,24 @@ from pathlib import Path
 from canopen.objectdictionary import ObjectDictionary
 from canopen.objectdictionary.eds import import_eds
 
-from canshaper.config.source import read_bounded
+from canshaper.config.source import encoding_of, read_bounded
 from canshaper.errors import ConfigError, Problem
 
 # What canopen thinks of types that no PDO has is not for the operator's terminal.
 logging.getLogger("canopen.objectdictionary").setLevel(logging.ERROR)
 MOST_BYTES = 4 << 20
 _OBJECT = re.compile(r"([0-9A-F]{4})(sub[0-9A-F]+)?", re.IGNORECASE)
-_OF_OBJECTS = re.compile(r"[0-9A-F]{1,4}(sub[0-9A-F]+|Name|Value)?", re.IGNORECASE)
+_OF_OBJECTS = re.compile(r"([0-9A-F]{1,4})(?:(sub(?=.)|Name$|Value$)([0-9A-F]*))?", re.IGNORECASE)
 _NODE = "DeviceComissioning"  # as the standard spells it
+_COMPACT = "CompactSubObj"
+_OF_ELEMENTS = ("DataType", "AccessType", "DefaultValue", "PDOMapping", "LowLimit", "HighLimit")
+_MAY_BE_EMPTY = {_COMPACT, "ObjectType", "PDOMapping", "LowLimit", "HighLimit", "SubNumber"}
+_KEYS = {
+    key.lower(): key
+    for key in (*_OF_ELEMENTS, *_MAY_BE_EMPTY, "ParameterName", "ParameterValue", "NodeID")
+}
+_PARTS = {part.lower(): part for part in ("", "sub", "Name", "Value")}
+_MOST_ELEMENTS = 254
 _VARIABLES = (0x2, 0x7)  # DOMAIN, VAR
 
 
@@ -43,15 +52,22 @@ class Eds:
         self.path = path
         data = read_bounded(path, MOST_BYTES)
         try:
-            self._text = data.decode("utf-8-sig")
+            self._text = data.decode(encoding_of(data[:4]) or "utf-8")
         except UnicodeDecodeError:
             self._text = data.decode("latin-1")
+        if self._text.lstrip().startswith("<"):
+            text = "expected an EDS or DCF, got XML; export an EDS of an XDD or XDC"
+            raise ConfigError([Problem(str(path), 1, "", text)])
         self._file = configparser.RawConfigParser(inline_comment_prefixes=(";",))
         self._file.optionxform = str  # type: ignore[method-assign,assignment]
         try:
             self._file.read_string(self._text)
         except configparser.Error as error:
             raise self._not_one(error) from None
+        self._file = _canonical(self._file)
+        for name in self._file.sections():
+            if _OBJECT.fullmatch(name):
+                self._expand(name)
         sections = [name for name in self._file.sections() if _OBJECT.fullmatch(name)]
         if not sections:
             raise self._wrong("", "expected objects, such as [1000], got none; not an EDS or DCF")
@@ -85,9 +101,12 @@ class Eds:
         return objects
 
     def problem(self, section: str, text: str) -> Problem:
-        """A problem at a section, with its line."""
-        pattern = re.compile(rf"^\s*\[{re.escape(section)}\]", re.IGNORECASE | re.MULTILINE)
-        place = pattern.search(self._text) if section else None
+        """A problem at a section, with its line; of an element without one that of its array."""
+        place = None
+        for name in (section, section.partition("sub")[0]):
+            if section and not place:
+                row = rf"^\s*\[{re.escape(name)}\]"
+                place = re.search(row, self._text, re.IGNORECASE | re.MULTILINE)
         line = self._text.count("\n", 0, place.end()) + 1 if place else None
         return Problem(str(self.path), line, f"[{section}]" if section else "", text)
 
@@ -101,6 +120,33 @@ class Eds:
         got = self._text.splitlines()[line - 1].strip()[:40] if line else "another"
         text = "expected sections of KEY=VALUE, each once, as an EDS or DCF has them"
         return ConfigError([Problem(str(self.path), line, "", f"{text}, got {got!r}")])
+
+    def _expand(self, section: str) -> None:
+        """Give an array its elements, where the file has one section for all of them."""
+        file, options = self._file, self._file[section]
+        count = self._whole(section, _COMPACT, options.pop(_COMPACT, "0"))
+        if not 0 <= count <= _MOST_ELEMENTS:
+            raise self._wrong(
+                section, f"{_COMPACT}: expected {_MOST_ELEMENTS} at most, got {count}"
+            )
+        if not count:
+            return
+        common = {key: value for key, value in options.items() if key in _OF_ELEMENTS}
+        common |= {"ParameterName": "Entries", "ObjectType": "0x7"}
+        number = {"DataType": "0x5", "AccessType": "ro", "DefaultValue": str(count)}
+        elements = {0: common | number | {"PDOMapping": "0"}}
+        for n in range(1, count + 1):
+            name = options.get("ParameterName", "") + f" {n}"
+            elements[n] = common | {
+                "ParameterName": file.get(f"{section}Name", str(n), fallback=name)
+            }
+            if value := file.get(f"{section}Value", str(n), fallback=""):
+                elements[n]["ParameterValue"] = value
+        for n, element in elements.items():
+            if not file.has_section(f"{section}sub{n:X}"):
+                file[f"{section}sub{n:X}"] = element
+        for names in ("Name", "Value"):
+            file.remove_section(section + names)
 
     def _check(self, section: str) -> None:
         """Check what canopen would report with an error that names no section."""
@@ -125,3 +171,21 @@ class Eds:
             return int(text, 0)
         except ValueError:
             raise self._wrong(section, f"{key}: expected a whole number, got {text!r}") from None
+
+
+def _canonical(file: configparser.RawConfigParser) -> configparser.RawConfigParser:
+    """A file with sections and keys as the standard writes them, without those that are empty."""
+    result = configparser.RawConfigParser()
+    result.optionxform = str  # type: ignore[method-assign,assignment]
+    for section in file.sections():
+        name = _NODE if section.lower() == _NODE.lower() else section
+        if match := _OF_OBJECTS.fullmatch(section):
+            index, part, subindex = match.groups("")
+            name = index.upper() + _PARTS[part.lower()] + subindex.upper()
+        if not result.has_section(name):
+            result.add_section(name)
+        for key, value in file[section].items():
+            known = _KEYS.get(key.lower(), key)
+            if value or known not in _MAY_BE_EMPTY:
+                result[name][known] = value
+    return result

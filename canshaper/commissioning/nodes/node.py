@@ -106,7 +106,8 @@ class Node:
         self.pdos = [*self._pdos(RECEIVE), *self._pdos(TRANSMIT)]
         if not self.pdos:
             why = ", ".join(self.left_out) or "none"
-            none = eds.problem("", f"expected a PDO with objects, got {why}")
+            text = f"expected a PDO with objects, got {why}; map some, and export the DCF"
+            none = eds.problem("", text)
             raise ConfigError(self.faults or [none])
 
     def variable(self, index: int, subindex: int) -> ODVariable | None:
