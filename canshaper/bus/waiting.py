@@ -1,7 +1,4 @@
-"""What waits on a bus of python-can: an error of its interface costs what it stands for, no more.
-
-Who reads such a bus reads it by this: daemon, tools and simulator.
-"""
+"""What waits on a bus of python-can: an error of its interface costs one frame, no more."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,11 +11,7 @@ MOST_FAILURES = 20
 
 
 def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
-    """The next frame of a bus, or None where none comes in time.
-
-    Raises:
-        Exception: each interface raises its own kinds.
-    """
+    """The next frame of a bus, or None where none comes in time; raises as the interface does."""
     try:
         message: can.Message | None = bus.recv(timeout_s)
     except Exception as error:
@@ -30,12 +23,7 @@ def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
 
 
 def waiting(bus: Any, most: int) -> Iterator[can.Message | Exception | None]:
-    """Yield every frame that waits, or what the interface raised in its place; None at the end.
-
-    Args:
-        bus: of python-can.
-        most: frames; with these, or ``MOST_FAILURES``, there is no None.
-    """
+    """Yield what waits, or what the interface raised in its place; None where nothing waits."""
     failures = 0
     for _ in range(most):
         try:
@@ -45,7 +33,7 @@ def waiting(bus: Any, most: int) -> Iterator[can.Message | Exception | None]:
             failures += 1
             if failures == MOST_FAILURES:
                 return
-            continue
-        yield message
-        if message is None:
-            return
+        else:
+            yield message
+            if message is None:
+                return

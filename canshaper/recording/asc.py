@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import BinaryIO
 
-from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame, fits
+from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 
 SECOND_NS = 1_000_000_000
 # Far longer than any line of a log; a file without line ends must not fill the memory.
@@ -29,11 +29,6 @@ def lines(file: BinaryIO, place: Place, *, last: bool = False) -> Iterator[bytes
             if not last:
                 raise place.cut_off(f"no line end after {shown(line)}")
         yield line
-
-
-def id_text(can_id: int) -> str:
-    """An id that is none."""
-    return f"id {can_id:#x}"
 
 
 def shown(line: bytes) -> str:
@@ -87,11 +82,7 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             can_id, length, payload = _numbers(number, count, data, base, fd=on_fd)
         except ValueError:
             raise place.error(shown(raw), ASC_NUMBERS) from None
-        if len(payload) < length:
-            raise place.error(f"{len(payload)} of {length} bytes", "all of them")
-        if not fits(can_id, extended=extended):
-            raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with an x behind")
-        yield TimedFrame(time_ns, channel, can_id, extended, payload)
+        yield place.checked(TimedFrame(time_ns, channel, can_id, extended, payload), length)
 
 
 def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, bool]:

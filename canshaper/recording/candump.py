@@ -8,7 +8,7 @@ from io import BufferedReader
 from itertools import pairwise
 
 from canshaper.codec.frame import ERR_FLAG
-from canshaper.recording.asc import SECOND_NS, id_text, lines, shown
+from canshaper.recording.asc import SECOND_NS, lines, shown
 from canshaper.recording.channels import Place, TimedFrame, fits
 
 _new = tuple.__new__  # TimedFrame(...) in half the time
@@ -112,7 +112,7 @@ def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] |
     if extended and can_id & ERR_FLAG:
         return None
     if not fits(can_id, extended=extended):
-        raise place.error(id_text(can_id), "an id of 11 bits in 3 digits, or of 29 in 8")
+        raise place.error(f"id {can_id:#x}", "an id of 11 bits in 3 digits, or of 29 in 8")
     return channel.decode("ascii", "replace"), can_id, extended
 
 
@@ -141,11 +141,9 @@ def _screen(line: bytes, place: Place) -> TimedFrame | None:
     if source is None or data.startswith(b"remote"):
         place.left_out["error" if source is None else "remote"] += 1
         return None
-    payload = bytes.fromhex(data.decode("ascii"))
-    if len(payload) < int(length):
-        raise place.error(f"{len(payload)} of {int(length)} bytes", "all of them")
+    # What looks like bytes behind them is the text of -a.
+    payload = bytes.fromhex(data.decode("ascii"))[: int(length)]
     day, seconds, fraction = time.groups()
     whole = int(datetime.fromisoformat(day).timestamp()) if day else int(seconds)
     time_ns = whole * SECOND_NS + int(fraction.ljust(9, "0"))
-    # What looks like bytes behind them is the text of -a.
-    return TimedFrame(time_ns, *source, payload[: int(length)])
+    return place.checked(TimedFrame(time_ns, *source, payload), int(length))

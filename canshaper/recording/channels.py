@@ -145,6 +145,19 @@ class Place:
         """The log ends here, in the middle of something."""
         return CutOffError(f"{self}: the log is cut off: {reason}")
 
+    def checked(self, frame: TimedFrame, length: int) -> TimedFrame:
+        """The frame, whose log says that it has so many bytes.
+
+        Raises:
+            LogError: it has not, or its id has no room in its bits.
+        """
+        if len(frame.data) != length or length > MOST_BYTES:
+            raise self.error(f"{len(frame.data)} of {length} bytes", "all of them")
+        if not fits(frame.can_id, extended=frame.extended):
+            expected = "an id of 11 bits, or of an extended frame of 29"
+            raise self.error(f"id {frame.can_id:#x}", expected)
+        return frame
+
     def __str__(self) -> str:
         if not self.number:  # nothing is read yet: it is about the whole file
             return str(self.path)

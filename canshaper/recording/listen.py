@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from itertools import islice
 from typing import Any, NamedTuple
 
 import can
@@ -124,35 +125,19 @@ class Listener:
             raise BusError(f"cannot read: {error}") from error
         received: list[ReceivedFrame] = []
         for one, (name, channel) in self._sockets.items():
-            if isinstance(one, socket.socket):
-                received += self._raw(one, name, channel)
-            else:
-                received += self._python_can(one, name, channel)
+            read = _raw if isinstance(one, socket.socket) else self._python_can
+            try:
+                received += islice(read(one, name, channel), MOST_AT_ONCE)
+            except (OSError, can.CanError) as error:
+                text = getattr(error, "strerror", None) or str(error)
+                raise BusError(f"bus {name}: cannot read {channel}: {text}") from error
         raw = [one for one in self._sockets if isinstance(one, socket.socket)]
         self.lost = dropped_frames(raw)
         received.sort(key=lambda frame: frame.time_ns)
         return received
 
-    def _raw(self, one: socket.socket, name: str, channel: str) -> Iterator[ReceivedFrame]:
-        """Frames of SocketCAN.
-
-        Raises:
-            BusError: the interface is down or gone.
-        """
-        try:
-            for _ in range(MOST_AT_ONCE):
-                if (frame := _raw(one, name, channel)) is None:
-                    return
-                yield frame
-        except OSError as error:
-            raise _unreadable(name, channel, error) from error
-
     def _python_can(self, one: can.BusABC, name: str, channel: str) -> Iterator[ReceivedFrame]:
-        """Frames of python-can; an error of its interface is counted.
-
-        Raises:
-            BusError: it raises nothing but errors.
-        """
+        """Frames of python-can; an error of its interface is counted, until it is nothing else."""
         for message in waiting(one, MOST_AT_ONCE):
             if not isinstance(message, Exception):
                 self._failing[name] = 0
@@ -163,7 +148,7 @@ class Listener:
             self._failing[name] += 1
             self.last_error = f"bus {name}: {type(message).__name__} {message}".rstrip()
             if self._failing[name] == MOST_ERRORS:
-                raise _unreadable(name, channel, message) from message
+                raise can.CanOperationError(getattr(message, "strerror", None) or str(message))
 
     def close(self) -> None:
         """Close the buses."""
@@ -174,17 +159,15 @@ class Listener:
         self._files.clear()
 
 
-def _unreadable(name: str, channel: str, error: Exception) -> BusError:
-    text = getattr(error, "strerror", None) or str(error)
-    return BusError(f"bus {name}: cannot read {channel}: {text}")
+def _raw(one: socket.socket, bus: str, channel: str) -> Iterator[ReceivedFrame]:
+    """Frames of SocketCAN that wait."""
+    with suppress(BlockingIOError):
+        while True:
+            yield _of_socket(*one.recvmsg(FD_SIZE, ANCILLARY_BYTES)[:2], bus, channel)
 
 
-def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
-    """The next frame of SocketCAN; None when none waits."""
-    try:
-        data, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
-    except BlockingIOError:
-        return None
+def _of_socket(data: bytes, ancillary: Any, bus: str, channel: str) -> ReceivedFrame:
+    """A frame of SocketCAN."""
     stamp = stamp_ns(ancillary)
     time_ns = time.time_ns() if stamp is None else stamp
     word, payload, flags = Packet.unpack(data)

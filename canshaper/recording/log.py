@@ -14,21 +14,24 @@ from typing import Any
 
 from canshaper.config.source import encoding_of
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording import asc, binary, blf, candump, tables, trc
+from canshaper.recording import asc, binary, blf, loggers, pcap, tables, trc
 from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 
 READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
-    ".log": candump.candump,
+    ".log": loggers.log,
     ".asc": asc.asc,
     ".blf": blf.blf,
     ".csv": tables.csv,
     ".db": binary.database,
     ".mf4": binary.mf4,
     ".trc": trc.trc,
+    ".txt": loggers.kvaser,
+    ".pcap": pcap.pcap,
+    ".pcapng": pcap.pcap,
 }
-BINARY = frozenset((".blf", ".db", ".mf4"))
+BINARY = frozenset((".blf", ".db", ".mf4", ".pcap", ".pcapng"))
 # Two sockets of one logger are not read in the order in which their frames came.
 OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.

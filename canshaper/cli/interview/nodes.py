@@ -41,8 +41,15 @@ class Nodes:
         self.named: dict[str, Node] = {}
         self.messages: list[Message] = []
         self._pdos: dict[str, tuple[str, Pdo]] = {}
-        for eds in _read(files):
-            self._add(eds)
+        if not files:
+            return
+        from canshaper.commissioning.nodes import eds, node
+
+        read = [eds.Eds(path) for path in files]
+        for one in read:
+            node.Node(one, one.node or _FIRST)  # one without PDO is said before any question
+        for one in read:
+            self._add(one)
 
     def _add(self, eds: "Eds") -> None:
         from canshaper.commissioning.nodes import messages
@@ -183,19 +190,6 @@ def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str
         if axis.sensor:
             add(axis.sensor.message, axis.sensor.timeout_ms)
     return uses
-
-
-def _read(files: Sequence[Path]) -> "list[Eds]":
-    """Read files; one that cannot be used is said before there is any question."""
-    if not files:
-        return []
-    from canshaper.commissioning.nodes.eds import Eds
-    from canshaper.commissioning.nodes.node import Node
-
-    read = [Eds(path) for path in files]
-    for eds in read:
-        Node(eds, eds.node or _FIRST)
-    return read
 
 
 def _label(pdo: "Pdo", key: tuple[int, int]) -> str | None:

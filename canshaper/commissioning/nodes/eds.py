@@ -22,15 +22,10 @@ MOST_BYTES = 4 << 20
 _OBJECT = re.compile(r"([0-9A-F]{4})(sub[0-9A-F]+)?", re.IGNORECASE)
 _OF_OBJECTS = re.compile(r"([0-9A-F]{1,4})(?:(sub(?=.)|Name$|Value$)([0-9A-F]*))?", re.IGNORECASE)
 _NODE = "DeviceComissioning"  # as the standard spells it
-_COMPACT = "CompactSubObj"
-_OF_ELEMENTS = ("DataType", "AccessType", "DefaultValue", "PDOMapping", "LowLimit", "HighLimit")
-_MAY_BE_EMPTY = {_COMPACT, "ObjectType", "PDOMapping", "LowLimit", "HighLimit", "SubNumber"}
-_KEYS = {
-    key.lower(): key
-    for key in (*_OF_ELEMENTS, *_MAY_BE_EMPTY, "ParameterName", "ParameterValue", "NodeID")
-}
+_MAY_BE_EMPTY = ("ObjectType", "PDOMapping", "LowLimit", "HighLimit", "SubNumber", "CompactSubObj")
+_OTHERS = ("ParameterName", "ParameterValue", "DataType", "AccessType", "DefaultValue", "NodeID")
+_KEYS = {key.lower(): key for key in (*_MAY_BE_EMPTY, *_OTHERS)}
 _PARTS = {part.lower(): part for part in ("", "sub", "Name", "Value")}
-_MOST_ELEMENTS = 254
 _VARIABLES = (0x2, 0x7)  # DOMAIN, VAR
 
 
@@ -65,9 +60,6 @@ class Eds:
         except configparser.Error as error:
             raise self._not_one(error) from None
         self._file = _canonical(self._file)
-        for name in self._file.sections():
-            if _OBJECT.fullmatch(name):
-                self._expand(name)
         sections = [name for name in self._file.sections() if _OBJECT.fullmatch(name)]
         if not sections:
             raise self._wrong("", "expected objects, such as [1000], got none; not an EDS or DCF")
@@ -100,13 +92,15 @@ class Eds:
             raise self._wrong("", f"not an EDS or DCF that can be read: {error}") from None
         return objects
 
+    def elements(self, index: int) -> int:
+        """Elements of an array that has one section for all of them; 0 of another one."""
+        section, key = f"{index:04X}", "CompactSubObj"
+        return self._whole(section, key, self._file.get(section, key, fallback="0"))
+
     def problem(self, section: str, text: str) -> Problem:
-        """A problem at a section, with its line; of an element without one that of its array."""
-        place = None
-        for name in (section, section.partition("sub")[0]):
-            if section and not place:
-                row = rf"^\s*\[{re.escape(name)}\]"
-                place = re.search(row, self._text, re.IGNORECASE | re.MULTILINE)
+        """A problem at a section, with its line."""
+        pattern = re.compile(rf"^\s*\[{re.escape(section)}\]", re.IGNORECASE | re.MULTILINE)
+        place = pattern.search(self._text) if section else None
         line = self._text.count("\n", 0, place.end()) + 1 if place else None
         return Problem(str(self.path), line, f"[{section}]" if section else "", text)
 
@@ -120,33 +114,6 @@ class Eds:
         got = self._text.splitlines()[line - 1].strip()[:40] if line else "another"
         text = "expected sections of KEY=VALUE, each once, as an EDS or DCF has them"
         return ConfigError([Problem(str(self.path), line, "", f"{text}, got {got!r}")])
-
-    def _expand(self, section: str) -> None:
-        """Give an array its elements, where the file has one section for all of them."""
-        file, options = self._file, self._file[section]
-        count = self._whole(section, _COMPACT, options.pop(_COMPACT, "0"))
-        if not 0 <= count <= _MOST_ELEMENTS:
-            raise self._wrong(
-                section, f"{_COMPACT}: expected {_MOST_ELEMENTS} at most, got {count}"
-            )
-        if not count:
-            return
-        common = {key: value for key, value in options.items() if key in _OF_ELEMENTS}
-        common |= {"ParameterName": "Entries", "ObjectType": "0x7"}
-        number = {"DataType": "0x5", "AccessType": "ro", "DefaultValue": str(count)}
-        elements = {0: common | number | {"PDOMapping": "0"}}
-        for n in range(1, count + 1):
-            name = options.get("ParameterName", "") + f" {n}"
-            elements[n] = common | {
-                "ParameterName": file.get(f"{section}Name", str(n), fallback=name)
-            }
-            if value := file.get(f"{section}Value", str(n), fallback=""):
-                elements[n]["ParameterValue"] = value
-        for n, element in elements.items():
-            if not file.has_section(f"{section}sub{n:X}"):
-                file[f"{section}sub{n:X}"] = element
-        for names in ("Name", "Value"):
-            file.remove_section(section + names)
 
     def _check(self, section: str) -> None:
         """Check what canopen would report with an error that names no section."""
@@ -162,7 +129,7 @@ class Eds:
         for key in needed:
             if key not in options:
                 raise self._wrong(section, f"expected {key}, got none")
-        for key in ("DataType", "PDOMapping"):
+        for key in ("DataType", "PDOMapping", "CompactSubObj"):
             if key in options:
                 self._whole(section, key, options[key])
 

@@ -113,7 +113,9 @@ class Node:
     def variable(self, index: int, subindex: int) -> ODVariable | None:
         """An object of it, or None."""
         entry = self.objects.indices.get(index)
-        if isinstance(entry, ODRecord | ODArray):
+        if isinstance(entry, ODArray) and 0 < subindex <= self.eds.elements(index):
+            entry = entry[subindex]  # like the first, where it has no name
+        elif isinstance(entry, ODRecord | ODArray):
             entry = entry.subindices.get(subindex)
         elif subindex:
             return None
