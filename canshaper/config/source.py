@@ -40,11 +40,7 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
 
 
 def encoding_of(head: bytes) -> str:
-    """Encoding of a text with a byte order mark, or in UTF-16 without one; empty for others.
-
-    Args:
-        head: its first four bytes.
-    """
+    """Encoding of a text, by its first bytes: a byte order mark, or UTF-16 without; else empty."""
     if head.startswith(BOM_UTF8):
         return "utf-8-sig"
     if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):

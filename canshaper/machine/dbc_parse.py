@@ -74,8 +74,7 @@ def _explained(text: str, cause: Exception, why: str) -> tuple[int, str] | None:
         expected = f"expected BA_DEF_ {at[1]}{at[0].split()[1]} {kind}; before it"
         return _line_at(text, at.start()), expected
     if "Expected int or float" in why and (at := _attribute(text, "GenSigStartValue")):
-        expected = "expected GenSigStartValue as INT, HEX or FLOAT in its BA_DEF_"
-        return _line_at(text, at.start()), expected
+        return _line_at(text, at.start()), "expected GenSigStartValue as INT, HEX or FLOAT"
     if twice := re.search(r"signals (\w+) and \1 are overlapping in message (\w+)", why):
         name, message = twice.groups()
         both = rf"BO_\s+\d+\s+{message}\b.*?SG_\s+{name}\b.*?SG_\s+{name}\b"

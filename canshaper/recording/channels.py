@@ -146,11 +146,7 @@ class Place:
         return CutOffError(f"{self}: the log is cut off: {reason}")
 
     def checked(self, frame: TimedFrame, length: int) -> TimedFrame:
-        """The frame, whose log says that it has so many bytes.
-
-        Raises:
-            LogError: it has not, or its id has no room in its bits.
-        """
+        """The frame, if it has so many bytes and its id has room in its bits; else a LogError."""
         if len(frame.data) != length or length > MOST_BYTES:
             raise self.error(f"{len(frame.data)} of {length} bytes", "all of them")
         if not fits(frame.can_id, extended=frame.extended):

@@ -9,6 +9,7 @@ from canshaper.codec.layout import FD_LENGTHS
 from canshaper.recording.asc import SECOND_NS, lines, shown
 from canshaper.recording.candump import candump
 from canshaper.recording.channels import Place, TimedFrame
+from canshaper.recording.tables import FORMAT
 
 DAY_NS = 86_400 * SECOND_NS
 # Sign, time, channel, id, direction, flags, length, data and a counter.
@@ -18,7 +19,6 @@ _KVASER = re.compile(
     re.ASCII,
 )
 _NO_FRAME = re.compile(r"\s*(?:-?\d+[.,]\d+\s+Trigger |DateTime:|$)")
-_FORMAT = re.compile(r"\s*Format of (id|data) field:\s*(HEX|DEC)")
 _BUSMASTER = re.compile(
     r"(\d{1,4}):(\d\d?):(\d\d?):(\d{1,4})\s+[RT]x\s+(\d+)\s+(?:0x)?([0-9A-F]{1,10})\s+(s|x|sr|xr)"
     r"\s+(\d{1,2})\s*(.*)",
@@ -37,7 +37,7 @@ def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").rstrip()
         if not below:
-            if found := _FORMAT.match(line):
+            if found := FORMAT.search(line):
                 bases[found[1]] = 16 if found[2] == "HEX" else 10
             below = line.startswith("=" * 40)  # under the names of the columns
         elif "ErrorFrame" in line:

@@ -39,7 +39,7 @@ _COLUMN = re.compile("|".join(f"(?P<{name}>{words})" for name, words in NAMES.it
 _BYTE = re.compile(r"(?:d|data)(\d{1,2})")
 _UNIT = re.compile(r"[\[( ](ms|us|µs|ns)\b")
 _UNITS = {"ms": 6, "us": 3, "µs": 3, "ns": 0}
-_FORMAT = re.compile(r"format of (id|data) field\W+(hex|dec)", re.IGNORECASE)  # Kvaser's
+FORMAT = re.compile(r"format of (id|data) field\W+(hex|dec)", re.IGNORECASE)  # Kvaser's
 _TRUE = frozenset(("1", "true", "wahr"))
 _REMOTE, _EXTENDED, _ERROR = 1, 4, 0x20  # Kvaser's flags
 WRAP_NS = (1 << 32) * 1000  # of a clock of 32 bits that counts microseconds
@@ -62,14 +62,15 @@ def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     rows, bases = lines(file, place), {}
     first = header = next(rows, b"").decode("utf-8", "replace").strip()
     while (table := Table.of(header)) is None:
-        if found := _FORMAT.search(header):
+        if found := FORMAT.search(header):
             bases[found[1].lower()] = 16 if found[2].lower() == "hex" else 10
         if place.number >= MOST_ABOVE or not (row := next(rows, b"")):
             place.number = 1
             raise place.error(shown(first.encode()), HEADER)
         header = row.decode("utf-8", "replace").strip()
     table.bases.update(bases)
-    return _unwrapped(table.frames(rows, place))
+    frames = table.frames(rows, place)
+    return _unwrapped(frames) if table.of_gvret else frames
 
 
 def _unwrapped(frames: Iterator[TimedFrame]) -> Iterator[TimedFrame]:
@@ -79,23 +80,18 @@ def _unwrapped(frames: Iterator[TimedFrame]) -> Iterator[TimedFrame]:
     for frame in frames:
         if offset_ns is None:
             offset_ns = before_ns = max(0, -frame.time_ns)
-        elif before_ns - frame.time_ns - offset_ns > WRAP_NS // 2:
+        elif before_ns - frame.time_ns - offset_ns > WRAP_NS * 9 // 10:
             offset_ns += WRAP_NS
         before_ns = frame.time_ns + offset_ns
         yield frame._replace(time_ns=before_ns) if offset_ns else frame
 
 
 class Table:
-    """Columns of a table, and the frames in its rows.
-
-    Args:
-        header: its names.
-        delimiter: between them.
-        at: place of a column by what it is.
-        cells: whether each byte has one, of which that of the first counts.
+    """Columns of a table, by the names in ``NAMES``, and the frames in its rows.
 
     Attributes:
         bases: of identifiers and bytes.
+        of_gvret: whether its times are microseconds, which GVRET does not say.
     """
 
     def __init__(self, header: str, delimiter: str, at: dict[str, int], *, cells: bool) -> None:
@@ -103,8 +99,8 @@ class Table:
         self._header, self._delimiter, self._at, self._cells = header, delimiter, at, cells
         self._packed = "arbitration_id" in header  # python-can's, in Base64
         unit = _UNIT.search(header.lower().split(delimiter)[at["time"]])
-        of_gvret = cells and "length" in at  # microseconds, which it does not say
-        self._power = _UNITS[unit[1]] if unit else 3 if of_gvret else 9
+        self.of_gvret = cells and header.lower().startswith("time stamp")
+        self._power = _UNITS[unit[1]] if unit else 3 if self.of_gvret else 9
 
     @classmethod
     def of(cls, header: str) -> "Table | None":
@@ -124,11 +120,7 @@ class Table:
         return cls(header, delimiter, at, cells=cells)
 
     def frames(self, rows: Iterator[bytes], place: Place) -> Iterator[TimedFrame]:
-        """Yield the data frames of rows.
-
-        Raises:
-            LogError: a row is no frame.
-        """
+        """Yield the data frames of rows."""
         others = [at for name, at in self._at.items() if name not in ("time", "data")]
         key_of = itemgetter(*others)
         width, delimiter, at_time = max(self._at.values()) + 1, self._delimiter, self._at["time"]
@@ -163,12 +155,7 @@ class Table:
             yield frame
 
     def _kind(self, cells: Sequence[str], place: Place) -> Known:
-        """Channel, id and length of a row; or what it is instead of a data frame.
-
-        Raises:
-            ValueError: a cell is none of its column.
-            LogError: its id has no room in its bits.
-        """
+        """Channel, id and length of a row; or what it is instead of a data frame."""
         row = {name: cells[at].strip().lower() for name, at in self._at.items()}
         flags = int(row.get("flags") or "0")
         for name, bit in (("error", _ERROR), ("remote", _REMOTE)):
@@ -201,9 +188,8 @@ class Table:
         if self._packed:
             return b64decode(cells[at], validate=True)
         if self._cells:
-            words = [
-                w for w in cells[at : at + (CLASSICAL_BYTES if length is None else length)] if w
-            ]
+            end = at + (CLASSICAL_BYTES if length is None else length)
+            words = [cell for cell in cells[at:end] if cell]
         elif base == 16:
             return bytes.fromhex(cells[at])
         else:

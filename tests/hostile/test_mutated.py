@@ -1,7 +1,6 @@
 """500 log, DBC and EDS files with a few bytes changed: read, or refused in words with the file."""
 
 import random
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,9 @@ from tests.recording.test_of_loggers import LOGS
 from tests.recording.test_of_strangers import TEXTS
 
 COUNT = 500
-DBC = Path(__file__).parents[1] / "fuzz" / "small.dbc"
+FILES = LOGS | {name: text.encode() for name, text in TEXTS.items()}
+FILES["a.eds"] = eds(JOYSTICK, 16).encode()
+FILES["a.dbc"] = Path(__file__).parents[1].joinpath("fuzz", "small.dbc").read_bytes()
 WORDS = [b"", b"-1", b"1e99", b"\xff", b"\0", b";", b",", b'"', b"\n", b"FFFFFFFF", b"nan", b"0x"]
 
 
@@ -30,37 +31,28 @@ def mutated(content: bytes, random_: random.Random) -> bytes:
     return content
 
 
-def read_dbc(path: Path) -> None:
-    _, problems = load_dbc(path)
-    for problem in problems:
-        raise ConfigError([problem])
+def read(path: Path) -> None:
+    """By its suffix.
 
-
-def read_eds(path: Path) -> None:
-    Node(Eds(path), 16)
-
-
-def read_log(path: Path) -> None:
-    for _ in LogFile(path):
-        pass
-
-
-def files() -> Iterator[tuple[str, bytes, Callable[[Path], None]]]:
-    """Names, contents and readers."""
-    yield "a.eds", eds(JOYSTICK, 16).encode("latin-1"), read_eds
-    yield "a.dbc", DBC.read_bytes(), read_dbc
-    for name, content in {**LOGS, **{n: t.encode() for n, t in TEXTS.items()}}.items():
-        yield name, content, read_log
+    Raises:
+        ConfigError, LogError: it is refused.
+    """
+    if path.suffix == ".eds":
+        Node(Eds(path), 16)
+    elif path.suffix == ".dbc":
+        if problems := load_dbc(path)[1]:
+            raise ConfigError(problems)
+    else:
+        list(LogFile(path))
 
 
 @pytest.mark.slow
 def test_no_mutated_file_ends_in_another_exception(tmp_path: Path) -> None:
-    sources, refused = list(files()), 0
+    refused = 0
     for seed in range(COUNT):
-        random_ = random.Random(seed)
-        name, content, read = sources[seed % len(sources)]
+        name = list(FILES)[seed % len(FILES)]
         path = tmp_path / name
-        path.write_bytes(mutated(content, random_))
+        path.write_bytes(mutated(FILES[name], random.Random(seed)))
         try:
             read(path)
         except (ConfigError, LogError) as error:

@@ -92,7 +92,7 @@ def test_it_is_read(tmp_path: Path, content: str | bytes, cycle_ms: int | None) 
         (
             DBC
             + 'BA_DEF_ SG_ "GenSigStartValue" STRING;\nBA_ "GenSigStartValue" SG_ 272 Slew "1";',
-            f"a.dbc:17: {HAS}expected GenSigStartValue as INT, HEX or FLOAT in its BA_DEF_",
+            f"a.dbc:17: {HAS}expected GenSigStartValue as INT, HEX or FLOAT",
         ),
     ],
 )

@@ -37,7 +37,7 @@ EXIT_TOO_POOR = 1
 def sensor(
     file: str = FILE,
     log: Path | None = typer.Argument(
-        None, help="CAN log (.log, .asc, .blf, .trc, .db, .mf4) of a drive; else the simulated one."
+        None, help="CAN log of a drive, as replay reads it; else the simulated one."
     ),
     axis: str | None = typer.Option(None, "--axis", help="This one only."),
     live: bool = typer.Option(False, "--live", help="Listen to the machine while you drive it."),
