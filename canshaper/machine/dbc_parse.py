@@ -75,11 +75,11 @@ def _explained(text: str, cause: Exception, why: str) -> tuple[int, str] | None:
         return _line_at(text, at.start()), expected
     if "Expected int or float" in why and (at := _attribute(text, "GenSigStartValue")):
         return _line_at(text, at.start()), "expected GenSigStartValue as INT, HEX or FLOAT"
-    if twice := re.search(r"signals (\w+) and \1 are overlapping in message (\w+)", why):
-        name, message = twice.groups()
-        both = rf"BO_\s+\d+\s+{message}\b.*?SG_\s+{name}\b.*?SG_\s+{name}\b"
-        if at := re.search(both, text, re.DOTALL):
-            return _line_at(text, at.end()), f"{message} has the signal {name} twice: rename one"
+    twice = re.search(r"signals (\w+) and \1 are overlapping in message (\w+)", why)
+    name, message = twice.groups() if twice else ("", "")
+    both = rf"BO_\s+\d+\s+{message}\b.*?SG_\s+{name}\b.*?SG_\s+{name}\b"
+    if twice and (at := re.search(both, text, re.DOTALL)):
+        return _line_at(text, at.end()), f"{message} has the signal {name} twice: rename one"
     return None
 
 

@@ -203,7 +203,7 @@ class Table:
         power = self._power
         if power == 3 and word.isdecimal() and len(word) <= 19:
             return int(word) * 1000
-        whole, _, part = word.replace(",", ".").partition(".")
+        whole, _, part = word.partition(".")
         if whole.isdigit() and len(whole) <= 19 and len(part) <= power and (part or "0").isdigit():
             return int(whole + part.ljust(power, "0"))
         seconds = Decimal(word.replace(",", "."))
