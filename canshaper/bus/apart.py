@@ -18,6 +18,7 @@ from select import select
 
 import can
 
+from canshaper.bus.waiting import receive
 from canshaper.gate.loop import boottime_ns
 
 # A frame may leave so late after it was given to an adapter, and an adapter may take so long for
@@ -183,7 +184,7 @@ class BusApart:
             polled_ns, readable = boottime_ns(), self._readable(0.0)
             result: can.Message | Exception | None
             try:
-                result = self._bus.recv(0)
+                result = receive(self._bus)
             except Exception as error:  # as above
                 result = error
             if result is None and readable and ended(self._descriptor):

@@ -12,6 +12,7 @@ import can
 from canshaper.bus.multicast import LocalMulticastBus, receive_one_group
 from canshaper.bus.packet import Arrivals
 from canshaper.bus.raw import MOST_FRAMES
+from canshaper.bus.waiting import waiting
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.machine.buses import ALWAYS_FD
@@ -19,11 +20,6 @@ from canshaper.machine.routing import BusRoutes
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256
-# Failures of an interface in one tick: a garbled line of an adapter costs that line, and what waits
-# behind it must not grow old; a bus that is gone fails at every call.
-MOST_FAILURES = 20
-
-
 # Their calls return at once: datagrams, and a queue in memory. Of other interfaces it is not known.
 NEVER_BLOCK = frozenset(("udp_multicast", "virtual"))
 # What an interface is opened with unless the file says otherwise: a read of a serial line waits
@@ -82,25 +78,19 @@ class PythonCanPort:
 
     def frames(self) -> Iterator[Frame]:
         """Yield every frame that waits, in order; end when there is none or the bus fails."""
-        receive, failures = self._bus.recv, 0
         # python-can's own times are those of whatever clock an interface has.
         self.arrived_ns = self._arrivals.begin()
         if self._apart and (lost := self._bus.lost) != self._lost:
             self._lost = lost
             self._on_fault(FrameFault.FRAMES_LOST)
-        for _ in range(MOST_FRAMES):
-            try:
-                message = receive(0)
-            except Exception:  # each interface raises its own kinds
-                self.state = BusState.FAILED
-                self._on_fault(FrameFault.BUS_ERROR)
-                failures += 1
-                if failures == MOST_FAILURES:
-                    return
-                continue
+        for message in waiting(self._bus, MOST_FRAMES):
             if message is None:
                 self._arrivals.emptied()
                 return
+            if isinstance(message, Exception):
+                self.state = BusState.FAILED
+                self._on_fault(FrameFault.BUS_ERROR)
+                continue
             if self._apart:
                 self.arrived_ns = self._bus.since_ns
             if self.state is not BusState.NOT_CONFIRMED:

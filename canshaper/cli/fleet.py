@@ -46,7 +46,7 @@ class Log:
 
 def logs_below(folder: Path) -> list[tuple[str, Path]]:
     """Machine and path of every log in a folder and those in it, by name."""
-    known = {*READERS, SUFFIX}
+    known = {*READERS, SUFFIX} - {".txt"}  # most of them are notes
     logs = [
         path
         for path in sorted(folder.rglob("*"))

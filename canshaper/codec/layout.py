@@ -20,7 +20,7 @@ FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
 def layout_fault(message: Message) -> str | None:
     """Why the bits of a message cannot be read, or None; cantools reports it with a frame only."""
-    if not isinstance(message.cycle_time, int | None):
+    if not isinstance(message.cycle_time, int | None) or (message.cycle_time or 0) < 0:
         return f"GenMsgCycleTime: expected a whole number of ms, got {message.cycle_time!r}"
     multiplexors = {signal.name for signal in message.signals if signal.is_multiplexer}
     for signal in message.signals:

@@ -83,11 +83,18 @@ def magnitude_range(signal: Signal) -> str | None:
 
 
 def _no_range(signal: Signal) -> str | None:
-    low, high = signal.minimum, signal.maximum
     if not signal.scale:
         return f"{signal.name}: expected a scale other than 0, got 0"
-    if low is None or high is None or high <= low:
-        return f"{signal.name} has no range in the DBC; full speed is taken from it, or from full"
+    return ends_fault(signal, "full speed is taken from it, or from full")
+
+
+def ends_fault(signal: Signal, use: str) -> str | None:
+    """Why the ends of a range are none, or None; ``use`` is what it is for."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high == low:
+        return f"{signal.name} has no range in the DBC; {use}"
+    if high < low:
+        return f"{signal.name}: expected the range [{high:g}|{low:g}], got [{low:g}|{high:g}]"
     return None
 
 
@@ -247,9 +254,9 @@ def radius_range(signal: Signal) -> str | None:
     """Why a signal is no radius, or its range does not say what is one; None where it does."""
     if signal.unit not in LENGTHS:
         return f"{signal.name}: expected a radius in m, got a signal in {signal.unit}"
-    low, high = signal.minimum, signal.maximum
-    if low is None or high is None or high <= low:
-        return f"{signal.name} has no range in the DBC; what lies outside is no radius"
+    if fault := ends_fault(signal, "what lies outside is no radius"):
+        return fault
+    low, high = signal.minimum or 0.0, signal.maximum or 0.0
     if low < 0.0:
         return f"{signal.name}: expected a range from 0 m or more, got [{low:g}|{high:g}]"
     if high > FARTHEST_M:

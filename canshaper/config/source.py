@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import stat
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -36,6 +37,17 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
         text = f"expected {most_bytes} bytes at most, got more"
         raise OSError(errno.EFBIG, text, str(path))
     return data
+
+
+def encoding_of(head: bytes) -> str:
+    """Encoding of a text, by its first bytes: a byte order mark, or UTF-16 without; else empty."""
+    if head.startswith(BOM_UTF8):
+        return "utf-8-sig"
+    if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return "utf-16"
+    # The first sign of what is read here is one of ASCII.
+    little, big = head[1:2] == b"\0", head[:1] == b"\0"
+    return "utf-16-le" if little else "utf-16-be" if big else ""
 
 
 Place = tuple[str | int, ...]

@@ -3,6 +3,7 @@
 import logging
 import re
 from pathlib import Path
+from typing import Any
 
 import cantools
 from cantools.database.can import Database, Message
@@ -23,6 +24,7 @@ _LENGTH = re.compile(rf"{_MESSAGE}(\d{{1,5}})")
 _TOO_LARGE = re.compile(
     rf"{_MESSAGE}(\d{{6,}})|{keyword('SG_')}\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{{6,}})"
 )
+_WHOLE = re.compile(r"\s*(-?\d{1,9})(?:\.0*)?\s*", re.ASCII)
 UNUSABLE = "not a DBC file that can be used"
 SYNTAX = "Invalid syntax"
 
@@ -41,7 +43,9 @@ def parsed_messages(path: Path, text: str, *, bounded: bool) -> list[Message] | 
         why = " ".join(str(cause).split()) or type(cause).__name__
         if "more than 11 bits" in why:
             why += f" ({WIDE_ID})"
-        if at := re.search(r"at line (\d+)", why):
+        if found := _explained(text, cause, why):
+            line, why = found
+        elif at := re.search(r"at line (\d+)", why):
             line = int(at.group(1))
         elif at := re.search(r"in message (\w+)|unused \w+ entries in DBC: (\w+ \d+ \w+)", why):
             line = _line_of(text, rf"BO_\s+\d+\s+{at[1]}\b" if at[1] else re.escape(at[2]))
@@ -49,7 +53,44 @@ def parsed_messages(path: Path, text: str, *, bounded: bool) -> list[Message] | 
             line = None
         return Problem(str(path), line, "", f"{UNUSABLE}: {why}")
     assert isinstance(database, Database)
+    for message in database.messages:
+        message.cycle_time = _whole(message.cycle_time)
     return database.messages
+
+
+def _whole(cycle: object) -> Any:
+    """A cycle whose attribute is declared FLOAT or STRING, as a whole number where it is one."""
+    if isinstance(cycle, float) and cycle.is_integer():
+        return int(cycle)
+    if isinstance(cycle, str) and (number := _WHOLE.fullmatch(cycle)):
+        return int(number[1])
+    return cycle
+
+
+def _explained(text: str, cause: Exception, why: str) -> tuple[int, str] | None:
+    """Line of a mistake that cantools finds without a place, and what to write; None for others."""
+    if isinstance(cause, KeyError) and (at := _attribute(text, str(cause.args[0]))):
+        kind = "STRING" if '"' in at[2] else "INT 0 65535"
+        expected = f"expected BA_DEF_ {at[1]}{at[0].split()[1]} {kind}; before it"
+        return _line_at(text, at.start()), expected
+    if "Expected int or float" in why and (at := _attribute(text, "GenSigStartValue")):
+        return _line_at(text, at.start()), "expected GenSigStartValue as INT, HEX or FLOAT"
+    twice = re.search(r"signals (\w+) and \1 are overlapping in message (\w+)", why)
+    name, message = twice.groups() if twice else ("", "")
+    both = rf"BO_\s+\d+\s+{message}\b.*?SG_\s+{name}\b.*?SG_\s+{name}\b"
+    if twice and (at := re.search(both, text, re.DOTALL)):
+        return _line_at(text, at.end()), f"{message} has the signal {name} twice: rename one"
+    return None
+
+
+def _attribute(text: str, name: str) -> re.Match[str] | None:
+    """The first value of an attribute."""
+    value = rf'^[^\S\n]*BA_\s+"{re.escape(name)}"\s+((?:(?:BU|BO|SG|EV)_\s)?)([^;]*)'
+    return re.search(value, text, re.MULTILINE)
+
+
+def _line_at(text: str, place: int) -> int:
+    return text.count("\n", 0, place) + 1
 
 
 def letters(text: str) -> int:
@@ -60,7 +101,7 @@ def letters(text: str) -> int:
 def _too_large(text: str, *, bounded: bool) -> tuple[int | None, str] | None:
     """Line and reason, where a file would take cantools more time or memory than there is."""
     if large := _TOO_LARGE.search(text):
-        line = text.count("\n", 0, large.end()) + 1
+        line = _line_at(text, large.end())
         return line, f"expected 99999 bytes or bits at most, got {large[1] or large[2]}"
     if not bounded:
         return None
@@ -77,4 +118,4 @@ def _too_large(text: str, *, bounded: bool) -> tuple[int | None, str] | None:
 def _line_of(text: str, pattern: str) -> int | None:
     """Number of the first line of a text that starts with a pattern."""
     start = re.search(rf"^[^\S\n]*{pattern}", text, re.MULTILINE)
-    return text.count("\n", 0, start.start()) + 1 if start else None
+    return _line_at(text, start.start()) if start else None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
+from canshaper.config.source import encoding_of
 from canshaper.machine.dbc_signals import signals_fault
 
 # Of all DBC files of a deployment: several times those of a machine.
@@ -81,6 +82,12 @@ _STATEMENTS = {
     "endless": '"',
 }
 _SCAN = re.compile("|".join(f"{text}(?P<{kind}>)" for kind, text in _STATEMENTS.items()).encode())
+# A signal that no one receives, a message that no one sends: the name of no node is left out.
+_NO_NODE = re.compile(
+    rb'^[ \t]*(?:SG_[ \t][^"\n]*"[^"\n]*"|BO_[ \t]+\d+[ \t]+\w+[ \t]*:[ \t]*\d+)'
+    rb"(?=\s*(?:[A-Z_]+_\b|\Z))",
+    re.MULTILINE,
+)
 _OF_SIGNAL = re.compile(_row(r"(\w++)", r"\d++", f"({_NAME})").encode())
 
 
@@ -174,7 +181,7 @@ def dbc_text(data: bytes) -> DbcText:
     Raises:
         ValueError: it has more messages than are allowed.
     """
-    data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = _NO_NODE.sub(rb"\g<0> Vector__XXX", _cp1252(data))
     starts, ends, numbers, tables = (array("q") for _ in range(4))
     statements: list[tuple[bytes, int, int, str | None]] = []
     signals: dict[int, set[bytes]] = {}
@@ -214,6 +221,13 @@ def dbc_text(data: bytes) -> DbcText:
         if of_signal and of_signal[2] not in signals.get(numbers[i], ()):
             leftover.append(i)
     return DbcText(data, entries, starts, ends, numbers, leftover)
+
+
+def _cp1252(data: bytes) -> bytes:
+    """A text with line ends as Python has them; one with a byte order mark as one without."""
+    if encoding := encoding_of(data[:4]):
+        data = data.decode(encoding, "replace").encode("cp1252", "replace")
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
 def _id_fault(number: int) -> str | None:

@@ -10,7 +10,7 @@ from canshaper.codec.flags import Velocity
 from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.protection import Protection, SequenceChecker
-from canshaper.codec.signals import find_signal, radius_range
+from canshaper.codec.signals import ends_fault, find_signal, radius_range
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
@@ -222,10 +222,10 @@ def _check_range(
     """Check that a signal has a range, and that values of its section lie in it."""
     used, bound = result
     signal = bound.signal
-    low, high = signal.minimum, signal.maximum
-    if low is None or high is None or high <= low:
-        used.add_fault(f"{signal.name} has no range in the DBC; what lies outside is not {what}")
+    if fault := ends_fault(signal, f"what lies outside is not {what}"):
+        used.add_fault(fault)
         return
+    low, high = signal.minimum or 0.0, signal.maximum or 0.0
     for key in keys:
         if not low <= (value := getattr(bound.config, key)) <= high:
             text = f"expected {what} within the range of {signal.name}, [{low:g}|{high:g}]"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import BinaryIO
 
-from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame, fits
+from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 
 SECOND_NS = 1_000_000_000
 # Far longer than any line of a log; a file without line ends must not fill the memory.
@@ -31,11 +31,6 @@ def lines(file: BinaryIO, place: Place, *, last: bool = False) -> Iterator[bytes
         yield line
 
 
-def id_text(can_id: int) -> str:
-    """An id that is none."""
-    return f"id {can_id:#x}"
-
-
 def shown(line: bytes) -> str:
     """A line as a person reads it, its beginning where it is long."""
     text = line.decode("utf-8", "replace").rstrip()
@@ -49,6 +44,7 @@ _ASC = re.compile(
 )
 _ASC_ERROR = re.compile(r"\s*\d+\.\d+\s+(?:\d+|CANFD\s+\d+\s+\S+)\s+ErrorFrame", re.IGNORECASE)
 _ASC_FD = re.compile(r"\s*(\d+)\.(\d{1,9})\s+CANFD\s+(\d+)\s+(Rx|Tx|TxRq)\s+(\S+)\s+(.*)", re.ASCII)
+_BEFORE = re.compile(r"\s*-\d+\.\d+\s+(?:\d+|CANFD)\s", re.ASCII)
 _STAMP = re.compile(r"\s*(\d{1,10})\.(\d{1,9})\s", re.ASCII)
 ASC_NUMBERS = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with numbers"
 
@@ -73,9 +69,7 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             on_fd = True
             kind = "r" if count == "R" else "d"
         else:
-            if header := _BASE.match(line):
-                base = 10 if header[1].lower() == "dec" else 16
-                relative = bool(header[2]) and header[2].lower() == "relative"
+            base, relative = _read_on(line, base, relative, place)
             continue
         if direction == "TxRq":  # asked for, not yet on the bus; its Tx follows
             continue
@@ -88,11 +82,17 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             can_id, length, payload = _numbers(number, count, data, base, fd=on_fd)
         except ValueError:
             raise place.error(shown(raw), ASC_NUMBERS) from None
-        if len(payload) < length:
-            raise place.error(f"{len(payload)} of {length} bytes", "all of them")
-        if not fits(can_id, extended=extended):
-            raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with an x behind")
-        yield TimedFrame(time_ns, channel, can_id, extended, payload)
+        yield place.checked(TimedFrame(time_ns, channel, can_id, extended, payload), length)
+
+
+def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, bool]:
+    """Base of the numbers, and whether times are relative, behind a line without a frame."""
+    if header := _BASE.match(line):
+        base = 10 if header[1].lower() == "dec" else 16
+        relative = bool(header[2]) and header[2].lower() == "relative"
+    elif _BEFORE.match(line):
+        place.left_out["before the start"] += 1
+    return base, relative
 
 
 def _numbers(

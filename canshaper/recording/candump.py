@@ -4,10 +4,11 @@ import re
 from binascii import unhexlify
 from collections.abc import Iterator
 from datetime import datetime
-from typing import BinaryIO
+from io import BufferedReader
+from itertools import pairwise
 
 from canshaper.codec.frame import ERR_FLAG
-from canshaper.recording.asc import SECOND_NS, id_text, lines, shown
+from canshaper.recording.asc import SECOND_NS, lines, shown
 from canshaper.recording.channels import Place, TimedFrame, fits
 
 _new = tuple.__new__  # TimedFrame(...) in half the time
@@ -31,11 +32,23 @@ CANDUMP_ALLOWED = "a line of candump -L, such as (1436509052.249713) can0 110#01
 TIMES = "times before the frames: candump -L, or candump -t a"
 
 
-def candump(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
+# candump's times of -t d, and of -t z.
+_PADDED = re.compile(rb"(\s*\()(\d{3,6})\.(\d{6})(?=\))")
+LEAST_STAMPS, MOST_STAMPS = 8, 400
+# Below an error frame, with -e.
+_OF_ERROR = re.compile(rb"\s+[a-z][a-z-]+(?:[{,].*)?\s*")
+_DROPPED = re.compile(rb"DROPCOUNT: dropped (\d{1,10}) CAN frames? on .*\s*")
+
+
+def candump(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
     """``candump -L``, ``candump -l`` and python-can's logger: microseconds, or nanoseconds."""
     quick = _QUICK.fullmatch
     sources: dict[bytes, tuple[str, int, bool] | None] = {}
-    for line in lines(file, place):
+    rows = lines(file, place)
+    if _are_differences(file.peek()):
+        place.notes.append("its times are those from frame to frame (candump -t d), and summed up")
+        rows = _summed(rows)
+    for line in rows:
         match = quick(line)
         if match is not None:
             seconds, fraction, source, data = match.groups()
@@ -65,6 +78,31 @@ def candump(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             yield _new(TimedFrame, (time_ns, *known, content))
 
 
+def _are_differences(head: bytes) -> bool:
+    """Whether the times of a log do not grow: each is that since the frame before."""
+    found = (_PADDED.match(line) for line in head.split(b"\n", MOST_STAMPS)[:-1])
+    stamps = [int(f"{one[2].decode()}{one[3].decode()}") for one in found if one]
+    if len(stamps) < LEAST_STAMPS:
+        return False
+    half = len(stamps) // 2
+    latest = max(stamps[:half])
+    # Two logs in one file go back once; those of two sockets by little.
+    back = sum(after < before for before, after in pairwise(stamps))
+    same = len(set(stamps[1:])) == 1
+    return (same or 8 * back >= half) and 4 * sum(t <= latest for t in stamps[half:]) >= 3 * half
+
+
+def _summed(rows: Iterator[bytes]) -> Iterator[bytes]:
+    """Lines with the times from the first one on in place of those from line to line."""
+    time_us = 0
+    for row in rows:
+        if (stamp := _PADDED.match(row)) is None:
+            yield row
+        else:
+            time_us += int(stamp[2] + stamp[3])
+            yield b"%s%d.%06d%s" % (stamp[1], *divmod(time_us, 10**6), row[stamp.end() :])
+
+
 def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] | None:
     """Channel and id of a line of candump; None for an error frame."""
     channel, word = source.split()
@@ -74,7 +112,7 @@ def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] |
     if extended and can_id & ERR_FLAG:
         return None
     if not fits(can_id, extended=extended):
-        raise place.error(id_text(can_id), "an id of 11 bits in 3 digits, or of 29 in 8")
+        raise place.error(f"id {can_id:#x}", "an id of 11 bits in 3 digits, or of 29 in 8")
     return channel.decode("ascii", "replace"), can_id, extended
 
 
@@ -86,7 +124,13 @@ def _screen(line: bytes, place: Place) -> TimedFrame | None:
     """
     match = _SCREEN.fullmatch(line)
     if match is None:
-        raise place.error(shown(line), CANDUMP_ALLOWED)
+        if (dropped := _DROPPED.fullmatch(line)) is not None:
+            place.left_out["dropped by the logger"] += int(dropped[1])
+        elif _OF_ERROR.fullmatch(line):
+            place.left_out["words about errors"] += 1
+        else:
+            raise place.error(shown(line), CANDUMP_ALLOWED)
+        return None
     stamp, channel, word, length, data, _ = match.groups()
     if stamp is None:
         raise place.error(shown(line), TIMES)
@@ -97,11 +141,9 @@ def _screen(line: bytes, place: Place) -> TimedFrame | None:
     if source is None or data.startswith(b"remote"):
         place.left_out["error" if source is None else "remote"] += 1
         return None
-    payload = bytes.fromhex(data.decode("ascii"))
-    if len(payload) < int(length):
-        raise place.error(f"{len(payload)} of {int(length)} bytes", "all of them")
+    # What looks like bytes behind them is the text of -a.
+    payload = bytes.fromhex(data.decode("ascii"))[: int(length)]
     day, seconds, fraction = time.groups()
     whole = int(datetime.fromisoformat(day).timestamp()) if day else int(seconds)
     time_ns = whole * SECOND_NS + int(fraction.ljust(9, "0"))
-    # What looks like bytes behind them is the text of -a.
-    return TimedFrame(time_ns, *source, payload[: int(length)])
+    return place.checked(TimedFrame(time_ns, *source, payload), int(length))

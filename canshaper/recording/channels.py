@@ -127,13 +127,15 @@ class Place:
         path: the log.
         unit: what is counted: lines or frames.
         number: the one that is being read, from 1.
-        left_out: frames that are no data frames, by kind.
+        left_out: frames that are no data frames, and lines of tools among them, by kind.
+        notes: what else one has to know of the log.
     """
 
     path: Path
     unit: str = "line"
     number: int = 0
     left_out: Counter[str] = field(default_factory=Counter)
+    notes: list[str] = field(default_factory=list)
 
     def error(self, got: str, expected: str) -> LogError:
         """Return an error at this place of the log."""
@@ -142,6 +144,15 @@ class Place:
     def cut_off(self, reason: str) -> CutOffError:
         """The log ends here, in the middle of something."""
         return CutOffError(f"{self}: the log is cut off: {reason}")
+
+    def checked(self, frame: TimedFrame, length: int) -> TimedFrame:
+        """The frame, if it has so many bytes and its id has room in its bits; else a LogError."""
+        if len(frame.data) != length or length > MOST_BYTES:
+            raise self.error(f"{len(frame.data)} of {length} bytes", "all of them")
+        if not fits(frame.can_id, extended=frame.extended):
+            expected = "an id of 11 bits, or of an extended frame of 29"
+            raise self.error(f"id {frame.can_id:#x}", expected)
+        return frame
 
     def __str__(self) -> str:
         if not self.number:  # nothing is read yet: it is about the whole file

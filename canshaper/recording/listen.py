@@ -3,8 +3,10 @@
 import select
 import socket
 import time
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from itertools import islice
 from typing import Any, NamedTuple
 
 import can
@@ -21,12 +23,15 @@ from canshaper.bus.packet import (
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can
 from canshaper.bus.socketcan import dropped_frames, open_sockets
+from canshaper.bus.waiting import MOST_FAILURES, waiting
 from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 
 # Frames read from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
+# So many errors of an interface with no frame and no silence between them: the bus is gone.
+MOST_ERRORS = 10 * MOST_FAILURES
 # Of every signal that asks us to end, the next one must not wait for a frame.
 LOOK_S = 0.2
 # How often an interface is polled that has no file to wait for.
@@ -74,13 +79,17 @@ class Listener:
 
     Attributes:
         lost: frames that the kernel could not keep for us.
+        errors: what interfaces of python-can raised in place of a frame, by bus.
+        last_error: the last of them, with its bus.
 
     Raises:
         BusError: a bus cannot be opened.
     """
 
     def __init__(self, buses: Iterable[tuple[str, Bus]]) -> None:
-        self.lost = 0
+        self.lost, self.last_error = 0, ""
+        self.errors: Counter[str] = Counter()
+        self._failing: Counter[str] = Counter()  # those without anything since, by bus
         self._sockets: dict[Any, tuple[str, str]] = {}
         self._files: list[Any] = []
         for name, bus in buses:
@@ -116,13 +125,9 @@ class Listener:
             raise BusError(f"cannot read: {error}") from error
         received: list[ReceivedFrame] = []
         for one, (name, channel) in self._sockets.items():
+            read = _raw if isinstance(one, socket.socket) else self._python_can
             try:
-                receive = _raw if isinstance(one, socket.socket) else _python_can
-                for _ in range(MOST_AT_ONCE):
-                    frame = receive(one, name, channel)
-                    if frame is None:
-                        break
-                    received.append(frame)
+                received += islice(read(one, name, channel), MOST_AT_ONCE)
             except (OSError, can.CanError) as error:
                 text = getattr(error, "strerror", None) or str(error)
                 raise BusError(f"bus {name}: cannot read {channel}: {text}") from error
@@ -131,21 +136,38 @@ class Listener:
         received.sort(key=lambda frame: frame.time_ns)
         return received
 
+    def _python_can(self, one: can.BusABC, name: str, channel: str) -> Iterator[ReceivedFrame]:
+        """Frames of python-can; an error of its interface is counted, until it is nothing else."""
+        for message in waiting(one, MOST_AT_ONCE):
+            if not isinstance(message, Exception):
+                self._failing[name] = 0
+                if message is not None:
+                    yield _python_can(message, name, channel)
+                continue
+            self.errors[name] += 1
+            self._failing[name] += 1
+            self.last_error = f"bus {name}: {type(message).__name__} {message}".rstrip()
+            if self._failing[name] == MOST_ERRORS:
+                raise can.CanOperationError(getattr(message, "strerror", None) or str(message))
+
     def close(self) -> None:
         """Close the buses."""
         for one in self._sockets:
-            with suppress(can.CanError, OSError):
+            with suppress(Exception):  # each interface raises its own kinds
                 one.close() if isinstance(one, socket.socket) else one.shutdown()
         self._sockets.clear()
         self._files.clear()
 
 
-def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
-    """The next frame of SocketCAN; None when none waits."""
-    try:
-        data, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
-    except BlockingIOError:
-        return None
+def _raw(one: socket.socket, bus: str, channel: str) -> Iterator[ReceivedFrame]:
+    """Frames of SocketCAN that wait."""
+    with suppress(BlockingIOError):
+        while True:
+            yield _of_socket(*one.recvmsg(FD_SIZE, ANCILLARY_BYTES)[:2], bus, channel)
+
+
+def _of_socket(data: bytes, ancillary: Any, bus: str, channel: str) -> ReceivedFrame:
+    """A frame of SocketCAN."""
     stamp = stamp_ns(ancillary)
     time_ns = time.time_ns() if stamp is None else stamp
     word, payload, flags = Packet.unpack(data)
@@ -157,11 +179,8 @@ def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
     return ReceivedFrame(time_ns, bus, channel, can_id, extended, payload, remote, flags)
 
 
-def _python_can(one: can.BusABC, bus: str, channel: str) -> ReceivedFrame | None:
-    """The next frame of python-can; None when none waits."""
-    message = one.recv(0)
-    if message is None:
-        return None
+def _python_can(message: can.Message, bus: str, channel: str) -> ReceivedFrame:
+    """A frame of python-can."""
     time_ns = round(message.timestamp * 1e6) * 1000
     can_id, extended, kind = message.arbitration_id, message.is_extended_id, ""
     flags = None

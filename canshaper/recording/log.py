@@ -5,28 +5,33 @@ A million lines take no more memory than a hundred.
 
 import gzip
 import zlib
+from codecs import getincrementaldecoder
 from collections import Counter
 from collections.abc import Callable, Iterator
 from io import BufferedReader, RawIOBase
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
+from canshaper.config.source import encoding_of
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording import asc, binary, blf, candump, tables, trc
+from canshaper.recording import asc, binary, blf, loggers, pcap, tables, trc
 from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 
-READERS: dict[str, Callable[[BinaryIO, Place], Iterator[TimedFrame]]] = {
-    ".log": candump.candump,
+READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
+    ".log": loggers.log,
     ".asc": asc.asc,
     ".blf": blf.blf,
     ".csv": tables.csv,
     ".db": binary.database,
     ".mf4": binary.mf4,
     ".trc": trc.trc,
+    ".txt": loggers.kvaser,
+    ".pcap": pcap.pcap,
+    ".pcapng": pcap.pcap,
 }
-BINARY = frozenset((".blf", ".db", ".mf4"))
+BINARY = frozenset((".blf", ".db", ".mf4", ".pcap", ".pcapng"))
 # Two sockets of one logger are not read in the order in which their frames came.
 OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.
@@ -46,7 +51,8 @@ class LogFile:
         progress: called now and then with the part that is read, 0 to 1.
 
     Attributes:
-        left_out: frames that are no data frames, by kind; of the last iteration.
+        left_out: frames that are no data frames, and lines of tools among them, by kind; of the
+            last iteration.
         disordered: frames that stand behind a later one, by up to ``OUT_OF_ORDER_NS``; they are
             handed out in the order of the file, with the time of that later one.
     """
@@ -54,6 +60,7 @@ class LogFile:
     def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
         self.left_out: Counter[str] = Counter()
         self.disordered = 0
+        self._notes: list[str] = []
         self._path = path
         self._progress = progress
 
@@ -65,7 +72,7 @@ class LogFile:
             LogError: the log cannot be used.
         """
         place = Place(self._path)
-        self.left_out, self.disordered = place.left_out, 0
+        self.left_out, self._notes, self.disordered = place.left_out, place.notes, 0
         try:
             yield from self._frames(place)
         except EOFError:
@@ -78,6 +85,15 @@ class LogFile:
         except zlib.error as error:
             raise place.error(f"damaged packing ({error})", "a log that is whole") from None
 
+    def warnings(self) -> Iterator[str]:
+        """Yield what to know of the last iteration, before its frames are believed."""
+        yield from self._notes
+        if self.left_out:
+            counts = ", ".join(f"{count} {kind}" for kind, count in self.left_out.items())
+            yield f"what is no data frame is left out: {counts}"
+        if self.disordered:
+            yield f"{self.disordered} frames stand behind later ones; the log's order counts"
+
     def _frames(self, place: Place) -> Iterator[TimedFrame]:
         """Its frames, whose times never go back."""
         packed, suffix = _format(place)
@@ -86,9 +102,12 @@ class LogFile:
         with self._path.open("rb", buffering=0) as raw:
             size = raw.seek(0, 2)
             raw.seek(0)
-            file: BinaryIO = BufferedReader(raw, BUFFER_BYTES)
+            file: BufferedReader[Any] = BufferedReader(raw, BUFFER_BYTES)
             if packed:
                 file = BufferedReader(_Unpacked(file), BUFFER_BYTES)
+            # PowerShell writes UTF-16 with ">".
+            if suffix not in BINARY and (encoding := encoding_of(file.peek(4)[:4])):
+                file = BufferedReader(_Utf8(file, encoding), BUFFER_BYTES)
             last_ns: int | None = None
             latest_ns = 0
             for frame in READERS[suffix](file, place):
@@ -141,7 +160,7 @@ class _UnpackedWithoutEndError(Exception):
 class _Unpacked(RawIOBase):
     """Unpacked content of a gzip file; of a file that is cut off, all of it before the error."""
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, file: BufferedReader) -> None:
         self._packed = file
         self._file = gzip.GzipFile(fileobj=file)
         self._count = 0
@@ -165,6 +184,27 @@ class _Unpacked(RawIOBase):
 
     def tell(self) -> int:
         return self._file.tell()
+
+
+class _Utf8(RawIOBase):
+    """UTF-8, without a mark, of a text in another encoding."""
+
+    def __init__(self, file: BufferedReader, encoding: str) -> None:
+        self._file = file
+        self._decoder = getincrementaldecoder(encoding)("replace")
+        self._text, self._ended = b"", False
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        while not (self._text or self._ended):
+            data = self._file.read1()
+            self._ended = not data
+            self._text = self._decoder.decode(data, self._ended).encode("utf-8", "replace")
+        count = min(len(buffer), len(self._text))
+        buffer[:count], self._text = self._text[:count], self._text[count:]
+        return count
 
 
 def read_log(path: Path, progress: Callable[[float], None] | None = None) -> Iterator[TimedFrame]:

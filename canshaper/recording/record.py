@@ -19,16 +19,26 @@ class Recording:
     Attributes:
         frames: by kind, the empty one for data frames.
         lost: frames that the kernel could not keep for us.
+        errors: of the interfaces, each in place of a frame.
         history: what the status messages reported.
         seconds: how long.
     """
 
     def __init__(self, deployment: Deployment) -> None:
         self.frames: Counter[str] = Counter()
-        self.lost = 0
+        self.lost = self.errors = 0
+        self._last_error = ""
         self.seconds = 0.0
         self.history = History(deployment)
         self._deployment = deployment
+
+    def __str__(self) -> str:
+        text = f"{self.seconds:.1f} s, {self.frames.total()} frames"
+        others = ", ".join(f"{count} {kind}" for kind, count in self.frames.items() if kind)
+        text += f" ({others})" if others else ""
+        if self.errors:
+            text += f", {self.errors} ERRORS of the interface, the last {self._last_error}"
+        return f"{text}, {self.lost} LOST by the kernel" if self.lost else text
 
     def run(
         self,
@@ -59,6 +69,7 @@ class Recording:
                             self.history.receive(frame)
                     now = time.monotonic()
                     self.seconds, self.lost = now - begin, listener.lost
+                    self.errors, self._last_error = listener.errors.total(), listener.last_error
                     if now - flushed >= FLUSH_S:
                         flushed = now
                         log.flush()

@@ -16,6 +16,8 @@ from canshaper.recording.channels import Key, Kind, Sorter, TimedFrame, bus_of_c
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import Player, frames_of, of_its_copies, of_same_files
 from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick, clocked
+from canshaper.shaping.reasons import REASON_TEXTS
+from canshaper.shaping.states import Reason, State
 
 # What is looked at before a replay, to know the channels.
 LOOKED_AT = 20_000
@@ -108,6 +110,7 @@ class Replay:
         received: frames of each message that is received.
         verdict: of a black box.
         cut_off: the log is cut off, and why; else empty.
+        never_ready: ticks of each reason, of axes that were never ready in a log.
     """
 
     def __init__(self, deployment: Deployment, drive: Drive) -> None:
@@ -115,6 +118,7 @@ class Replay:
         self.received: Counter[Key] = Counter()
         self.verdict = Verdict()
         self.cut_off = drive.box.cut_off if drive.box else ""
+        self.never_ready: dict[str, Counter[Reason]] = {}
         self._deployment = deployment
         self._drive = drive
         self.log = LogFile(drive.path)
@@ -140,10 +144,19 @@ class Replay:
 
     def _clocked(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
         self.log = LogFile(self._drive.path, progress)
-        stepper = Stepper(Controller(self._deployment))
+        controller = Controller(self._deployment)
+        stepper = Stepper(controller)
+        waiting = self.never_ready = {name: Counter() for name in controller.axes}
         tick_ns = self._deployment.config.tick_ms * 1_000_000
         for tick in clocked(self._frames(Sorter(self._deployment)), tick_ns):
-            yield tick, stepper.step(tick)
+            result = stepper.step(tick)
+            for name in [*waiting]:
+                runner = controller.axes[name]
+                if runner.axis.state is State.READY:
+                    del waiting[name]
+                else:
+                    waiting[name][runner.reason] += 1
+            yield tick, result
 
     def check_joysticks(self) -> None:
         """Look whether there was anything to replay.
@@ -190,11 +203,10 @@ class Replay:
             yield f"{self.cut_off}; replayed up to there"
         for name in self._missing():
             yield f"no joystick frame of {name}"
-        if self.log.left_out:
-            counts = ", ".join(f"{count} {kind}" for kind, count in self.log.left_out.items())
-            yield f"frames that are no data frames are left out: {counts}"
-        if self.log.disordered:
-            yield f"{self.log.disordered} frames stand behind later ones; the log's order counts"
+        for name, reasons in self.never_ready.items():
+            ((reason, _),) = reasons.most_common(1) or [(Reason.START, 0)]
+            yield f"{name} was never ready: {REASON_TEXTS[reason].words} ({reason.name})"
+        yield from self.log.warnings()
 
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
         """Frames of the log on the buses of the deployment, but those that no daemon sees."""

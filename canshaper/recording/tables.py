@@ -1,122 +1,221 @@
-"""Logs that are tables with commas, python-can's and GVRET's, and the writer of logs."""
+"""Logs that are tables whose header names the columns, and the writer of logs.
 
+Those of python-can, GVRET (SavvyCAN), CANedge, Kvaser and Vector, with commas, semicolons or tabs,
+and what Excel makes of them.
+"""
+
+import csv as quoted
 import re
 from base64 import b64decode
-from binascii import unhexlify
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import Decimal
+from operator import itemgetter
 from typing import BinaryIO, TextIO
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.layout import CLASSICAL_BYTES
+from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
+from canshaper.errors import LogError
 from canshaper.machine.routing import Key
-from canshaper.recording.asc import SECOND_NS, id_text, lines, shown
+from canshaper.recording.asc import lines, shown
 from canshaper.recording.channels import LATEST_S, MOST_BYTES, Place, TimedFrame
 from canshaper.recording.ticks import Result, Tick
 
-_CSV = re.compile(
-    rb"([0-9.e+-]+),(0x[0-9a-f]{1,8}),([01]),([01]),([01]),([0-9]{1,2}),([A-Za-z0-9+/]*=*)\s*"
-)
-CSV_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
-# SavvyCAN before 2018 had no column for the direction.
-GVRET_HEADERS = ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1", "Time Stamp,ID,Extended,Bus,LEN,D1")
-_GVRET = re.compile(
-    rb"(\d{1,19}),([0-9A-Fa-f]{1,8}),(true|false|[01]),(?:[RT]x,)?(\d+),(\d{1,2}),"
-    rb"((?:[0-9A-Fa-f]{1,2},)*[0-9A-Fa-f]{0,2})\s*",
-    re.IGNORECASE,
-)
-_TRUE = frozenset((b"true", b"1"))
-Reader = Callable[[bytes, Place], TimedFrame | None]
-
+# Names of columns without case, units and signs; the first two groups and one of data are needed.
+NAMES: Mapping[str, str] = {
+    "time": "time|timestamp|timestampepoch|zeit",
+    "id": "id|arbitrationid|canid|identifier",
+    "data": "data|databytes",
+    "channel": "channel|chn|chan|ch|bus|buschannel|kanal",
+    "extended": "extended|ide|ext",
+    "remote": "remote|rtr",
+    "error": "error",
+    "flags": "flags",
+    "kind": "eventtype|type",
+    "direction": "dir|direction",
+    "length": "datalength|length|len",
+    "code": "dlc",
+}
+_COLUMN = re.compile("|".join(f"(?P<{name}>{words})" for name, words in NAMES.items()))
+_BYTE = re.compile(r"(?:d|data)(\d{1,2})")
+_UNIT = re.compile(r"[\[( ](ms|us|µs|ns)\b")
+_UNITS = {"ms": 6, "us": 3, "µs": 3, "ns": 0}
+FORMAT = re.compile(r"format of (id|data) field\W+(hex|dec)", re.IGNORECASE)  # Kvaser's
+_TRUE = frozenset(("1", "true", "wahr"))
+_REMOTE, _EXTENDED, _ERROR = 1, 4, 0x20  # Kvaser's flags
+WRAP_NS = (1 << 32) * 1000  # of a clock of 32 bits that counts microseconds
 _new = tuple.__new__  # TimedFrame(...) in half the time
+MOST_KNOWN = 10_000
+MOST_ABOVE = 30  # lines above the header
+HEADER = "a header that names time, id and data, such as Time;Channel;ID;DLC;Data"
+# Channel, id, whether that is extended, and length; or of what kind it is that is left out.
+Known = tuple[str, int, bool, int | None] | str
 
 
 def is_log(header: str) -> bool:
     """Whether this first line of a table is that of a log of frames, or nearly one."""
-    return "arbitration_id" in header or header.startswith(GVRET_HEADERS)
+    of_kvaser = header.strip().startswith(("CSV CAN data", "Kvaser Memorator Log"))
+    return of_kvaser or "arbitration_id" in header or Table.of(header) is not None
 
 
 def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """A table by its header."""
-    rows = lines(file, place)
-    header = next(rows, b"").strip().decode("utf-8", "replace").removeprefix("\ufeff")
-    if header == CSV_HEADER:
-        read: Reader = _python_can
-    elif header.startswith(GVRET_HEADERS):
-        read = _gvret
-    else:
-        expected = f"the header of python-can, {CSV_HEADER}, or of GVRET, {GVRET_HEADERS[0]}..."
-        raise place.error(shown(header.encode()), expected)
-    for row in rows:
-        if (frame := read(row, place)) is not None:
+    """A table by its header, which may stand below some lines."""
+    rows, bases = lines(file, place), {}
+    first = header = next(rows, b"").decode("utf-8", "replace").strip()
+    while (table := Table.of(header)) is None:
+        if found := FORMAT.search(header):
+            bases[found[1].lower()] = 16 if found[2].lower() == "hex" else 10
+        if place.number >= MOST_ABOVE or not (row := next(rows, b"")):
+            place.number = 1
+            raise place.error(shown(first.encode()), HEADER)
+        header = row.decode("utf-8", "replace").strip()
+    table.bases.update(bases)
+    frames = table.frames(rows, place)
+    return _unwrapped(frames) if table.of_gvret else frames
+
+
+def _unwrapped(frames: Iterator[TimedFrame]) -> Iterator[TimedFrame]:
+    """Frames of a clock of 32 bits, signed or not: from 0 where it began below, and on over it."""
+    offset_ns: int | None = None
+    before_ns = 0
+    for frame in frames:
+        if offset_ns is None:
+            offset_ns = before_ns = max(0, -frame.time_ns)
+        elif before_ns - frame.time_ns - offset_ns > WRAP_NS * 9 // 10:
+            offset_ns += WRAP_NS
+        before_ns = frame.time_ns + offset_ns
+        yield frame._replace(time_ns=before_ns) if offset_ns else frame
+
+
+class Table:
+    """Columns of a table, by the names in ``NAMES``, and the frames in its rows.
+
+    Attributes:
+        bases: of identifiers and bytes.
+        of_gvret: whether its times are microseconds, which GVRET does not say.
+    """
+
+    def __init__(self, header: str, delimiter: str, at: dict[str, int], *, cells: bool) -> None:
+        self.bases = {"id": 16, "data": 16}
+        self._header, self._delimiter, self._at, self._cells = header, delimiter, at, cells
+        self._packed = "arbitration_id" in header  # python-can's, in Base64
+        unit = _UNIT.search(header.lower().split(delimiter)[at["time"]])
+        self.of_gvret = cells and header.lower().startswith("time stamp")
+        self._power = _UNITS[unit[1]] if unit else 3 if self.of_gvret else 9
+
+    @classmethod
+    def of(cls, header: str) -> "Table | None":
+        """The table under a header; None where its rows are no frames."""
+        delimiter = next((one for one in ";\t," if one in header), ",")
+        at: dict[str, int] = {}
+        cells = False
+        for place, cell in enumerate(header.replace('"', "").lower().split(delimiter)):
+            name = re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", cell))
+            if _BYTE.fullmatch(name):
+                cells = cells or "data" not in at
+                at.setdefault("data", place)
+            elif (match := _COLUMN.fullmatch(name)) and match.lastgroup:
+                at.setdefault(match.lastgroup, place)
+        if not {"time", "id", "data"} <= at.keys():
+            return None
+        return cls(header, delimiter, at, cells=cells)
+
+    def frames(self, rows: Iterator[bytes], place: Place) -> Iterator[TimedFrame]:
+        """Yield the data frames of rows."""
+        others = [at for name, at in self._at.items() if name not in ("time", "data")]
+        key_of = itemgetter(*others)
+        width, delimiter, at_time = max(self._at.values()) + 1, self._delimiter, self._at["time"]
+        known: dict[object, Known] = {}  # most rows are of a few kinds
+        for row in rows:
+            text = row.decode("utf-8", "replace").strip()
+            if not text:
+                continue
+            try:
+                cells = text.split(delimiter)
+                if '"' in text:
+                    (cells,) = quoted.reader([text], delimiter=delimiter)
+                if len(cells) < width:
+                    cells += [""] * (width - len(cells))
+                key = key_of(cells)
+                if (what := known.get(key)) is None:
+                    if len(known) == MOST_KNOWN:
+                        known.clear()
+                    known[key] = what = self._kind(cells, place)
+                if isinstance(what, str):
+                    place.left_out[what] += 1
+                    continue
+                channel, can_id, extended, length = what
+                payload, time_ns = self._payload(cells, length), self._time_ns(cells[at_time])
+            except LogError:
+                raise
+            except (ArithmeticError, ValueError, quoted.Error):
+                raise place.error(shown(row), f"a row of {self._header}") from None
+            frame = _new(TimedFrame, (time_ns, channel, can_id, extended, payload))
+            if length is None or len(payload) != length:
+                place.checked(frame, len(payload) if length is None else length)
             yield frame
 
+    def _kind(self, cells: Sequence[str], place: Place) -> Known:
+        """Channel, id and length of a row; or what it is instead of a data frame."""
+        row = {name: cells[at].strip().lower() for name, at in self._at.items()}
+        flags = int(row.get("flags") or "0")
+        for name, bit in (("error", _ERROR), ("remote", _REMOTE)):
+            if flags & bit or name in row.get("kind", "") or row.get(name) in _TRUE:
+                return name
+        if not (word := row["id"]):
+            return "without id"
+        if row.get("direction") == "txrq":  # its Tx follows
+            return "asked for"
+        if self._packed and not word.startswith("0x"):
+            raise ValueError
+        digits = word.removeprefix("0x").removesuffix("h").removesuffix("x")
+        number = _number(digits, self.bases["id"])
+        extended = row.get("extended") in _TRUE or bool(flags & _EXTENDED)
+        if not {"extended", "flags"} & row.keys():
+            extended = word.endswith("x") or len(digits) == 8 or number > 0x7FF
+        length = int(row["length"]) if row.get("length") else None
+        if length is None and row.get("code"):
+            length = int(row["code"])
+            if not self._packed and CLASSICAL_BYTES < length < len(FD_LENGTHS):
+                length = FD_LENGTHS[length]
+        if (length or 0) > MOST_BYTES:
+            return "impossible"
+        channel = cells[self._at["channel"]].strip() if "channel" in row else ""
+        place.checked(TimedFrame(0, channel, number, extended, b""), 0)
+        return channel, number, extended, length
 
-def _python_can(row: bytes, place: Place) -> TimedFrame | None:
-    """A row of python-can's table, which has no channels."""
-    match = _CSV.fullmatch(row)
-    if match is None:
-        raise place.error(shown(row), f"a row of {CSV_HEADER}")
-    time, number, extended, remote, error, length, data = match.groups()
-    if error == b"1" or remote == b"1":
-        place.left_out["error" if error == b"1" else "remote"] += 1
-        return None
-    try:
-        payload = b64decode(data)
-        time_ns = _time_ns(time)
-    except (ArithmeticError, ValueError):
-        raise place.error(shown(row), f"a row of {CSV_HEADER}") from None
-    if len(payload) > MOST_BYTES:
-        place.left_out["impossible"] += 1
-        return None
-    if len(payload) != int(length):
-        raise place.error(f"{len(payload)} of {length.decode()} bytes", "all of them")
-    can_id, wide = int(number, 16), extended == b"1"
-    if can_id >> (29 if wide else 11):
-        raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with extended 1")
-    frame: TimedFrame = _new(TimedFrame, (time_ns, "", can_id, wide, payload))
-    return frame
+    def _payload(self, cells: Sequence[str], length: int | None) -> bytes:
+        at, base = self._at["data"], self.bases["data"]
+        if self._packed:
+            return b64decode(cells[at], validate=True)
+        if self._cells:
+            end = at + (CLASSICAL_BYTES if length is None else length)
+            words = [cell for cell in cells[at:end] if cell]
+        elif base == 16:
+            return bytes.fromhex(cells[at])
+        else:
+            words = cells[at].split()
+        text = "".join(words)
+        if base == 16 and len(text) == 2 * len(words):
+            return bytes.fromhex(text)
+        return bytes([_number(word.strip(), base) for word in words])
+
+    def _time_ns(self, word: str) -> int:
+        power = self._power
+        if power == 3 and word.isdecimal() and len(word) <= 19:
+            return int(word) * 1000
+        whole, _, part = word.partition(".")
+        if whole.isdigit() and len(whole) <= 19 and len(part) <= power and (part or "0").isdigit():
+            return int(whole + part.ljust(power, "0"))
+        seconds = Decimal(word.replace(",", "."))
+        if abs(seconds) > LATEST_S * 10 ** (9 - power):  # before it has a million digits
+            raise ValueError
+        return int(seconds.scaleb(power).to_integral_value())
 
 
-def _time_ns(time: bytes) -> int:
-    """A time in seconds, without a float.
-
-    Raises:
-        ValueError, ArithmeticError: it is none, or none of a clock.
-    """
-    whole, _, part = time.partition(b".")
-    if whole.isdigit() and part.isdigit() and len(whole) <= 10 and len(part) <= 9:
-        return int(whole) * SECOND_NS + int(part.ljust(9, b"0"))
-    seconds = Decimal(time.decode("ascii"))
-    if abs(seconds) > LATEST_S:  # before it is a number of a million digits
+def _number(word: str, base: int) -> int:
+    if not (word.isascii() and word.isalnum() and len(word) <= 10):  # int() takes more
         raise ValueError
-    return int(seconds.scaleb(9).to_integral_value())
-
-
-def _gvret(row: bytes, place: Place) -> TimedFrame | None:
-    """A row of SavvyCAN's table: microseconds, buses from 0."""
-    if not row.strip():
-        return None
-    match = _GVRET.fullmatch(row)
-    if match is None:
-        raise place.error(shown(row), f"a row of {GVRET_HEADERS[0]}...")
-    time, number, extended, bus, length, data = match.groups()
-    count = int(length)
-    if count > MOST_BYTES:
-        place.left_out["impossible"] += 1
-        return None
-    if len(data) == 3 * count:  # as SavvyCAN writes them
-        payload = unhexlify(data.replace(b",", b""))
-    else:
-        payload = bytes([int(byte, 16) for byte in data.split(b",")[:count] if byte])
-    if len(payload) != count:
-        raise place.error(f"{len(payload)} of {count} bytes", "all of them")
-    can_id, wide = int(number, 16), extended.lower() in _TRUE
-    if can_id >> (29 if wide else 11):
-        raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with Extended true")
-    content = (int(time) * 1000, bus.decode(), can_id, wide, payload)
-    frame: TimedFrame = _new(TimedFrame, content)
-    return frame
+    return int(word, base)
 
 
 class LogWriter:

@@ -6,7 +6,7 @@ from typing import BinaryIO
 
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
 from canshaper.errors import LogError
-from canshaper.recording.asc import id_text, lines, shown
+from canshaper.recording.asc import lines, shown
 from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 
 # Columns by version: number, offset of time (ms), bus, type, id, reserved, length, data. From 2.0
@@ -26,7 +26,6 @@ _LEFT_OUT = {
     **dict.fromkeys(("Error", "ER"), "error"),
     "RR": "remote",
 }
-_new = tuple.__new__  # TimedFrame(...) in half the time
 _NO_ID = "FFFFFFFF"  # of a warning, in version 1.0
 
 
@@ -99,10 +98,7 @@ def _frame(cells: list[str], columns: str, begin_ns: int, place: Place) -> Timed
     if len(payload) != length or length > most:
         raise place.error(f"{len(payload)} of {length} bytes", f"all of them, {most} at most")
     can_id, extended = int(number, 16), len(number) > 4
-    if can_id >> (29 if extended else 11):
-        raise place.error(id_text(can_id), "an id of 11 bits in 4 digits, or of 29 in 8")
     whole, _, part = cells[at("O")].partition(".")
     time_ns = begin_ns + int(whole) * 1_000_000 + int((part or "0").ljust(6, "0")[:6])
     channel = cells[at("B")] if "B" in columns else "1"
-    frame: TimedFrame = _new(TimedFrame, (time_ns, channel, can_id, extended, payload))
-    return frame
+    return place.checked(TimedFrame(time_ns, channel, can_id, extended, payload), length)

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from tests.cli.eds_nodes import ANSWERS, init
-from tests.commissioning.nodes.eds_files import JOYSTICK, mapping, pdo, write
+from tests.commissioning.nodes.eds_files import JOYSTICK, VALVE, mapping, pdo, write
 
 
 @pytest.mark.parametrize(
@@ -43,6 +43,15 @@ def test_a_file_that_is_no_eds_is_one_line_and_a_bad_pdo_a_warning(tmp_path: Pat
     result = CliRunner().invoke(app, words, input="", prog_name="canshaper")
     assert "[1A01sub5]: expected a mapping of 8 bytes at most, got 80 bits" in result.output
     assert "TPDO1 0x190, event timer 0 ms: Slew, NearFar, Buttons" in result.output
+
+
+def test_a_node_without_pdo_is_said_before_any_question(tmp_path: Path) -> None:
+    result = init(tmp_path, "", near={key: VALVE[key] for key in (0x1000, 0x6040)})
+    assert result.exit_code == 2
+    assert result.output == (
+        f"{tmp_path}/near.eds: expected a PDO with objects, got none; map some, and export the"
+        " DCF\n"
+    )
 
 
 def test_a_dbc_that_is_there_stays(tmp_path: Path) -> None:

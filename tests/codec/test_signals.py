@@ -73,11 +73,17 @@ def test_no_range_to_both_sides(low: float, high: float, scale: float, is_float:
     )
 
 
-@pytest.mark.parametrize(("low", "high"), [(None, 5.0), (-5.0, None), (5.0, 5.0), (5.0, -5.0)])
+@pytest.mark.parametrize(("low", "high"), [(None, 5.0), (-5.0, None), (5.0, 5.0)])
 def test_no_range_at_all(low: Number, high: Number) -> None:
     one = signal(low, high)
     assert str(symmetrical_range(one)).startswith("S has no range in the DBC; full speed is taken")
     assert radius_range(one) == "S has no range in the DBC; what lies outside is no radius"
+
+
+def test_a_range_the_wrong_way_round() -> None:
+    one = signal(5.0, -5.0)
+    text = "S: expected the range [-5|5], got [5|-5]"
+    assert symmetrical_range(one) == radius_range(one) == magnitude_range(one) == text
 
 
 @pytest.mark.parametrize(

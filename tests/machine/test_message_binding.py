@@ -246,12 +246,6 @@ def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
             "JoystickLeft",
             "Slew: expected a start bit of 0 or more, got -1",
         ),
-        (
-            '"GenMsgCycleTime" INT',  # a type that there is not: everything is text
-            '"GenMsgCycleTime" nanINT',
-            "JoystickLeft",
-            "GenMsgCycleTime: expected a whole number of ms, got '20'",
-        ),
     ],
 )
 def test_numbers_that_are_none_are_reported(

@@ -46,7 +46,19 @@ def test_a_log_without_joystick_frames_is_reported_with_what_it_has(tmp_path: Pa
 def test_one_missing_joystick_is_a_warning(tmp_path: Path) -> None:
     replay = replayed(written(tmp_path, [row for row in drive() if " 111#" not in row]))
     replay.check_joysticks()
-    assert list(replay.warnings()) == ["no joystick frame of JoystickRight, id 0x111 on crane"]
+    assert list(replay.warnings()) == [
+        "no joystick frame of JoystickRight, id 0x111 on crane",
+        "lift was never ready: no joystick message (JOYSTICK_TIMEOUT)",
+    ]
+
+
+def test_an_axis_that_was_never_ready_is_named_with_what_it_waited_for(tmp_path: Path) -> None:
+    assert replayed(DRIVE).never_ready == {}
+    rows = [f"({n // 50}.{n % 50 * 20:03d}000) vcan0 110#{0:016X}\n" for n in range(300)]
+    replay = replayed(written(tmp_path, rows))
+    said = [text for text in replay.warnings() if text.startswith(("slew", "near_far"))]
+    why = "was never ready: enable is off (ENABLE_OFF)"
+    assert said == [f"slew {why}", f"near_far {why}"]
 
 
 def test_a_log_that_is_cut_off_is_replayed_up_to_there(tmp_path: Path) -> None:

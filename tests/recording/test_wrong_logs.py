@@ -125,24 +125,22 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         ),
         (
             "a.csv",
-            "time;id;data\n",
-            "expected the header of python-can,"
-            " timestamp,arbitration_id,extended,remote,error,dlc,data, or of GVRET, Time Stamp,ID,"
-            "Extended,Dir,Bus,LEN,D1..., got 'time;id;data'",
+            "time;id;value\n",
+            "a.csv:1: expected a header that names time, id and data, such as"
+            " Time;Channel;ID;DLC;Data, got 'time;id;value'",
         ),
         ("a.blf", "LOGG", "expected a BLF log that is whole, got error"),
         ("a.blf", "x" * 200, "got BLFParseError Unexpected file format"),
         (
-            "a.txt",
+            "a.xyz",
             "",
-            "expected the suffix .log, .asc, .blf, .csv, .db, .mf4, .trc, each also with .gz"
-            " behind, got '.txt'",
+            "expected the suffix .log, .asc, .blf, .csv, .db, .mf4, .trc, .txt, .pcap, .pcapng,"
+            " each also with .gz behind, got '.xyz'",
         ),
         (
             "drive",
             "",
-            "expected the suffix .log, .asc, .blf, .csv, .db, .mf4, .trc, each also with .gz"
-            " behind, got none",
+            "each also with .gz behind, got none",
         ),
     ],
 )

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from cantools.database.can import Message
 
     from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
+    from canshaper.commissioning.nodes.eds import Eds
     from canshaper.commissioning.nodes.node import Node, Pdo
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.commissioning.nodes.use import MessageTiming
@@ -40,17 +41,22 @@ class Nodes:
         self.named: dict[str, Node] = {}
         self.messages: list[Message] = []
         self._pdos: dict[str, tuple[str, Pdo]] = {}
-        for path in files:
-            self._add(path)
+        if not files:
+            return
+        from canshaper.commissioning.nodes import eds, node
 
-    def _add(self, path: Path) -> None:
+        read = [eds.Eds(path) for path in files]
+        for one in read:
+            node.Node(one, one.node or _FIRST)  # one without PDO is said before any question
+        for one in read:
+            self._add(one)
+
+    def _add(self, eds: "Eds") -> None:
         from canshaper.commissioning.nodes import messages
-        from canshaper.commissioning.nodes.eds import Eds
         from canshaper.commissioning.nodes.node import Node
 
-        eds = Eds(path)
-        likely = _likely_name(path.stem, self.named)
-        name = ask(f"{path.name}: name of the node", _name(self.named), likely)
+        likely = _likely_name(eds.path.stem, self.named)
+        name = ask(f"{eds.path.name}: name of the node", _name(self.named), likely)
         ids = [node.id for node in self.named.values()]
         free = next(number for number in range(_FIRST, _LAST + 1) if number not in ids)
         node_id = ask(f"{name}: node id", _node_id(ids), str(eds.node or free))

@@ -42,7 +42,7 @@ def identify(
     logs: list[str] | None = typer.Argument(
         None,
         metavar="[LABEL=]LOG...",
-        help="CAN logs (.log, .asc, .blf, .trc, .db, .mf4) or tables (.csv) of a phone or logger.",
+        help="CAN logs, as replay reads them, or tables (.csv) of a phone or logger.",
     ),
     file: str | None = typer.Option(
         None, "--file", help="Deployment: its DBC files, axes, commands and grapple signal."

@@ -113,7 +113,7 @@ def record(
     if not recording.frames:
         text = f"nothing was received, {out} is without frames: is the bus up, and the machine on?"
         echo(text, err=True)
-    echo(f"{out}: {_text(recording)}")
+    echo(f"{out}: {recording}")
 
 
 def _last(file: str, control: Path | None) -> None:
@@ -155,6 +155,7 @@ def _bundle(
         "seconds": round(recording.seconds, 3),
         "frames": {kind or "data": count for kind, count in recording.frames.items()},
         "lost_by_the_kernel": recording.lost,
+        "errors_of_the_interface": recording.errors,
         "ended": str(failure) if failure else "as asked",
     }
     try:
@@ -165,11 +166,4 @@ def _bundle(
 
 
 def _line(recording: "Recording", out: Path) -> str:
-    return f"recording to {out}: {_text(recording)} (Ctrl-C ends it)"
-
-
-def _text(recording: "Recording") -> str:
-    text = f"{recording.seconds:.1f} s, {recording.frames.total()} frames"
-    others = ", ".join(f"{count} {kind}" for kind, count in recording.frames.items() if kind)
-    text += f" ({others})" if others else ""
-    return f"{text}, {recording.lost} LOST by the kernel" if recording.lost else text
+    return f"recording to {out}: {recording} (Ctrl-C ends it)"

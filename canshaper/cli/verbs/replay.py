@@ -44,7 +44,7 @@ MOST_EVENTS = 12
 
 def replay(
     log: Path = typer.Argument(..., help="A black box or another bundle (.zip);"
-    " .log, .asc, .blf, .trc, .csv, .db, .mf4, see docs/replay.md."),
+    " .log, .asc, .blf, .trc, .csv, .txt, .pcap, .db, .mf4, see docs/replay.md."),
     configs: list[str] | None = typer.Option(
         None, "--config", metavar="FILE", help="Deployment; twice for two side by side. Of a bundle"
         " its own by default."

@@ -37,7 +37,7 @@ EXIT_TOO_POOR = 1
 def sensor(
     file: str = FILE,
     log: Path | None = typer.Argument(
-        None, help="CAN log (.log, .asc, .blf, .trc, .db, .mf4) of a drive; else the simulated one."
+        None, help="CAN log of a drive, as replay reads it; else the simulated one."
     ),
     axis: str | None = typer.Option(None, "--axis", help="This one only."),
     live: bool = typer.Option(False, "--live", help="Listen to the machine while you drive it."),
@@ -142,8 +142,7 @@ def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
     with Live(console=SafeConsole(stderr=True), refresh_per_second=4) as shown:
 
         def report(so_far: Recording) -> bool:
-            text = f"{so_far.seconds:.0f} s, {so_far.frames.total()} frames"
-            shown.update(f"listening, drive now: {text} (Ctrl-C ends it)")
+            shown.update(f"listening, drive now: {so_far} (Ctrl-C ends it)")
             return not stop.requested
 
         recording.run(log, seconds, report)

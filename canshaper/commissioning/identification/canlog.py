@@ -181,6 +181,7 @@ def _read(
             commands.receive(time_s, key, frame.data)
     except CutOffError as error:
         notes.append(f"{error}; what stands before it was used")
+    notes += log.warnings()
     if channel is not None and not seen:
         there = ", ".join(map(repr, sorted(channels))) or "none"
         raise LogError(f"{path}: expected the bus {channel!r}, got frames of {there}")

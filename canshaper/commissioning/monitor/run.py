@@ -21,6 +21,7 @@ from canshaper.recording.listen import Listener
 
 # How often a bus that has gone is looked for.
 REOPEN_S = 1.0
+GARBLED = "unreadable"
 SECOND_NS = 1_000_000_000
 
 
@@ -45,6 +46,10 @@ class Ear:
         try:
             for frame in self._listener.frames(timeout_s):
                 self._monitor.receive(frame)
+            if count := self._listener.errors.total():
+                if not self._monitor.others[GARBLED]:
+                    self._monitor.note(time.time_ns(), self._listener.last_error)
+                self._monitor.others[GARBLED] = count
         except BusError as error:
             self._monitor.note(time.time_ns(), f"{error}; trying again")
             self.close()

@@ -13,15 +13,19 @@ from pathlib import Path
 from canopen.objectdictionary import ObjectDictionary
 from canopen.objectdictionary.eds import import_eds
 
-from canshaper.config.source import read_bounded
+from canshaper.config.source import encoding_of, read_bounded
 from canshaper.errors import ConfigError, Problem
 
 # What canopen thinks of types that no PDO has is not for the operator's terminal.
 logging.getLogger("canopen.objectdictionary").setLevel(logging.ERROR)
 MOST_BYTES = 4 << 20
 _OBJECT = re.compile(r"([0-9A-F]{4})(sub[0-9A-F]+)?", re.IGNORECASE)
-_OF_OBJECTS = re.compile(r"[0-9A-F]{1,4}(sub[0-9A-F]+|Name|Value)?", re.IGNORECASE)
+_OF_OBJECTS = re.compile(r"([0-9A-F]{1,4})(?:(sub(?=.)|Name$|Value$)([0-9A-F]*))?", re.IGNORECASE)
 _NODE = "DeviceComissioning"  # as the standard spells it
+_MAY_BE_EMPTY = ("ObjectType", "PDOMapping", "LowLimit", "HighLimit", "SubNumber", "CompactSubObj")
+_OTHERS = ("ParameterName", "ParameterValue", "DataType", "AccessType", "DefaultValue", "NodeID")
+_KEYS = {key.lower(): key for key in (*_MAY_BE_EMPTY, *_OTHERS)}
+_PARTS = {part.lower(): part for part in ("", "sub", "Name", "Value")}
 _VARIABLES = (0x2, 0x7)  # DOMAIN, VAR
 
 
@@ -43,15 +47,19 @@ class Eds:
         self.path = path
         data = read_bounded(path, MOST_BYTES)
         try:
-            self._text = data.decode("utf-8-sig")
+            self._text = data.decode(encoding_of(data[:4]) or "utf-8")
         except UnicodeDecodeError:
             self._text = data.decode("latin-1")
+        if self._text.lstrip().startswith("<"):
+            text = "expected an EDS or DCF, got XML; export an EDS of an XDD or XDC"
+            raise ConfigError([Problem(str(path), 1, "", text)])
         self._file = configparser.RawConfigParser(inline_comment_prefixes=(";",))
         self._file.optionxform = str  # type: ignore[method-assign,assignment]
         try:
             self._file.read_string(self._text)
         except configparser.Error as error:
             raise self._not_one(error) from None
+        self._file = _canonical(self._file)
         sections = [name for name in self._file.sections() if _OBJECT.fullmatch(name)]
         if not sections:
             raise self._wrong("", "expected objects, such as [1000], got none; not an EDS or DCF")
@@ -83,6 +91,11 @@ class Eds:
         except (configparser.Error, KeyError, ValueError, TypeError) as error:
             raise self._wrong("", f"not an EDS or DCF that can be read: {error}") from None
         return objects
+
+    def elements(self, index: int) -> int:
+        """Elements of an array that has one section for all of them; 0 of another one."""
+        section, key = f"{index:04X}", "CompactSubObj"
+        return self._whole(section, key, self._file.get(section, key, fallback="0"))
 
     def problem(self, section: str, text: str) -> Problem:
         """A problem at a section, with its line."""
@@ -116,7 +129,7 @@ class Eds:
         for key in needed:
             if key not in options:
                 raise self._wrong(section, f"expected {key}, got none")
-        for key in ("DataType", "PDOMapping"):
+        for key in ("DataType", "PDOMapping", "CompactSubObj"):
             if key in options:
                 self._whole(section, key, options[key])
 
@@ -125,3 +138,21 @@ class Eds:
             return int(text, 0)
         except ValueError:
             raise self._wrong(section, f"{key}: expected a whole number, got {text!r}") from None
+
+
+def _canonical(file: configparser.RawConfigParser) -> configparser.RawConfigParser:
+    """A file with sections and keys as the standard writes them, without those that are empty."""
+    result = configparser.RawConfigParser()
+    result.optionxform = str  # type: ignore[method-assign,assignment]
+    for section in file.sections():
+        name = _NODE if section.lower() == _NODE.lower() else section
+        if match := _OF_OBJECTS.fullmatch(section):
+            index, part, subindex = match.groups("")
+            name = index.upper() + _PARTS[part.lower()] + subindex.upper()
+        if not result.has_section(name):
+            result.add_section(name)
+        for key, value in file[section].items():
+            known = _KEYS.get(key.lower(), key)
+            if value or known not in _MAY_BE_EMPTY:
+                result[name][known] = value
+    return result

@@ -106,13 +106,16 @@ class Node:
         self.pdos = [*self._pdos(RECEIVE), *self._pdos(TRANSMIT)]
         if not self.pdos:
             why = ", ".join(self.left_out) or "none"
-            none = eds.problem("", f"expected a PDO with objects, got {why}")
+            text = f"expected a PDO with objects, got {why}; map some, and export the DCF"
+            none = eds.problem("", text)
             raise ConfigError(self.faults or [none])
 
     def variable(self, index: int, subindex: int) -> ODVariable | None:
         """An object of it, or None."""
         entry = self.objects.indices.get(index)
-        if isinstance(entry, ODRecord | ODArray):
+        if isinstance(entry, ODArray) and 0 < subindex <= self.eds.elements(index):
+            entry = entry[subindex]  # like the first, where it has no name
+        elif isinstance(entry, ODRecord | ODArray):
             entry = entry.subindices.get(subindex)
         elif subindex:
             return None

@@ -1,8 +1,9 @@
 """Parameters that a node needs to work with canshaper; written by SDO where asked."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 import can
 import canopen
@@ -10,6 +11,7 @@ from canopen.sdo.exceptions import SdoError
 
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can
+from canshaper.bus.waiting import receive
 from canshaper.codec.identifier import EMERGENCY
 from canshaper.commissioning.nodes.messages import ANALOGUE_INPUTS
 from canshaper.commissioning.nodes.node import (
@@ -169,10 +171,26 @@ def _set(node: canopen.RemoteNode, parameter: Parameter) -> str:
 def _connected(bus: Bus) -> Iterator[canopen.Network]:
     network = canopen.Network()
     try:
-        network.bus = open_python_can(bus)
+        opened: Any = _GoesOn(open_python_can(bus))
     except (can.CanError, OSError, ValueError) as error:
         raise not_opened("crane", bus, error) from error
+    network.bus = opened
     try:
         yield network.connect()
     finally:
         network.disconnect()
+
+
+class _GoesOn:
+    """A bus whose errors cost an answer, and not the thread that waits for it."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+
+    def recv(self, timeout_s: float | None = None) -> can.Message | None:
+        with suppress(Exception):  # each interface raises its own kinds
+            return receive(self._bus, timeout_s)
+        return None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)

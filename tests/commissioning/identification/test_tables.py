@@ -12,7 +12,6 @@ from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.identification.table import is_table, read_table
 from canshaper.commissioning.identification.verdict import identify
 from canshaper.errors import IdentificationError
-from canshaper.recording.tables import CSV_HEADER, GVRET_HEADERS
 from canshaper_sim.grapple import Grapple, Sway
 from tests.commissioning.identification.machine import driven, period_of, phone
 
@@ -242,7 +241,16 @@ def test_progress(tmp_path: Path) -> None:
     assert 0.0 < reported[0] < reported[-1] <= 1.0
 
 
-@pytest.mark.parametrize("header", [CSV_HEADER, *(f"{one},D2" for one in GVRET_HEADERS)])
+@pytest.mark.parametrize(
+    "header",
+    [
+        "timestamp,arbitration_id,extended,remote,error,dlc,data",
+        "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2",
+        "Time Stamp,ID,Extended,Bus,LEN,D1,D2",
+        "TimestampEpoch;BusChannel;ID;IDE;DLC;DataLength;Dir;EDL;BRS;ESI;RTR;DataBytes",
+        "CSV CAN data",
+    ],
+)
 def test_a_log_of_frames_is_no_table(tmp_path: Path, header: str) -> None:
     file = tmp_path / "log.csv"
     file.write_text(f"{header}\n")

@@ -190,7 +190,7 @@ def test_what_a_node_has_not_is_said(tmp_path: Path) -> None:
         (
             {0x1800: pdo("TPDO1", "0x80000000", "20"), 0x1801: pdo("T", "0x190", "1"), 0x1A01: []},
             "joy.eds: expected a PDO with objects, got TPDO1 without identifier (1800h:1), TPDO2"
-            " empty (1A01h:0)",
+            " empty (1A01h:0); map some, and export the DCF",
         ),
     ],
 )
