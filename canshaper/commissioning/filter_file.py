@@ -1,43 +1,52 @@
 """Writing of a filter with its tail into the deployment file."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisSection
+from canshaper.config.source import Place
 from canshaper.edit.edit import Change, FileValue, change, of_limits
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
 
 
-def write_filter(
+def write_filters(
     deployment: Deployment,
     axis: str,
-    filter_values: Mapping[str, FileValue],
+    filters: Sequence[tuple[Place, Mapping[str, FileValue]]],
     tail_s: float | None,
     verb: str,
+    *,
+    sway: Mapping[str, FileValue] | None = None,
 ) -> list[str]:
-    """Write a filter, and a longer tail where the stopping distance of the file allows it.
+    """Write filters, and a longer tail where the stopping distance of the file allows it.
 
-    What it was designed for carries where it comes from: measured as the swing was.
+    What they were designed for carries where it comes from: measured as the swing was.
 
     Args:
         deployment: the machine, as its file says.
         axis: the axis.
-        filter_values: its kind and the other keys of its section filter; see ``change``.
-        tail_s: tail that the filter needs; None or less than that of the file changes nothing.
-        verb: that designed the filter.
+        filters: place below the axis, () for its own or that of a breakpoint; kind and the other
+            keys of its section filter, see ``change``.
+        tail_s: tail that they need; None or less than that of the file changes nothing.
+        verb: that designed them.
+        sway: keys of the axis' own swing to write with them.
 
     Returns:
-        Lines that have changed, which kind it replaces, and why the tail has not.
+        Lines that have changed, which kind its own replaces, and why the tail has not.
 
     Raises:
-        ConfigError: the file cannot be changed, or is no good deployment with the filter: a range
+        ConfigError: the file cannot be changed, or is no good deployment with the filters: a range
             in which the sway may be adjusted can be too wide for it. The file is as it was.
     """
     path, config = deployment.path, deployment.axes[axis].config
-    written = _with_origin(config, filter_values, verb)
-    changes: list[Change] = [(("axes", axis, "filter"), written, note(verb))]
+    changes: list[Change] = [
+        (("axes", axis, *place, "filter"), _with_origin(config, values, verb), note(verb))
+        for place, values in filters
+    ]
+    if sway:
+        changes.append((("axes", axis, "sway"), sway, note(verb)))
     kept = None
     if tail_s is not None and tail_s > config.limits.tail_s:
         limits = config.limits.model_copy(update={"tail_s": tail_s})
@@ -45,9 +54,10 @@ def write_filter(
         if not kept:
             changes.append(of_limits(axis, config, {"tail_s": tail_s}))
     lines = change(path, changes)
-    was, kind = config.filter.kind, filter_values["kind"]
-    if was != kind:
-        lines.append(f"NOTE: axes.{axis}.filter.kind: {kind} replaces {was}")
+    was = config.filter.kind
+    for kind in (values["kind"] for place, values in filters if not place):
+        if was != kind:
+            lines.append(f"NOTE: axes.{axis}.filter.kind: {kind} replaces {was}")
     if kept:
         text = f"expected {tail_s:g} s, got {config.limits.tail_s:g} s, which stays"
         lines.append(f"WARNING: axes.{axis}.limits.tail_s: {text}: stop_distance_m: {kept}")

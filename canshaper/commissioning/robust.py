@@ -1,30 +1,37 @@
 """The robust shaper of an axis: designed for its swing in the file, shown, and written there."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
-from canshaper.commissioning.filter_file import write_filter
+from canshaper.commissioning.filter_file import write_filters
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import Filter, designed, filter_of
+from canshaper.config.limits import Sway
 from canshaper.config.section import shortened
+from canshaper.config.source import Place
 from canshaper.design.profiles import swinging_axis
-from canshaper.design.tuning.evaluate import Evaluation, Machine, evaluate
+from canshaper.design.tuning.evaluate import LENGTHS_PCT, Evaluation, Machine, evaluate, shaper_of
 from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual
-from canshaper.design.tuning.robust import RobustShaper, least_residual, shortest
+from canshaper.design.tuning.robust import LEAST_TAP, RobustShaper, least_residual, shortest
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
 from canshaper.report.console import new_table
-from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Least taps of a shaper for a range: with a smaller one less of the swing is left, and a tap of the
+# joystick may be several movements. Through the limits the smallest is not always the best.
+_LEAST_TAPS = (LEAST_TAP, LEAST_TAP / 3.0, 0.0)
+# Length of the response in swings: with a range that of ZVD, which is zero twice in its middle.
+_SWINGS, _SWINGS_OF_RANGE = 0.77, 1.0
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
 
@@ -43,6 +50,9 @@ class RobustDesign:
         section: the filter section of the file.
         needed_s: tail that it needs, where that of the file is shorter.
         second: a second mode that it covers too, and the shaper without that.
+        lengths_m: shortest and longest pendulum that it was designed for, in place of a range.
+        sway: what the file has to have as the swing then, by key.
+        at: number of its breakpoint in the gain schedule; None for the axis' own filter.
     """
 
     bound: BoundAxis
@@ -54,6 +64,9 @@ class RobustDesign:
     section: dict[str, Any]
     needed_s: float | None
     second: tuple[SecondMode, RobustShaper] | None = None
+    lengths_m: tuple[float, float] | None = None
+    sway: dict[str, float] = field(default_factory=dict)
+    at: int | None = None
 
     @property
     def chosen(self) -> Filter:
@@ -65,40 +78,69 @@ def design_robust(
     deployment: Deployment,
     axis: str,
     *,
+    at: int | None = None,
     range_pct: float = 15.0,
+    lengths_m: tuple[float, float] | None = None,
     duration_s: float | None = None,
     residual_pct: float | None = None,
     second: str | None = None,
+    first: Sequence[float] = (),
 ) -> RobustDesign:
     """Design the shaper of an axis.
 
     Args:
         deployment: the machine.
         axis: name of an axis with sway data.
+        at: number of a breakpoint in the gain schedule; None for the axis' own filter.
         range_pct: lengths of the pendulum that it covers, +- %.
-        duration_s: length of its impulse response; None for 0.77 of a swing.
+        lengths_m: instead: shortest and longest pendulum that it covers.
+        duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
         residual_pct: instead: the shortest that leaves at most this.
         second: a second mode as the option --second has it.
+        first: taps with which it begins, where it has a duration.
 
     Raises:
         DesignError: the axis has no sway data.
         UsageError: there is no such shaper.
     """
     bound, sway = swinging_axis(deployment, axis)
-    mode, rate = sway.mode(), bound.config.limits.slowest_per_s
+    sway = sway if at is None else bound.config.gain_schedule[at].sway
+    mode, lengths_pct = sway.mode(), LENGTHS_PCT
+    changes: dict[str, float] = {}
+    if lengths_m is not None:
+        mode, range_pct, changes = _between(sway, lengths_m)
+        lengths_pct = tuple(part * range_pct for part in (-1.0, -0.5, 0.0, 0.5, 1.0))
+    rate, tail_s = bound.config.limits.slowest_per_s, bound.config.limits.tail_s
     tick_ms = bound.period_ticks * deployment.config.tick_ms
     tick_s = tick_ms / 1000.0
     if residual_pct is not None and duration_s is not None:
         raise UsageError("expected one of --duration and --residual, got both")
     requirements: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
     two = _second(second, mode, tick_s, rate)
+    swings = _SWINGS_OF_RANGE if lengths_m else _SWINGS
+    duration_s = duration_s or round(swings * mode.period_s / tick_s) * tick_s
+
+    def design(second: SecondMode | None, least_tap: float) -> RobustShaper:
+        if residual_pct is not None:
+            return shortest(mode, residual_pct=residual_pct, second=second, **requirements)
+        given = requirements | {"duration_s": duration_s, "least_tap": least_tap}
+        return least_residual(mode, second=second, first=first, **given)
+
+    def evaluated(shaper: RobustShaper) -> Evaluation:
+        machine, taps = Machine.of(bound), [round(tap, _DIGITS) for tap in shaper.taps]
+        if lengths_m:  # with the tail that is written with it
+            limits = replace(machine.limits, tail_s=max(tail_s, shaper.duration_s))
+            machine = replace(machine, limits=limits)
+        shaper_for = shaper_of(bound, tick_s, filter_of("robust", tick_ms=tick_ms, taps=taps))
+        return evaluate(mode, tick_s, shaper_for, machine, lengths_pct)
+
     try:
-        without = _designed(mode, None, duration_s, residual_pct, requirements)
-        shaper = _designed(mode, two, duration_s, residual_pct, requirements) if two else without
-        measured = _evaluated(bound, mode, tick_s, shaper)
+        shapers = [design(two, one) for one in _LEAST_TAPS[: 3 if lengths_m else 1]]
+        without = design(None, LEAST_TAP) if two else shapers[0]
+        measures = [(evaluated(one), one) for one in shapers]
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
-    tail_s = bound.config.limits.tail_s
+    measured, shaper = min(measures, key=lambda one: one[0].worst(range_pct))
     return RobustDesign(
         bound,
         mode,
@@ -109,26 +151,51 @@ def design_robust(
         _section(shaper, mode, requirements, tick_ms, two),
         round(shaper.duration_s + 0.1, 1) if tail_s < shaper.duration_s else None,
         (two, without) if two else None,
+        lengths_m,
+        changes,
+        at,
     )
+
+
+def _between(
+    sway: Sway, lengths_m: tuple[float, float]
+) -> tuple[SwayMode, float, dict[str, float]]:
+    """The swing in the middle of two lengths, its range in +- %, its keys in the file."""
+    low_m, high_m = lengths_m
+    length_m = round(0.5 * (low_m + high_m), 4)
+    if sway.length_m is not None:
+        changes = {"length_m": length_m}
+    else:
+        swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), sway.mode().damping_ratio)
+        changes = {"period_s": round(swing.period_s, 4)}
+    mode = sway.model_copy(update=changes).mode()
+    return mode, round(50.0 * (high_m - low_m) / length_m, 1), changes
 
 
 def summary_line(one: RobustDesign) -> str:
     """How long it takes, and what it leaves."""
-    shaper = one.shaper
+    shaper, lengths = one.shaper, f"lengths within ±{one.range_pct:g} %"
+    if one.lengths_m:
+        lengths = "pendulums of {:g} to {:g} m".format(*one.lengths_m)
     return (
         f"Robust shaper for {one.bound.name}: {shaper.duration_s:.2f} s, mean delay"
         f" {shaper.mean_delay_s:.2f} s; alone it leaves at most {100.0 * shaper.residual:.1f} % of"
-        f" the swing at lengths within ±{one.range_pct:g} %."
+        f" the swing at {lengths}."
     )
 
 
 def print_design(deployment: Deployment, one: RobustDesign, console: Console) -> None:
     """Print the residuals of a shaper, its cost, and the stopping distance with it."""
-    axis = one.bound.name
     console.print(summary_line(one))
-    console.print(_table(one.measured))
+    console.print(_table(one))
     if one.second:
         console.print(_second_table(one))
+    print_consequences(deployment, one, console)
+
+
+def print_consequences(deployment: Deployment, one: RobustDesign, console: Console) -> None:
+    """Print the tail that it needs, and the stopping distance with it."""
+    axis = one.bound.name
     if one.needed_s is not None:
         tail_s = one.bound.config.limits.tail_s
         console.print(
@@ -138,28 +205,27 @@ def print_design(deployment: Deployment, one: RobustDesign, console: Console) ->
     console.print(consequences(deployment, axis, one.chosen, one.needed_s))
 
 
-def write_design(deployment: Deployment, one: RobustDesign) -> list[str]:
-    """Write it into the file; see ``write_filter``."""
-    gone = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True))
-    return write_filter(deployment, one.bound.name, gone | one.section, one.needed_s, "robust")
+def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
+    """Write designs for an axis into the file; see ``write_filters``."""
+    config, parts = designs[0].bound.config, []
+    for one in designs:
+        place: Place = () if one.at is None else ("gain_schedule", one.at)
+        present = config.filter if one.at is None else config.gain_schedule[one.at].filter
+        gone = dict.fromkeys(present.model_dump(exclude_none=True))
+        parts.append((place, gone | one.section))
+    longest = max(designs, key=lambda one: one.shaper.duration_s)
+    name, sway = longest.bound.name, designs[0].sway
+    return write_filters(deployment, name, parts, longest.needed_s, "robust", sway=sway)
 
 
 def figure(one: RobustDesign) -> "Figure":
     """The new filter next to that of the file."""
     from canshaper.design.tuning import robust_plot  # noqa: PLC0415  # pictures alone need it
 
-    rate = one.bound.config.limits.slowest_per_s
-
-    def build(chosen: Filter) -> Callable[..., Any]:
-        parameters = chosen.parameters()
-        return lambda model: build_shaper(
-            chosen.kind, one.tick_s, model, valve_rate_per_s=rate, **parameters
-        )
-
     present = one.bound.config.filter
     filters = [
-        robust_plot.Candidate("this one", build(one.chosen)),
-        robust_plot.Candidate(f"in the file, {present.kind}", build(present)),
+        robust_plot.Candidate(name, shaper_of(one.bound, one.tick_s, chosen))
+        for name, chosen in (("this one", one.chosen), (f"in the file, {present.kind}", present))
     ]
     return robust_plot.figure(
         one.bound.name,
@@ -168,19 +234,6 @@ def figure(one: RobustDesign) -> "Figure":
         machine=Machine.of(one.bound),
         filters=filters,
         range_pct=one.range_pct,
-    )
-
-
-def _evaluated(bound: BoundAxis, mode: SwayMode, tick_s: float, shaper: RobustShaper) -> Evaluation:
-    """Measure the shaper on the axis, with the taps as they stand in the file."""
-
-    rate = bound.config.limits.slowest_per_s
-    taps = [round(tap, _DIGITS) for tap in shaper.taps]
-    return evaluate(
-        mode,
-        tick_s,
-        lambda model: build_shaper("robust", tick_s, model, valve_rate_per_s=rate, taps=taps),
-        Machine.of(bound),
     )
 
 
@@ -201,21 +254,6 @@ def _second(
         return second_mode(first, *values, tick_s=tick_s, rate_per_s=rate_per_s)
     except DesignError as error:
         raise UsageError(f"--second: {error}") from None
-
-
-def _designed(
-    mode: SwayMode,
-    second: SecondMode | None,
-    duration_s: float | None,
-    residual_pct: float | None,
-    requirements: dict[str, Any],
-) -> RobustShaper:
-
-    if residual_pct is not None:
-        return shortest(mode, residual_pct=residual_pct, second=second, **requirements)
-    tick_s = requirements["tick_s"]
-    seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
-    return least_residual(mode, duration_s=seconds, second=second, **requirements)
 
 
 def _section(
@@ -244,9 +282,14 @@ def _section(
     }
 
 
-def _table(measured: Evaluation) -> Table:
+def _table(one: RobustDesign) -> Table:
 
-    table = new_table("swing left, %", *(f"{r.length_pct:+g} %" for r in measured.residuals))
+    measured = one.measured
+    heads = [f"{r.length_pct:+g} %" for r in measured.residuals]
+    if one.lengths_m:
+        middle_m = 0.5 * sum(one.lengths_m)
+        heads = [f"{middle_m * (1.0 + r.length_pct / 100.0):.2f} m" for r in measured.residuals]
+    table = new_table("swing left, %", *heads)
     table.add_row("through the machine", *(f"{100 * r.machine:.1f}" for r in measured.residuals))
     table.add_row("shaper alone", *(f"{100 * r.linear:.1f}" for r in measured.residuals))
     return table

@@ -10,12 +10,14 @@ from canshaper.controller.ends import AimPoint, AxisEnds
 from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.hydraulics import SharedFlow
 from canshaper.controller.motion import motion_runners
+from canshaper.controller.parameter_sets import Load
 from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
 from canshaper.controller.status import SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
 from canshaper.inputs.input import EnableGate, Key, Part, carry_over
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.named_codes import values_of_schedules
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason, State, Transition
@@ -178,7 +180,7 @@ class Controller:
             self._stood_still = False
             self._invalidate()
         overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
-        together = missed or self.motions or self._flow or self._ends
+        together = missed or self.motions or self._flow or self._ends or self._load
         changed = self._before_axes(now_ns, last, now) if together else []
         silent = self.silent_buses if self._protocols else NOWHERE
         for name, runner, message, rule in self._turns:
@@ -235,6 +237,8 @@ class Controller:
         for runner, run_on in self._followed:  # it held its last demand until now
             if ticks := now // runner.period_ticks - last // runner.period_ticks:
                 run_on.add(runner.axis.command, ticks)
+        if self._load and (load := self._load.step(now_ns)):
+            self.events.append(load)
         for end in self._ends:
             if (change := end.step(now_ns)) is not None:
                 self.events.append(change)
@@ -247,11 +251,13 @@ class Controller:
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
         """Connect load state, profile, sway sensors, ends and two-axis motions to the axes."""
+        values = values_of_schedules(self.deployment.config).values()
+        self._load = Load(inputs.load_state, [*values]) if inputs.load_state and values else None
         for runner in self.axes.values():
             if switches := inputs.gates.get(runner.bound.config.command.joystick):
                 runner.add_interlock(EnableGate(switches))
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
-                runner.add_chooser(inputs.load_state, inputs.profile)
+                runner.add_chooser(self._load, inputs.profile)
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
             self._sensors[name] = SensorReport(name, self.axes[name])

@@ -105,6 +105,18 @@ class OtherFlowEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class LoadEvent:
+    """The signal of the load is known again, lost, or restless: it jumps to and fro."""
+
+    state: str
+
+    @property
+    def text(self) -> str:
+        """Line for the log."""
+        return f"load_state={self.state}"
+
+
+@dataclass(frozen=True, slots=True)
 class EndsEvent:
     """The position by which an axis is stopped ahead of its end stops is lost, or known again."""
 

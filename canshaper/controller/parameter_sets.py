@@ -1,10 +1,12 @@
 """Sway data and filter of an axis, chosen in motion by load state and operator."""
 
 import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 
 from canshaper.config.filters import Profile
 from canshaper.config.schema import AxisSection
+from canshaper.controller.events import LoadEvent
 from canshaper.inputs.value import ProfileChoice, ValueInput
 from canshaper.machine.filters import parameter_sets
 from canshaper.machine.valves import BoundAxis
@@ -25,6 +27,46 @@ LEAST_BETWEEN_NS = 100_000_000
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
 STEADY = 0.02
 STEADY_NS = 200_000_000
+# A load is gripped and dropped once in so long; a signal that says so again does not settle.
+SETTLES_NS = 2_000_000_000
+_MOST_JUMPS = 3
+
+
+class Load:
+    """The load, or that it is not known: its signal is silent, or jumps to and fro.
+
+    Args:
+        signal: says what hangs on the crane.
+        breakpoints: all of them of the machine.
+
+    Attributes:
+        value: the load, in the unit of its signal; None while it is not known.
+    """
+
+    __slots__ = ("_jump", "_jumps_ns", "_said", "_signal", "_state", "value")
+
+    def __init__(self, signal: ValueInput, breakpoints: Sequence[float]) -> None:
+        self.value: float | None = None
+        self._signal = signal
+        self._jump = 0.5 * (max(breakpoints) - min(breakpoints))
+        self._jumps_ns: deque[int] = deque(maxlen=_MOST_JUMPS)
+        self._said: float | None = None  # before it jumped last
+        self._state = "known"
+
+    def step(self, now_ns: int) -> LoadEvent | None:
+        """Take what the signal says now; whether it is known, where that has changed."""
+        value, jumps_ns = self._signal.fresh(now_ns), self._jumps_ns
+        if value is not None and (self._said is None or abs(value - self._said) >= self._jump > 0):
+            if self._said is not None:
+                jumps_ns.append(now_ns)
+            self._said = value
+        restless = len(jumps_ns) == _MOST_JUMPS and now_ns - jumps_ns[0] < SETTLES_NS
+        self.value = None if restless else value
+        state = "restless" if restless else "lost" if value is None else "known"
+        if state == self._state:
+            return None
+        self._state = state
+        return LoadEvent(state)
 
 
 class SetChooser:
@@ -33,7 +75,7 @@ class SetChooser:
     Args:
         bound: the axis.
         axis: its state machine, which is retuned.
-        load_state: says what hangs on the crane, where there is a signal for it.
+        load: what hangs on the crane, where there is a signal for it.
         profile: the operator's choice, where there is one.
 
     Attributes:
@@ -45,13 +87,13 @@ class SetChooser:
         self,
         bound: BoundAxis,
         axis: ShapedAxis,
-        load_state: ValueInput | None,
+        load: Load | None,
         profile: ProfileChoice | None,
     ) -> None:
         config = bound.config
         self.number = 0
         self._axis = axis
-        self._load_state = load_state
+        self._load = load
         self._profile = profile
         self._rate = config.limits.slowest_per_s
         self._programs = programs(bound)
@@ -70,13 +112,18 @@ class SetChooser:
         name = self._profile.name(now_ns) if self._profile else ""
         if name not in self._programs:
             name = ""
-        if name != self._now[0]:
-            name = name if self._steady(now_ns) else self._now[0]
-        else:
+        before, steps = self._now
+        value = self._load.value if self._load else None
+        lost = value is None and steps is not None  # on the way to a speed it hangs there still
+        if name == before and not lost:
             self._restless_ns = None
+        elif not self._steady(now_ns):
+            name = before
+        else:
+            lost = False
         base, sets = self._programs[name]
-        value = self._load_state.fresh(now_ns) if self._load_state and sets else None
-        steps = None if value is None else position(sets, value)
+        if not lost:
+            steps = position(sets, value) if sets and value is not None else None
         if (name, steps) == self._now or now_ns < self._not_before_ns:
             return
         self._now, self._not_before_ns = (name, steps), now_ns + LEAST_BETWEEN_NS

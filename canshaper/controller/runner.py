@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Self
 from canshaper.codec.frame import Frame
 from canshaper.codec.sent import Sender
 from canshaper.config.schema import AxisSection
-from canshaper.controller.parameter_sets import SetChooser
+from canshaper.controller.parameter_sets import Load, SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
-from canshaper.inputs.value import ProfileChoice, Value, ValueInput
+from canshaper.inputs.value import ProfileChoice, Value
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
@@ -161,9 +161,9 @@ class AxisControl:
         """Add an interlock: it has to agree before the axis may move."""
         self._interlocks.append(interlock)
 
-    def add_chooser(self, load_state: ValueInput | None, profile: ProfileChoice | None) -> None:
-        """Let load state and operator choose sway data and filter."""
-        self.chooser = SetChooser(self.bound, self.axis, load_state, profile)
+    def add_chooser(self, load: Load | None, profile: ProfileChoice | None) -> None:
+        """Let load and operator choose sway data and filter."""
+        self.chooser = SetChooser(self.bound, self.axis, load, profile)
 
     def add_sway_sensor(self, message: "SwaySensorInput") -> None:
         """Add a sway sensor."""

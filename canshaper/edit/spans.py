@@ -29,6 +29,9 @@ class Edit:
         self._count(root)
         node, self._head = root, root
         for key in place:
+            if isinstance(node, yaml.SequenceNode) and isinstance(key, int):
+                self._head, node = None, node.value[key]
+                continue
             pairs = node.value if isinstance(node, yaml.MappingNode) else []
             self._head, node = next(((k, v) for k, v in pairs if k.value == key), (None, None))
             if node is None:

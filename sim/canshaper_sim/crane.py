@@ -242,6 +242,11 @@ class Crane:
         """The axes that are held by an end stop just now."""
         return tuple(name for name, axis in self._axes.items() if axis.at_stop)
 
+    @property
+    def gripped_kg(self) -> float:
+        """Mass of what the grapple holds just now."""
+        return self.parameters.grapple.m2_kg - self._empty_kg
+
     def speed(self, axis: str) -> float:
         """Speed of an axis that it has, rad/s or m/s."""
         return self._axes[axis].speed
@@ -289,7 +294,7 @@ class Crane:
         """One internal step."""
         grapple = self.parameters.grapple
         for valve in self._uncompensated:
-            valve.meet(valve.parameters.against(grapple.m2_kg - self._empty_kg))
+            valve.meet(valve.parameters.against(self.gripped_kg))
         if self._pump:
             self._pump.advance(step_s)
         tips = self.boom.advance(step_s)

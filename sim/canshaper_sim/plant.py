@@ -10,7 +10,7 @@ from canshaper.codec.signals import find_signal
 from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import USUAL_MAX_STEP, BoundValue
+from canshaper.machine.inputs import USUAL_MAX_STEP, BoundValue, Choosing
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
@@ -104,6 +104,31 @@ class _ValveFeedback:
             yield self._sender.frame({self._signal: self._sender.fields.raw(self._signal, value)})
 
 
+class _LoadMessage:
+    """What the machine says of its load, each cycle: kg, or in any other unit whether there is one.
+
+    Args:
+        bound: the signal that the deployment reads.
+    """
+
+    def __init__(self, bound: BoundValue[Choosing]) -> None:
+        self._signal = bound.signal
+        self._sender = SentMessage(
+            bound.config.bus, bound.message, bound.key[1] & 0xFF, bound.protection
+        ).sender()
+        self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
+        self._left_s = 0.0
+
+    def frames(self, gripped_kg: float, passed_s: float) -> Iterator[Frame]:
+        """The frame, when it is due after so much more time."""
+        self._left_s -= passed_s
+        if self._left_s <= 1e-9:
+            self._left_s += self._cycle_s
+            value = gripped_kg if self._signal.unit == "kg" else float(gripped_kg > 0.0)
+            name = self._signal.name
+            yield self._sender.frame({name: self._sender.fields.raw(name, value)})
+
+
 class PlantNode:
     """Valves, crane and grapple behind the valve messages of a deployment.
 
@@ -165,6 +190,9 @@ class PlantNode:
         ]
         sensors = (parameters or CraneParameters()).sway_sensor
         self._sway_sensors = sensor_messages(deployment, sensors)
+        load = deployment.load_state
+        its_own = load is not None and load.message.name not in self._senders
+        self._load = _LoadMessage(load) if load and its_own else None
         self._canopen = CanopenSide(deployment)
         self._passed_s = 0.0
         self._inputs = {axis: _ValveInput(axis, deployment) for axis in deployment.axes}
@@ -207,6 +235,8 @@ class PlantNode:
         frames = self._measured(state) if self._feedback else []
         for valve in self._valve_feedback:
             frames += valve.frames(self.crane, self._passed_s)
+        if self._load:
+            frames += self._load.frames(self.crane.gripped_kg, self._passed_s)
         for sensors in self._sway_sensors:
             due = sensors.frames(state, self._passed_s)
             frames += [frame for frame in due if self._canopen.works(frame.bus, sensors.node)]

@@ -26,7 +26,9 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
         f"{SHIPPED}: good",
         "  bus crane: socketcan vcan0, its 10 messages load 12% of 250 kbit/s",
         "  axis slew: JoystickLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
+        "    pendulum: 1.17 to 1.58 m, 9 and 8 % of the swing left",
         "  axis near_far: JoystickLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
+        "    pendulum: 1.02 to 1.38 m, 8 and 7 % of the swing left",
         "  axis lift: JoystickRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
         "  slew is in no motion: together with another axis it leaves more swing;",
         "    a motion takes one axis that moves the tip in and out, which joints are not",
@@ -61,6 +63,21 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     assert warning.endswith(f": hydraulics: missing: {NO_PUMP}")
     assert "lift: in seconds of full speed" in "".join(lines)
     assert "slewing: of one that slews" not in "".join(lines)
+
+
+def test_check_says_for_which_pendulums_the_filters_of_each_load_hold(tmp_path: Path) -> None:
+    """Those that a filter was designed for, else those that a campaign draws."""
+    load = ROBUST.with_name("forwarder-load.yaml")
+    assert [row for row in invoke("check", str(load)).stdout.splitlines() if "pendulum" in row] == [
+        "    pendulum: at 0 1.17 to 1.58 m, 9 and 9 %; at 600 1.52 to 2.06 m, 8 and 8 %;"
+        " load not known 1.38 to 1.79 m, 2 and 2 % of the swing left",
+        "    pendulum: at 0 1.02 to 1.38 m, 8 and 8 %; at 600 1.36 to 1.84 m, 7 and 7 %;"
+        " load not known 1.20 to 1.60 m, 1 and 1 % of the swing left",
+    ]
+    file = tmp_path / "machine.yaml"
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(SHIPPED.parents[1] / "dbc"))
+    file.write_text(f"{text}\nuncertainty: {{ length_pct: [-60, 100] }}\n", encoding="utf-8")
+    assert "pendulum: 0.48 to 2.40 m, 45 and 34 % of" in invoke("check", str(file)).stdout
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ pull does not matter to them.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -23,7 +23,7 @@ ROTOR = 1e14
 STEP_S = 0.0025
 TICK_MS = 20
 STEPS = round(TICK_MS / 1000.0 / STEP_S)
-RADIUS_ID = 0x401
+RADIUS_ID, LOAD_ID = 0x401, 0x414
 VALVES = {0x200: "slew", 0x201: "near_far"}
 FULL = {"slew": 0.5, "near_far": 1.0}  # rad/s, m/s
 
@@ -45,6 +45,9 @@ class TwinCrane:
             both axes; the crane itself then has no weight.
         wind_n: on the grapple, to the left of the carrier.
         log: kg in the grapple's middle, its length, its angle to the boom in degrees.
+        lower_m: how much lower the middle of grapple and log hangs than that of the grapple.
+        says_kg: weight that the machine reports at a time in s, or None where it is silent; by
+            default that of the log.
     """
 
     radius_m: float = 3.0
@@ -58,6 +61,8 @@ class TwinCrane:
     tyres: tuple[float, float, float] = (0.0, 0.0, 1.0)
     wind_n: float = 0.0
     log: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lower_m: float = 0.0
+    says_kg: Callable[[float], float | None] | None = None
 
 
 class Valve:
@@ -82,7 +87,7 @@ class Twin:
     """Crane, valves and the sensor of the radius."""
 
     def __init__(self, crane: TwinCrane) -> None:
-        link, arm = 0.2 * crane.length, 1.2 * crane.length
+        link, arm = 0.2 * crane.length, 1.2 * crane.length + crane.lower_m
         pitch, roll = (math.radians(one) for one in crane.slope_deg)
         rock_hz, ratio, inertia = crane.tyres
         stiffness = inertia * (2.0 * math.pi * rock_hz) ** 2
@@ -201,6 +206,11 @@ def drive(
         if now_ns < crane.radius_until_s * 1e9:
             radius = round(1000.0 * twin.radius_m).to_bytes(2, "little")
             frames.append(Frame("crane", RADIUS_ID, False, b"\0\0" + radius + b"\0\0"))
+        if deployment.load_state and tick % 5 == 0:
+            kg = crane.log[0] if crane.says_kg is None else crane.says_kg(tick * TICK_MS / 1000.0)
+            if kg is not None:
+                data = round(kg).to_bytes(2, "little") + b"\0"
+                frames.append(Frame("crane", LOAD_ID, False, data))
         for frame in frames:
             guarded.receive(frame, now_ns)
         for _, can_id, _, data in guarded.tick(now_ns):

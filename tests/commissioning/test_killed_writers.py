@@ -14,7 +14,7 @@ import pytest
 
 from canshaper.commissioning.assumed import write_numbers
 from canshaper.commissioning.calibration.write import write_curve
-from canshaper.commissioning.filter_file import write_filter
+from canshaper.commissioning.filter_file import write_filters
 from canshaper.commissioning.identification.report import write_sway
 from canshaper.config.origin import written_by
 from canshaper.edit.edit import replace_text, set_values
@@ -42,7 +42,7 @@ class Measured:
 
 def tuned(deployment: Deployment) -> None:
     values = {"kind": "gff", "a1": 0.7, "a2": 0.11, "designed_for": DESIGNED}
-    write_filter(deployment, "slew", values, 2.1, "tune")
+    write_filters(deployment, "slew", [((), values)], 2.1, "tune")
 
 
 def measured(deployment: Deployment) -> None:

@@ -11,6 +11,7 @@ from canshaper.config.load import load_config
 from canshaper.edit.edit import FileValue, edited, set_values
 from canshaper.errors import ConfigError
 from tests.edit.edited import NEW, SLEW, gff_line
+from tests.rigs.files import ROOT
 
 
 def test_flow_style(file: Path) -> None:
@@ -55,6 +56,16 @@ def test_block_style_poles_become_coefficients(file: Path, newline: str) -> None
     after = text.replace(BLOCK.replace("\n", newline), BLOCK_AFTER.replace("\n", newline))
     assert file.read_bytes() == after.encode()
     assert load_config(file)[0].axes["slew"].filter.parameters() == {"a1": 0.7, "a2": 0.12233}
+
+
+def test_an_item_of_a_list(file: Path) -> None:
+    """Of a gain schedule one breakpoint's filter is written, and the others stay."""
+    text = (ROOT / "config" / "forwarder-load.yaml").read_text(encoding="utf-8")
+    place = ("axes", "slew", "gain_schedule", 1, "filter")
+    after = edited(text, place, {"taps": ["2 x 0.5"]}, note="By hand.").splitlines()
+    changed = [one for one, was in zip(after, text.splitlines(), strict=True) if one != was]
+    assert changed == ["          taps: [2 x 0.5]"]
+    assert after.index(changed[0]) > after.index("      - breakpoint: 600 # a log")
 
 
 # section before, values, section after

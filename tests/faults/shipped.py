@@ -32,6 +32,7 @@ NAMES = (
     "cia402-forwarder",
     "remote-forwarder",
     "forwarder-pump",
+    "forwarder-load",
 )
 
 

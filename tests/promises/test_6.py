@@ -118,8 +118,11 @@ class TestEveryFault:
         return world
 
     def moves(self, world: World) -> None:
-        world.go(12, **world.held(0.7))
-        assert all(world.speed.values())
+        moved: set[str] = set()
+        for _ in range(12):  # what came before may stop one of them for a moment
+            world.go(1, **world.held(0.7))
+            moved |= {axis for axis, speed in world.speed.items() if speed}
+        assert moved == world.speed.keys()
         world.evil.events.clear()
 
     @pytest.mark.parametrize("state", ["TRIPPED", "STOPPING"])

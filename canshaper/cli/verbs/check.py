@@ -1,6 +1,7 @@
 """``canshaper check``: is a deployment fit to start?"""
 
 import json
+import math
 from dataclasses import asdict
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
 
     from canshaper.config.bus import Bus
     from canshaper.config.limits import Motion
-    from canshaper.config.schema import DeploymentConfig
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.used_message import NamedCode
+    from canshaper.machine.valves import BoundAxis
 
 GROUP = "setup"
 
@@ -36,7 +37,8 @@ def check(
     """Load a deployment against its DBC files and report every problem at once.
 
     Shows how far each axis still travels after release, reversal, lost joystick and lost enable,
-    and how far its limits allow; and what each value means that the DBC names (VAL_) in a signal
+    and how far its limits allow; for which pendulums its filters hold, and what they leave of the
+    swing at the ends of that range; and what each value means that the DBC names (VAL_) in a signal
     that is read.
 
     Exit code 0 when it is good, 2 when it is not. What is wrong in the DBC files with messages that
@@ -141,7 +143,7 @@ def _print(deployment: "Deployment") -> None:
             f"  axis {name}: {config.joysticks[joystick.joystick].message}.{joystick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
-        for line in _of_axis(config, name):
+        for line in _of_axis(deployment, name):
             echo(f"    {line}")
     for motion in config.motion.values():
         echo(_motion(deployment, motion))
@@ -166,8 +168,11 @@ def _print(deployment: "Deployment") -> None:
         echo(f"WARNING: {warning}")
 
 
-def _of_axis(config: "DeploymentConfig", name: str) -> "Iterator[str]":
+def _of_axis(deployment: "Deployment", name: str) -> "Iterator[str]":
     """What else is known of an axis, in words."""
+    from canshaper.shaping.registry import KINDS
+
+    config, bound = deployment.config, deployment.axes[name]
     axis = config.axes[name]
     if sensor := axis.sway_sensor:
         does = "damps" if sensor.use == "damp" else "is watched"
@@ -178,6 +183,12 @@ def _of_axis(config: "DeploymentConfig", name: str) -> "Iterator[str]":
         others = "measured" if oil.others_measured else f"{oil.others:g}"
         text = f"takes {oil.shares.get(name, 1.0):g} of {oil.flow:g} full axis flows of the pump"
         yield f"{text}, others {others}"
+    if axis.sway and KINDS[axis.filter.kind].needs_sway:
+        tick_s, usual_pct = (
+            bound.period_ticks * config.tick_ms / 1000.0,
+            config.uncertainty.length_pct,
+        )
+        yield f"pendulum: {'; '.join(_pendulums(bound, tick_s, usual_pct))} of the swing left"
 
 
 def _print_codes(codes: "Sequence[NamedCode]") -> None:
@@ -221,6 +232,31 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
         f"  NOTE: while {motion.slew} moves, {motion.near_far} moves too without its joystick: by"
         f" up to {speed_m_s:.2g} m/s, {most_m:g} m in or out{sources}, {motion.max_s:g} s"
     )
+
+
+def _pendulums(bound: "BoundAxis", tick_s: float, usual_pct: "Sequence[float]") -> "Iterator[str]":
+    """For which pendulums each filter holds, and what it leaves of the swing of either end.
+
+    Those that it was designed for, else those that a campaign draws.
+    """
+    from canshaper.design.tuning.evaluate import gain_at, shaper_of, step_response
+    from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
+
+    config = bound.config
+    own = "load not known " if config.gain_schedule else ""
+    loads = [(f"at {one.breakpoint:g} ", one.sway, one.filter) for one in config.gain_schedule]
+    for name, sway, chosen in (*loads, (own, config.sway, config.filter)):
+        assert sway is not None
+        mode, percents = sway.mode(), usual_pct
+        steps = step_response(mode, tick_s, shaper_of(bound, tick_s, chosen))
+        if (design := chosen.design()) and (range_pct := design.length_range_pct):
+            mode = SwayMode.from_period(design.period_s, design.damping_ratio)
+            percents = -range_pct, range_pct
+        roots = [math.sqrt(1.0 + percent / 100.0) for percent in percents]
+        ends = [SwayMode(mode.omega_rad_s / root, mode.damping_ratio) for root in roots]
+        low, high = (f"{GRAVITY_M_S2 / end.omega_rad_s**2:.2f}" for end in ends)
+        short, long = (f"{100.0 * gain_at(end, tick_s, steps):.0f}" for end in ends)
+        yield f"{name}{low} to {high} m, {short} and {long} %"
 
 
 def _load(deployment: "Deployment", bus: str) -> str:

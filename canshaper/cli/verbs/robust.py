@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from canshaper.cli.common import FILE, PICTURE, REPORT, echo, loader, refuse_shipped
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from canshaper.commissioning.robust import RobustDesign
@@ -19,8 +20,20 @@ def robust(
     file: str = FILE,
     axis: str = typer.Option(..., "--axis", help="Axis to design for."),
     range_pct: float = typer.Option(15.0, "--range", help="Pendulum length error covered, +- %."),
+    lengths: str | None = typer.Option(
+        None,
+        "--lengths",
+        metavar="LOW:HIGH",
+        help="Instead: shortest and longest pendulum in m, for a load that no signal tells.",
+    ),
+    loads: bool = typer.Option(
+        False, "--loads", help="Design every breakpoint of the gain schedule."
+    ),
     duration_s: float | None = typer.Option(
-        None, "--duration", help="Length of the impulse response in s. Default: 0.77 of a swing."
+        None,
+        "--duration",
+        help="Length of the impulse response in s; with --loads for the shortest swing. Default:"
+        " 0.77 of a swing, with --lengths one.",
     ),
     residual_pct: float | None = typer.Option(
         None, "--residual", help="Instead: the shortest that leaves at most this % of the swing."
@@ -42,6 +55,10 @@ def robust(
     that makes one movement of a tap of the joystick. Prints what it does and, without --write, the
     lines for the file.
 
+    With --lengths one response holds from an empty grapple to a full one; the swing in the file
+    becomes that of the middle. Of several least taps the one counts that leaves least through the
+    limits of the axis. With --loads the table has what each design leaves with the other loads.
+
     With --second it leaves a second mode in peace too, such as that of grapple and rotator with
     long logs, and prints what that costs and gains. The picture, with --picture or --report, has
     impulses, step and residual over length next to those of the filter in the file.
@@ -54,40 +71,45 @@ def robust(
 
       canshaper robust config/forwarder.yaml --axis near_far --residual 5
 
+      canshaper robust config/forwarder.yaml --axis near_far --lengths 1.2:1.6
+
+      canshaper robust config/forwarder-load.yaml --axis near_far --loads --duration 1.8
+
       canshaper robust config/forwarder.yaml --axis near_far --second 0.6,0.1,20
 
       canshaper robust config/forwarder.yaml --axis slew --report slew.html
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.filter_file import written_line
-    from canshaper.commissioning.robust import (
-        design_robust,
-        figure,
-        print_design,
-        write_design,
-    )
+    from canshaper.commissioning.loads import design_loads, lengths_of, print_loads
+    from canshaper.commissioning.robust import design_robust, figure, print_design, write_design
     from canshaper.edit.edit import flow
 
     deployment = loader(file)()
     results = Results(f"Robust shaper for {axis}", deployment, report, picture, quiet=as_json)
     if write:
         refuse_shipped(file)
-    one = design_robust(
-        deployment,
-        axis,
-        range_pct=range_pct,
-        duration_s=duration_s,
-        residual_pct=residual_pct,
-        second=second,
-    )
-    print_design(deployment, one, results)
-    if path := results.picture(None, lambda: figure(one)):
+    lengths_m = lengths_of(lengths)
+    if loads and lengths_m:
+        raise UsageError("expected one of --lengths and --loads, got both")
+    options: dict[str, Any] = {"range_pct": range_pct, "residual_pct": residual_pct}
+    options |= {"duration_s": duration_s, "second": second}
+    if loads:
+        designs = design_loads(deployment, axis, **options)
+        print_loads(deployment, designs, results)
+    else:
+        designs = [design_robust(deployment, axis, lengths_m=lengths_m, **options)]
+        print_design(deployment, designs[0], results)
+    if path := results.picture(None, lambda: figure(designs[0])):
         results.picture_line(path)
-    changed = write_design(deployment, one) if write else []
+    changed = write_design(deployment, *designs) if write else []
     if as_json:
+        data = {"loads": [*map(_result, designs)]} if loads else _result(designs[0])
         files = {"picture": path, "written": deployment.path if write else None}
-        echo(json.dumps(_result(one) | files, indent=2, default=str))
-    lines = [*changed, written_line(deployment.path)] if write else [f"filter: {flow(one.section)}"]
+        echo(json.dumps(data | files, indent=2, default=str))
+    lines = [f"sway: {flow(one.sway)}" for one in designs if one.sway]
+    lines += [f"filter: {flow(one.section)}" for one in designs]
+    lines = [*changed, written_line(deployment.path)] if write else lines
     results.print("\n".join(lines), soft_wrap=True)
     results.write()
 

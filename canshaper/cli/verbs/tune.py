@@ -262,7 +262,7 @@ def _write(
     setting: "Setting",
     tail: tuple[float, float] | None,
 ) -> list[str]:
-    from canshaper.commissioning.filter_file import write_filter
+    from canshaper.commissioning.filter_file import write_filters
     from canshaper.config.filters import designed
     from canshaper.edit.edit import FileValue
 
@@ -280,6 +280,6 @@ def _write(
         "designed_for": designed_for,
     }
     gone = bound.config.filter.model_dump(exclude_none=True).keys() - values.keys()
-    return write_filter(
-        deployment, bound.name, dict.fromkeys(sorted(gone)) | values, tail_s, "tune"
+    return write_filters(
+        deployment, bound.name, [((), dict.fromkeys(sorted(gone)) | values)], tail_s, "tune"
     )

@@ -27,6 +27,7 @@ class Candidate:
         ours: limit-aware, as G_FF and the robust shaper are.
         motion: with the two-axis motion, where the deployment has one.
         sensor: with its sway sensors.
+        by_load: the file's own, with the sets of its gain schedules.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Candidate:
     ours: bool = False
     motion: bool = True
     sensor: bool = False
+    by_load: bool = False
 
 
 def candidates(deployment: Deployment) -> list[Candidate]:
@@ -70,11 +72,15 @@ def candidates(deployment: Deployment) -> list[Candidate]:
     if deployment.motions:
         name = _short(designs[1].name) + " apart"
         every.append(replace(designs[1], name=name, motion=False))
+    configs = {axis: deployment.axes[axis].config for axis in AXES}
+    if all(config.gain_schedule for config in configs.values()):
+        own = {axis: config.filter for axis, config in configs.items()}
+        every.append(Candidate("the file's, by load", own, ours=True, by_load=True))
     if all(_damped(deployment, axis) for axis in AXES):
         every += [
             replace(one, name=_short(one.name) + " +sensor", sensor=True)
             for one in every
-            if one.motion and one.filters["slew"].kind == "robust"
+            if one.motion and not one.by_load and one.filters["slew"].kind == "robust"
         ]
     return every
 
@@ -117,7 +123,10 @@ def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
     for axis, its_filter in candidate.filters.items():
         config = axes[axis].config
         limits = config.limits.model_copy(update={"tail_s": TAIL_S, "stop_distance_m": None})
-        config = config.model_copy(update={"filter": its_filter, "limits": limits})
+        changes = {"filter": its_filter, "limits": limits, "gain_schedule": config.gain_schedule}
+        if not candidate.by_load:
+            changes["gain_schedule"] = []
+        config = config.model_copy(update=changes)
         sensor = axes[axis].sway_sensor if candidate.sensor else None
         axes[axis] = replace(axes[axis], config=config, sway_sensor=sensor)
     motions = deployment.motions if candidate.motion else {}

@@ -11,10 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
+from canshaper.config.filters import Filter
 from canshaper.design.tuning.formulation import SETTLED, at_length
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
@@ -23,7 +25,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 
 ShaperFor = Callable[[SwayModel], Shaper]
 
-LENGTHS_PCT = (-30, -20, -10, 0, 10, 20, 30)
+LENGTHS_PCT: tuple[float, ...] = (-30, -20, -10, 0, 10, 20, 30)
 RISEN = 0.95
 # A response is watched until it stays this close to its end, and no longer than this.
 _AT_END, _LONGEST_S = 1e-9, 120.0
@@ -118,6 +120,12 @@ class Traces:
     swing_raw: tuple[float, ...]
 
 
+def shaper_of(bound: BoundAxis, tick_s: float, chosen: Filter) -> ShaperFor:
+    """A filter of an axis."""
+    rate, parameters = bound.config.limits.slowest_per_s, chosen.parameters()
+    return lambda sway: build_shaper(chosen.kind, tick_s, sway, valve_rate_per_s=rate, **parameters)
+
+
 def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
     """G_FF of any axis with these poles."""
     return lambda sway: Gff(sway, poles_rad_s, third_pole_rad_s=third_pole_rad_s)
@@ -149,17 +157,10 @@ def evaluate(
     run_on_s = (outside[-1] + 1) * tick_s if outside else 0.0
     machine = machine or Machine()
     hold_s = min(_LONGEST_S, max(4.0, 2.0 * run_on_s + 1.0, machine.limits.tail_s + 1.0))
-    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
-    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
-    residuals = []
-    for percent in lengths_pct:
-        true = at_length(mode, 1.0 + percent / 100.0)
-        left, unshaped = (
-            [_swing_left(true, tick_s, machine.lag_s, move) for move in moves]
-            for moves in (shaped, raw)
-        )
-        worst = max(a / b for a, b in zip(left, unshaped, strict=True))
-        residuals.append(Residual(percent, _gain_at(true, tick_s, y), worst))
+    trues = [at_length(mode, 1.0 + percent / 100.0) for percent in lengths_pct]
+    left = swing_left(mode, tick_s, shaper_for, machine, trues, hold_s=hold_s)
+    linear = [gain_at(true, tick_s, y) for true in trues]
+    residuals = map(Residual, lengths_pct, linear, left)
     return Evaluation(
         first_jump=y[0],
         peak=max(y),
@@ -168,6 +169,26 @@ def evaluate(
         mean_delay_s=sum(1.0 - value / end for value in y) * tick_s,
         residuals=tuple(residuals),
     )
+
+
+def swing_left(
+    mode: SwayMode,
+    tick_s: float,
+    shaper_for: ShaperFor,
+    machine: Machine,
+    trues: Sequence[SwayMode],
+    *,
+    hold_s: float = 4.0,
+) -> list[float]:
+    """See ``Residual.machine``, of each true pendulum; the joystick is held, then rests so long."""
+    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
+    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
+
+    def left(true: SwayMode, move: tuple[float, list[float]]) -> float:
+        return _swing_left(true, tick_s, machine.lag_s, move)
+
+    pairs = [*zip(shaped, raw, strict=True)]
+    return [max(left(true, one) / left(true, other) for one, other in pairs) for true in trues]
 
 
 def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[float]:
@@ -261,7 +282,7 @@ def _modal(
     return result
 
 
-def _gain_at(mode: SwayMode, tick_s: float, y: Sequence[float]) -> float:
+def gain_at(mode: SwayMode, tick_s: float, y: Sequence[float]) -> float:
     """|H(e^(pT))| from the step response: sum of its increments times e^(-pT k), over its end."""
     turn, at = cmath.exp(-mode.pole * tick_s), 1.0 + 0j
     total, before = 0j, 0.0

@@ -71,6 +71,7 @@ def least_residual(
     swing: Sequence[tuple[float, float]] = ((0.0, 1.0),),
     least_tap: float = LEAST_TAP,
     second: SecondMode | None = None,
+    first: Sequence[float] = (),
 ) -> RobustShaper:
     """Least worst residual over the range that taps within the duration and the rate can give.
 
@@ -84,6 +85,8 @@ def least_residual(
             between; by default the same at every length. The residual then is in its unit.
         least_tap: least tap, as a part of the mean one, 0 to 1.
         second: second mode, whose residual counts twice.
+        first: taps with which it begins, as those of another load do: until then a change between
+            both changes no output.
 
     Raises:
         DesignError: a value is out of range, or the rate cannot reach full speed in the duration.
@@ -101,7 +104,9 @@ def least_residual(
         rows = np.vstack(
             [rows, _disc_rows(second_responses(second, tick_s, count), _SECOND_COUNTS)]
         )
-    taps = _least_taps(rows, tick_s, least_tap / count, rate_per_s * tick_s)
+    bounds = [(least_tap / count, rate_per_s * tick_s)] * count
+    bounds[: len(first)] = [(tap, tap) for tap in first]
+    taps = _least_taps(rows, tick_s, bounds)
     left = np.abs(responses_of(mode, range_pct, tick_s, count, FINE) @ taps)
     used = np.flatnonzero(taps > 1e-9)
     return RobustShaper(
@@ -114,9 +119,9 @@ def least_residual(
 
 
 def _least_taps(
-    rows: NDArray[np.float64], tick_s: float, least: float, most: float
+    rows: NDArray[np.float64], tick_s: float, bounds: list[tuple[float, float]]
 ) -> NDArray[np.float64]:
-    """Taps with the least largest row, each between two bounds, 1 in sum.
+    """Taps with the least largest row, each within its bounds, 1 in sum.
 
     Raises:
         DesignError: the solver finds none.
@@ -129,7 +134,7 @@ def _least_taps(
         b_ub=np.zeros(len(rows)),
         A_eq=np.append(np.ones(count), 0.0)[None, :],
         b_eq=[1.0],
-        bounds=[(least, most)] * count + [(0.0, None)],
+        bounds=[*bounds, (0.0, None)],
         method="highs",
     )
     if not solution.success:

@@ -1,0 +1,90 @@
+"""The load: when it is known, which filters that means, and what the log says of it."""
+
+import pytest
+
+from canshaper.codec.frame import Frame
+from tests.rigs.forwarder import ROOT, Rig
+
+EMPTY, LOG, UNKNOWN = 1, 2, 0
+
+
+@pytest.fixture
+def rig() -> Rig:
+    one = Rig(ROOT / "config" / "forwarder-load.yaml")
+    one.run(3)
+    return one
+
+
+def say(rig: Rig, kg: int) -> None:
+    rig.receive(Frame("crane", 0x414, False, kg.to_bytes(2, "little") + b"\0"))
+
+
+def run(rig: Rig, seconds: float, kg: int | None, **joystick: int) -> None:
+    """Drive with this weight on the bus, every 0.1 s; None: silence."""
+    for tick in range(round(seconds / 0.02)):
+        if kg is not None and tick % 5 == 0:
+            say(rig, kg)
+        rig.run(1, **joystick)
+
+
+def sets(rig: Rig) -> list[int]:
+    axes = rig.controller.axes
+    return [axes[name].active_set for name in ("slew", "near_far")]
+
+
+def news(rig: Rig) -> list[str]:
+    return [event.text for event in rig.controller.events if "load_state" in event.text]
+
+
+def test_the_weight_chooses_the_filters_of_both_axes(rig: Rig) -> None:
+    assert sets(rig) == [UNKNOWN] * 2
+    run(rig, 0.2, 0)
+    assert sets(rig) == [EMPTY] * 2
+    run(rig, 0.2, 600)
+    assert sets(rig) == [LOG] * 2
+    assert news(rig) == ["load_state=lost", "load_state=known"]
+
+
+def test_a_new_weight_counts_in_motion_too(rig: Rig) -> None:
+    run(rig, 0.2, 0)
+    run(rig, 0.3, 0, Slew=1000)
+    run(rig, 0.2, 600, Slew=1000)
+    assert sets(rig) == [LOG] * 2
+
+
+def test_one_that_is_lost_in_motion_holds_until_the_speed_is_steady(rig: Rig) -> None:
+    run(rig, 0.2, 600)
+    run(rig, 0.2, 600, Slew=1000)
+    run(rig, 1.2, None, Slew=1000)
+    assert sets(rig) == [LOG, UNKNOWN]  # the other axis rests
+    assert news(rig)[2:] == ["load_state=lost"]
+    run(rig, 1.4, None, Slew=1000)  # at full speed after 2.1 s
+    assert sets(rig) == [UNKNOWN] * 2
+
+
+def test_a_signal_that_jumps_to_and_fro_is_not_believed(rig: Rig) -> None:
+    for kg in (600, 0, 600, 0):
+        run(rig, 0.2, kg)
+    assert sets(rig) == [UNKNOWN] * 2
+    assert news(rig)[2:] == ["load_state=restless"]
+    run(rig, 2.2, 600)
+    assert sets(rig) == [LOG] * 2
+    assert news(rig)[3:] == ["load_state=known"]
+
+
+def test_two_jumps_are_a_grip_and_a_release(rig: Rig) -> None:
+    for kg in (0, 600, 0):
+        run(rig, 0.2, kg)
+    assert sets(rig) == [EMPTY] * 2
+
+
+def test_noise_of_a_weight_is_no_jump(rig: Rig) -> None:
+    for kg in (600, 310, 590, 320, 600, 310):
+        run(rig, 0.2, kg)
+    assert news(rig) == ["load_state=lost", "load_state=known"]
+
+
+def test_an_error_code_is_no_weight(rig: Rig) -> None:
+    run(rig, 0.2, 600)
+    run(rig, 1.0, 0xFFFE)
+    assert sets(rig) == [UNKNOWN] * 2
