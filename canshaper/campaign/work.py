@@ -1,0 +1,209 @@
+"""A working cycle with a model of an operator: empty grapple out to the pile, log back.
+
+A move ends when tip and load are within the tolerance for a while. One that is not done in time
+counts as that long; so do all from the one on in which the grapple swings above the horizontal.
+Between two moves the grapple stands on pile or bunk, the joysticks neutral. Lift and rotator do not
+move: they take their time in every set-up.
+"""
+
+import math
+import random
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from canshaper.campaign.draw import driven_axes
+from canshaper.campaign.run import Source
+from canshaper.design.lockstep import DriveOptions, OnFrame, Simulation
+from canshaper.errors import CampaignError
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.axes import NEAR_FAR, SLEW
+from canshaper_sim.crane import Crane, CraneParameters
+from canshaper_sim.grapple import Grapple
+from canshaper_sim.operator_model import Known, OperatorModel, Seen, Skill, Technique
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.strokes import Script, Stroke
+
+MOVES, LIMIT_S, LOADS, AXES = 10, 30.0, ("empty", "log"), (SLEW, NEAR_FAR)
+_HELD_S, _GRIP_S = 0.3 - 1e-9, 1.5  # within the tolerance; between two moves, not counted
+# Degrees and metres of the bunk, behind the cab, and of the pile, as loading was studied (Hartsch
+# et al. 2022, 2024: 45 to 135 degrees, 4 to 10 m) and this crane reaches.
+_PLACES = ((-5.0, 5.0), (2.6, 3.4)), ((55.0, 125.0), (4.0, 7.0))
+# Log of 600 kg in a grapple of 300 kg, .4 m lower: the heaviest that a campaign draws.
+_LOG_MASS, _LOG_M = 3.0, 0.4
+_PRESS = (0.5, 2.5, 0.6, 0.0)  # start, duration, level, ramp
+
+
+@dataclass(frozen=True)
+class Work:
+    """One working cycle.
+
+    Attributes:
+        bypass: with anti-sway switched off.
+        operator: name of who works.
+        skill: what the operator can.
+        known: of each axis; of slew a m is a rad.
+        techniques: one for each of `LOADS`.
+        within: tip from the target, m, and swing, degrees.
+        seed: of places and operator.
+    """
+
+    bypass: bool
+    operator: str
+    skill: Skill
+    known: tuple[Known, ...]
+    techniques: tuple[Technique, ...]
+    within: tuple[float, float]
+    seed: str
+
+
+class Move(NamedTuple):
+    """One move, as it was done."""
+
+    load: str
+    done: bool = False
+    seconds: float = LIMIT_S
+    taps: int = 0  # corrections and catches
+    waiting_s: float = 0.0  # no joystick moved, after the first stroke
+    peak_deg: float = 90.0
+    beyond_m: float = 0.0  # farthest that an axis went beyond the target
+
+
+@dataclass(frozen=True, slots=True)
+class _Joysticks(Script):
+    """Joysticks that a model holds, by axis."""
+
+    held: dict[str, float] = field(default_factory=dict)
+
+    def command(self, axis: str, time_s: float) -> float:
+        """Joystick value -1 .. 1 of one axis, now."""
+        return self.held.get(axis, 0.0)
+
+
+def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
+    """Slew angle and radius of the tip: bunk, pile, bunk, ... one more than there are moves."""
+    source = random.Random(f"places {seed}")
+    side, at = source.choice((-1.0, 1.0)), []
+    for number in range(MOVES + 1):
+        degrees, metres = _PLACES[number % 2]
+        slew, radius_m = math.radians(side * source.uniform(*degrees)), source.uniform(*metres)
+        slew = min(max(slew, crane.slew_min_rad), crane.slew_max_rad)
+        at.append((slew, min(max(radius_m, crane.radius_min_m), crane.radius_max_m)))
+    return at
+
+
+def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> tuple[Known, ...]:
+    """Press and let go each joystick once: what practice teaches of a crane.
+
+    Raises:
+        CampaignError: it has no tip that slew and near-far move.
+        ConfigError: the deployment does not fit the machine.
+    """
+    crane, axes = driven_axes(deployment)
+    if not {*AXES} <= {*axes}:
+        text = f"expected axes {' and '.join(AXES)}, got {', '.join(axes)}"
+        raise CampaignError(f"{deployment.path}: {text}")
+    middle_m, known = 0.5 * (nominal.radius_min_m + nominal.radius_max_m), []
+    start = replace(nominal, start_radius_m=middle_m)
+    options: DriveOptions = {"parameters": start, "crane": crane, "bypass": bypass}
+    for number, axis in enumerate(AXES):
+        press = Stroke(axis, *_PRESS)
+        simulation = Simulation(deployment, Script("press", (press,), 8.0), **options)
+        way, speed = [0.0], 0.0
+        for time_ms in simulation.ticks():
+            state = simulation.plant.crane.state
+            way.append((state.theta1_rad, state.radius_m)[number])
+            if time_ms <= 1000.0 * press.end_s:
+                speed, way = simulation.plant.crane.speed(axis), way[-1:]
+        run_on_s = (way[-1] - way[0]) / speed if speed else 0.0
+        known.append(Known(speed / press.level, max(run_on_s, 0.02)))
+    return tuple(known)
+
+
+def do_work(
+    source: Source, work: Work, on_frame: OnFrame | None = None, moves: int = MOVES
+) -> list[Move]:
+    """Do one working cycle, or its first moves.
+
+    Args:
+        source: the machine.
+        work: what is done.
+        on_frame: called with every frame and its time in s; None where no one listens.
+        moves: how many.
+    """
+    deployment, nominal = source.load(), changed_parameters([*source.changes])
+    at, tick_s = places(nominal, work.seed), deployment.config.tick_ms / 1000.0
+    joysticks = _Joysticks("work", (), MOVES * (_GRIP_S + LIMIT_S))
+    options: DriveOptions = {
+        "parameters": replace(nominal, start_theta1_rad=at[0][0], start_radius_m=at[0][1]),
+        "crane": driven_axes(deployment)[0],
+        "bypass": work.bypass,
+    }
+    simulation = Simulation(deployment, joysticks, on_frame, **options)
+    crane, ticks, done = simulation.plant.crane, simulation.ticks(), list[Move]()
+    for number, (slew_rad, radius_m) in enumerate(at[1 : 1 + moves]):
+        load, grapple = LOADS[number % 2], nominal.grapple
+        if crane.swung_over:
+            done.append(Move(load))
+            continue
+        if load == "log":
+            mass_kg, length_m = _LOG_MASS * grapple.m2_kg, grapple.l2_m + _LOG_M
+            grapple = replace(grapple, m2_kg=mass_kg, l2_m=length_m)
+        modes = grapple.mode5, grapple.mode6
+        crane.pick_up(_standing(grapple))
+        for _ in range(round(_GRIP_S / tick_s)):
+            next(ticks)
+        crane.pick_up(grapple)
+        tip_m, most_deg = work.within
+        task = [
+            (Known(one.full_m_s * metre, one.run_on_s, mode.omega_rad_s), target * metre)
+            for one, target, metre, mode in zip(
+                work.known, (slew_rad, radius_m), (radius_m, 1.0), modes, strict=True
+            )
+        ]
+        within = tip_m, math.radians(most_deg) * (grapple.l1_m + grapple.l2_m)
+        operator = OperatorModel(
+            work.skill,
+            work.techniques[number % 2],
+            task,
+            within,
+            seed=f"{work.seed} {number}",
+            tick_s=tick_s,
+        )
+        begin, _ = _seen(crane, radius_m)
+        seconds = held_s = waiting_s = peak_deg = beyond_m = 0.0
+        begun = False
+        while held_s < _HELD_S and seconds < LIMIT_S and not crane.swung_over:
+            next(ticks)
+            seconds += tick_s
+            seen, swing_deg = _seen(crane, radius_m)
+            operator.see(seconds, seen)
+            joysticks.held.update(zip(AXES, operator.joysticks, strict=True))
+            moves_now = any(operator.joysticks)
+            begun = begun or moves_now
+            waiting_s += tick_s * (begun and not moves_now)
+            off_m = [place - target for (place, _), (_, target) in zip(seen, task, strict=True)]
+            for (start, _), (_, target), off in zip(begin, task, off_m, strict=True):
+                beyond_m = max(beyond_m, math.copysign(1.0, target - start) * off)
+            peak_deg = max(peak_deg, swing_deg)
+            near = math.hypot(*off_m) <= tip_m and swing_deg <= most_deg
+            held_s = held_s + tick_s if near else 0.0
+        joysticks.held.clear()
+        ends = held_s >= _HELD_S
+        took_s = seconds if ends else LIMIT_S
+        done.append(Move(load, ends, took_s, operator.taps, waiting_s, peak_deg, beyond_m))
+    return done
+
+
+def _standing(one: Grapple) -> Grapple:
+    """The same on pile or bunk, where its swing is damped critically."""
+    c5, c6 = one.c5_n_m_s_rad / one.mode5.zeta, one.c6_n_m_s_rad / one.mode6.zeta
+    return replace(one, c5_n_m_s_rad=c5, c6_n_m_s_rad=c6)
+
+
+def _seen(crane: Crane, radius_m: float) -> tuple[Seen, float]:
+    """Tip and load, slewing in m there, and the swing in degrees; a lean in the wind is none."""
+    state, (across, along) = crane.state, crane.rest_rad
+    swing = state.theta5_rad - across, state.theta6_rad - along
+    out_m, across_m = crane.parameters.grapple.offset_m(*swing)
+    seen = [(state.theta1_rad * radius_m, across_m), (state.radius_m, out_m)]
+    return seen, math.degrees(math.hypot(*swing))
