@@ -18,8 +18,7 @@ from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import NEAR_FAR, SLEW
 from canshaper_sim.crane import Crane, CraneParameters
-from canshaper_sim.grapple import Grapple
-from canshaper_sim.operator_model import Known, OperatorModel, Seen, Skill, Technique
+from canshaper_sim.operator_model import Known, OperatorModel, Skill
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script, Stroke
 
@@ -30,7 +29,8 @@ _HELD_S, _GRIP_S = 0.3 - 1e-9, 1.5  # within the tolerance; between two moves, n
 _PLACES = ((-5.0, 5.0), (2.6, 3.4)), ((55.0, 125.0), (4.0, 7.0))
 # Log of 600 kg in a grapple of 300 kg, .4 m lower: the heaviest that a campaign draws.
 _LOG_MASS, _LOG_M = 3.0, 0.4
-_PRESS = (0.5, 2.5, 0.6, 0.0)  # start, duration, level, ramp
+_PRESS = (0.5, 3.2, 0.5, 0.0)  # start, duration, level, ramp
+_STANDS = 0.01  # of the speed before
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Work:
     operator: str
     skill: Skill
     known: tuple[Known, ...]
-    techniques: tuple[Technique, ...]
+    techniques: tuple[tuple[float, float], ...]
     within: tuple[float, float]
     seed: str
 
@@ -95,7 +95,7 @@ def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> 
     """Press and let go each joystick once: what practice teaches of a crane.
 
     Raises:
-        CampaignError: it has no tip that slew and near-far move.
+        CampaignError: it has no tip that slew and near-far move, or they do not move it.
         ConfigError: the deployment does not fit the machine.
     """
     crane, axes = driven_axes(deployment)
@@ -105,17 +105,21 @@ def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> 
     middle_m, known = 0.5 * (nominal.radius_min_m + nominal.radius_max_m), []
     start = replace(nominal, start_radius_m=middle_m)
     options: DriveOptions = {"parameters": start, "crane": crane, "bypass": bypass}
-    for number, axis in enumerate(AXES):
+    for axis in AXES:
         press = Stroke(axis, *_PRESS)
         simulation = Simulation(deployment, Script("press", (press,), 8.0), **options)
-        way, speed = [0.0], 0.0
+        speeds = list[float]()
         for time_ms in simulation.ticks():
-            state = simulation.plant.crane.state
-            way.append((state.theta1_rad, state.radius_m)[number])
-            if time_ms <= 1000.0 * press.end_s:
-                speed, way = simulation.plant.crane.speed(axis), way[-1:]
-        run_on_s = (way[-1] - way[0]) / speed if speed else 0.0
-        known.append(Known(speed / press.level, max(run_on_s, 0.02)))
+            if time_ms < 1000.0 * press.end_s:
+                speeds.clear()
+            speeds.append(simulation.plant.crane.speed(axis))
+        if speeds[0] <= 0.0:
+            text = f"expected {axis} to move when its joystick is at {press.level:.0%}"
+            raise CampaignError(f"{deployment.path}: {text}; it stood")
+        fall = [speed / speeds[0] for speed in speeds]
+        while len(fall) > 1 and abs(fall[-1]) < _STANDS:
+            fall.pop()
+        known.append(Known(speeds[0] / press.level, tuple(fall)))
     return tuple(known)
 
 
@@ -149,13 +153,15 @@ def do_work(
             mass_kg, length_m = _LOG_MASS * grapple.m2_kg, grapple.l2_m + _LOG_M
             grapple = replace(grapple, m2_kg=mass_kg, l2_m=length_m)
         modes = grapple.mode5, grapple.mode6
-        crane.pick_up(_standing(grapple))
+        unit = replace(grapple, c5_n_m_s_rad=1.0, c6_n_m_s_rad=1.0)
+        c5, c6 = 1.0 / unit.mode5.zeta, 1.0 / unit.mode6.zeta  # critical: it stands on the ground
+        crane.pick_up(replace(grapple, c5_n_m_s_rad=c5, c6_n_m_s_rad=c6))
         for _ in range(round(_GRIP_S / tick_s)):
             next(ticks)
         crane.pick_up(grapple)
         tip_m, most_deg = work.within
         task = [
-            (Known(one.full_m_s * metre, one.run_on_s, mode.omega_rad_s), target * metre)
+            (Known(one.full_m_s * metre, one.fall, mode.omega_rad_s), target * metre)
             for one, target, metre, mode in zip(
                 work.known, (slew_rad, radius_m), (radius_m, 1.0), modes, strict=True
             )
@@ -194,13 +200,7 @@ def do_work(
     return done
 
 
-def _standing(one: Grapple) -> Grapple:
-    """The same on pile or bunk, where its swing is damped critically."""
-    c5, c6 = one.c5_n_m_s_rad / one.mode5.zeta, one.c6_n_m_s_rad / one.mode6.zeta
-    return replace(one, c5_n_m_s_rad=c5, c6_n_m_s_rad=c6)
-
-
-def _seen(crane: Crane, radius_m: float) -> tuple[Seen, float]:
+def _seen(crane: Crane, radius_m: float) -> tuple[list[tuple[float, float]], float]:
     """Tip and load, slewing in m there, and the swing in degrees; a lean in the wind is none."""
     state, (across, along) = crane.state, crane.rest_rad
     swing = state.theta5_rad - across, state.theta6_rad - along

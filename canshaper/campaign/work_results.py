@@ -17,7 +17,7 @@ from canshaper.campaign.run import Source
 from canshaper.campaign.statistics import CONFIDENCE
 from canshaper.campaign.work import LIMIT_S, LOADS, Move, Work, do_work, learn
 from canshaper.report.console import OnProgress, new_table
-from canshaper_sim.operator_model import Operators, Technique
+from canshaper_sim.operator_model import Operators
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import CraneTrace
@@ -31,27 +31,33 @@ Done = dict[Work, list[Move]]
 """Moves of each working cycle, in the order of the seeds."""
 
 
-def crew(source: Source, operators: Operators, within: tuple[float, float]) -> list[Work]:
-    """What each operator does, with anti-sway off and on, before any practice.
+def practised(
+    source: Source,
+    operators: Operators,
+    within: tuple[float, float],
+    do: Callable[[Sequence[Work]], Done],
+) -> list[Work]:
+    """What each operator does, with anti-sway off and on; with each load as was the fastest.
+
+    Args:
+        source: the machine.
+        operators: what they can.
+        within: see ``Work``.
+        do: does working cycles, those of the practice.
 
     Raises:
         CampaignError: the machine has no tip that slew and near-far move.
     """
     deployment, nominal = source.load(), changed_parameters([*source.changes])
     known = {bypass: learn(deployment, nominal, bypass=bypass) for bypass in (True, False)}
-    return [
+    works = [
         Work(bypass, one.name, getattr(operators, one.name), known[bypass], (), within, "")
         for bypass, one in product(known, fields(operators))
     ]
-
-
-def practised(works: Sequence[Work], do: Callable[[Sequence[Work]], Done]) -> list[Work]:
-    """The same with the techniques, one for each load, that were the fastest in practice."""
     trials = [
-        replace(one, techniques=(Technique(*way),) * len(LOADS), seed=f"practice {number}")
-        for one, way in product(works, product(_SPEEDS, _CATCHES))
+        replace(one, techniques=(way,) * len(LOADS), seed=f"practice {number}")
+        for one, way, number in product(works, product(_SPEEDS, _CATCHES), range(_PRACTICE))
         if way[1] <= one.skill.catch
-        for number in range(_PRACTICE)
     ]
     tried = defaultdict[Any, list[float]](list)
     for one, moves in do(trials).items():

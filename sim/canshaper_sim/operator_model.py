@@ -2,8 +2,8 @@
 
 Both axes move at once and arrive together (Kelso, Southard and Goodman 1979). The person lets go
 where the tip is believed to stop and corrects by taps, as a hand that aims does (Woodworth 1899;
-Meyer et al. 1988). What is believed is what was seen one reaction ago, and what the own hand has
-done since to a crane that lags by the run-on that was learned (Miall et al. 1993). One decision is
+Meyer et al. 1988). What is believed is what was seen one reaction ago, and what is still to come of
+all that the own hand has done, by the run-on that was learned (Miall et al. 1993). One decision is
 taken at a time (Welford 1952). A swing is caught by a tap towards the load when it turns: by half
 of what the load is off, the other half on its way back, as ZV does.
 
@@ -16,6 +16,7 @@ import random
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import mul
 from typing import NamedTuple
 
 from canshaper_sim.ranges import check_ranges
@@ -24,9 +25,9 @@ from canshaper_sim.ranges import check_ranges
 _ALLOWED = dict.fromkeys(("reaction_s", "ramp_s"), (0.05, 1.0)) | dict.fromkeys(
     ("timing_s", "aim_m", "motor", "run_on", "dead_m", "catch"), (0.0, 1.0)
 )
-# Chosen: a tap lasts so long where full deflection is not needed, and has at least this one; a tip
-# that slow, part of full speed, disturbs no swing; parts of the tolerance worth a tap, and a catch.
-_TAP_S, _LEAST_LEVEL, _QUIET, _WORTH_A_TAP, _WORTH_A_CATCH = 0.3, 0.15, 0.05, 0.33, 0.7
+# Chosen: a tap lasts so long where full deflection is not needed, and has at least this one; a way
+# still to come that disturbs no swing; parts of the tolerance worth a tap, and a catch.
+_TAP_S, _LEAST_LEVEL, _QUIET_M, _WORTH_A_TAP, _WORTH_A_CATCH = 0.3, 0.15, 0.03, 0.33, 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,19 +62,10 @@ class Known(NamedTuple):
     """What practice has taught of an axis."""
 
     full_m_s: float  # speed of the tip at full deflection
-    run_on_s: float  # way after the joystick is let go at once, over the speed before
+    # Of that speed, tick by tick, after the joystick is let go at once: so much of what the hand
+    # did that long ago is still to come.
+    fall: tuple[float, ...]
     omega_rad_s: float = 1.0  # of the load's swing
-
-
-class Technique(NamedTuple):
-    """How a person works: speed and catch, parts of full deflection and of the swing."""
-
-    speed: float
-    catch: float
-
-
-Seen = Sequence[tuple[float, float]]
-"""Of each axis where the tip is, and how far off it the load."""
 
 
 class OperatorModel:
@@ -81,7 +73,7 @@ class OperatorModel:
 
     Args:
         skill: what the person can.
-        technique: how the person works.
+        technique: speed and catch of this person, parts of full deflection and of the swing.
         task: of each axis what is known of it, and where the tip has to be.
         within: how far off tip and load may be.
         seed: of all that is random: the same one aims and errs alike with any crane.
@@ -95,38 +87,40 @@ class OperatorModel:
     def __init__(
         self,
         skill: Skill,
-        technique: Technique,
+        technique: tuple[float, float],
         task: Sequence[tuple[Known, float]],
         within: tuple[float, float],
         *,
         seed: str,
         tick_s: float,
     ) -> None:
-        self._skill, self._technique, self._within, self._tick_s = skill, technique, within, tick_s
+        self._skill, self._within, (self._speed, self._catch) = skill, within, technique
         self._axes = [
             _Axis(skill, known, target_m, random.Random(f"{seed} {number}"), tick_s)
             for number, (known, target_m) in enumerate(task)
         ]
         # What was seen in the last reaction: only the oldest has arrived.
-        self._seen: deque[Seen] = deque(maxlen=round(skill.reaction_s / tick_s) + 1)
+        self._seen = deque[Sequence[tuple[float, float]]]()
+        self._late = round(skill.reaction_s / tick_s)
         self._begun, self._free_s = False, 0.0
         self.joysticks, self.taps = [0.0] * len(task), 0
 
-    def see(self, time_s: float, seen: Seen) -> None:
-        """See the crane at this time, and move the joysticks until the next one."""
+    def see(self, time_s: float, seen: Sequence[tuple[float, float]]) -> None:
+        """See of each axis where the tip is, and the load off it; move until the next time."""
         self._seen.append(seen)
-        if len(self._seen) < (self._seen.maxlen or 0):
+        if len(self._seen) <= self._late:
             return
-        for axis, (place_m, off_m) in zip(self._axes, self._seen[0], strict=True):
+        for axis, (place_m, off_m) in zip(self._axes, self._seen.popleft(), strict=True):
             axis.watch(place_m, off_m)
         if not self._begun:
             self._begun = True
             times_s = [abs(axis.error_m) / axis.known.full_m_s for axis in self._axes]
+            longest_s = max(times_s) or 1.0
             for axis, own_s in zip(self._axes, times_s, strict=True):
-                axis.begin(self._technique.speed * own_s / max(times_s))
+                axis.wanted = math.copysign(self._speed * own_s / longest_s, axis.error_m)
         swing_m, free = math.hypot(*(axis.swing_m for axis in self._axes)), time_s >= self._free_s
         swings = swing_m > _WORTH_A_CATCH * self._within[1]
-        catch = min(self._skill.catch, self._technique.catch) if swings else 0.0
+        catch = min(self._skill.catch, self._catch) if swings else 0.0
         for axis in self._axes:
             if axis.let_go(time_s) and free:
                 way_m = axis.caught_m(time_s, catch) if catch else axis.worth_m(self._within[0])
@@ -145,36 +139,35 @@ class _Axis:
     ) -> None:
         self.known, self._skill, self._source, self._tick_s = known, skill, source, tick_s
         self._target_m = target_m + skill.aim_m * source.gauss()
-        self._run_on_s = known.run_on_s * max(0.1, 1.0 + skill.run_on * source.gauss())
+        stretch = max(0.1, 1.0 + skill.run_on * source.gauss())
+        self._run_on_s = stretch * tick_s * sum(known.fall)
         self._late_s = skill.timing_s * source.gauss()
         self.error_m = self.swing_m = self._off_m = self._rate_m_s = self._coming_m = 0.0
-        self._joystick = self._wanted = self._ready_s = 0.0
+        self._joystick = self.wanted = self._ready_s = 0.0
         self._until_s = math.inf  # of a tap; infinite: of a stroke that ends at the target
-        # The crane as it is believed: speed, part of full, now and in the last reaction.
-        count = round(skill.reaction_s / tick_s)
-        self._speed, self._speeds = 0.0, deque([0.0] * count, maxlen=count)
+        # What the hand did, the newest first, and how much of it is still to come of what is seen.
+        count = round(stretch * len(known.fall))
+        fall = [known.fall[min(int(k / stretch), len(known.fall) - 1)] for k in range(count)]
+        self._to_come = [1.0] * round(skill.reaction_s / tick_s) + fall
+        self._done = deque([0.0] * len(self._to_come), maxlen=len(self._to_come))
 
     def watch(self, place_m: float, off_m: float) -> None:
         """See tip and load as they were one reaction ago, and believe where the tip will stop."""
         self._rate_m_s, self._off_m = (off_m - self._off_m) / self._tick_s, off_m
         self.swing_m = math.hypot(off_m, self._rate_m_s / self.known.omega_rad_s)
-        coming_s = self._tick_s * sum(self._speeds) + self._run_on_s * self._speed
-        self._coming_m = self.known.full_m_s * coming_s
+        coming = math.fsum(map(mul, self._done, self._to_come))
+        self._coming_m = self.known.full_m_s * self._tick_s * coming
         self.error_m = self._target_m - place_m - self._coming_m
-
-    def begin(self, level: float) -> None:
-        """Push towards the target."""
-        self._wanted = math.copysign(level, self.error_m)
 
     def let_go(self, time_s: float) -> bool:
         """Let go where it is time for it; whether the hand was free."""
-        if not self._wanted:
+        if not self.wanted:
             return time_s >= self._ready_s
         hand_s = 0.5 * self._joystick * abs(self._joystick) * self._skill.ramp_s
-        more_m = self.known.full_m_s * (hand_s + self._wanted * self._late_s)
-        there = self._until_s == math.inf and (self.error_m - more_m) * self._wanted <= 0.0
+        more_m = self.known.full_m_s * (hand_s + self.wanted * self._late_s)
+        there = self._until_s == math.inf and (self.error_m - more_m) * self.wanted <= 0.0
         if there or time_s >= self._until_s:  # what comes of it is seen one reaction later
-            self._wanted, self._ready_s = 0.0, time_s + self._skill.reaction_s
+            self.wanted, self._ready_s = 0.0, time_s + self._skill.reaction_s
             self._late_s = self._skill.timing_s * self._source.gauss()
         return False
 
@@ -186,7 +179,7 @@ class _Axis:
 
     def caught_m(self, time_s: float, part: float) -> float:
         """Way of a tap that has to begin now, to be half done when the load turns; else 0."""
-        if max(abs(self._speed), abs(self._speeds[0])) > _QUIET:
+        if abs(self._coming_m) > _QUIET_M:
             return 0.0
         omega = self.known.omega_rad_s
         phase = math.atan2(-self._rate_m_s / omega, self._off_m)  # it turns at each pi
@@ -207,14 +200,12 @@ class _Axis:
     def tap(self, time_s: float, way_m: float) -> None:
         """Begin a tap that moves the tip so far, as well as the hand can."""
         noise = 1.0 + self._skill.motor * self._source.gauss()
-        lasts_s, self._wanted = self._shape(way_m * noise)
+        lasts_s, self.wanted = self._shape(way_m * noise)
         self._until_s = time_s + lasts_s
 
     def advance(self) -> float:
-        """Move hand and believed crane on; position of the joystick until the next tick."""
+        """Move the hand on; position of the joystick until the next tick."""
         most = self._tick_s / self._skill.ramp_s
-        self._joystick += min(max(self._wanted - self._joystick, -most), most)
-        self._speeds.append(self._speed)
-        caught_up = -math.expm1(-self._tick_s / self._run_on_s)
-        self._speed += caught_up * (self._joystick - self._speed)
+        self._joystick += min(max(self.wanted - self._joystick, -most), most)
+        self._done.appendleft(self._joystick)
         return self._joystick

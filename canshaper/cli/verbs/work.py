@@ -48,7 +48,7 @@ def work(
       canshaper work --set pump_flow=1.2 --operator novice.reaction_s=0.4
     """
     from canshaper.campaign.run import Source
-    from canshaper.campaign.work_results import crew, do_all, figure, practised, table
+    from canshaper.campaign.work_results import do_all, figure, practised, table
     from canshaper.cli.results import Results
     from canshaper.report.console import progress_bar
     from canshaper_sim.operator_model import Operators
@@ -63,10 +63,10 @@ def work(
     deployment = loader(file)()
     results = Results("Seconds a move", deployment, report, picture)
     source = Source.of(deployment, deployment.config.uncertainty, changes or [])
-    plans = crew(source, people, (tolerance[0] / 100.0, tolerance[1]))
+    within = tolerance[0] / 100.0, tolerance[1]
     with progress_bar("practice") as on_progress:
         do = partial(do_all, engine(processes, None), source, on_progress)
-        plans = practised(plans, do)
+        plans = practised(source, people, within, do)
         on_progress(0.0, "work")
         done = do([replace(one, seed=str(seed)) for seed in range(seeds) for one in plans])
     results.print(table(done))
