@@ -35,25 +35,15 @@ _STANDS = 0.01  # of the speed before
 
 @dataclass(frozen=True)
 class Work:
-    """One working cycle.
+    """One working cycle."""
 
-    Attributes:
-        bypass: with anti-sway switched off.
-        operator: name of who works.
-        skill: what the operator can.
-        known: of each axis; of slew a m is a rad.
-        techniques: one for each of `LOADS`.
-        within: tip from the target, m, and swing, degrees.
-        seed: of places and operator.
-    """
-
-    bypass: bool
+    bypass: bool  # with anti-sway switched off
     operator: str
     skill: Skill
-    known: tuple[Known, ...]
-    techniques: tuple[tuple[float, float], ...]
-    within: tuple[float, float]
-    seed: str
+    known: tuple[Known, ...]  # of each axis; of slew a m is a rad
+    techniques: tuple[tuple[float, float], ...]  # one for each load
+    within: tuple[float, float]  # tip from the target, m, and swing, degrees
+    seed: str  # of places and operator
 
 
 class Move(NamedTuple):
@@ -63,7 +53,7 @@ class Move(NamedTuple):
     done: bool = False
     seconds: float = LIMIT_S
     taps: int = 0  # corrections and catches
-    waiting_s: float = 0.0  # no joystick moved, after the first stroke
+    waiting_s: float = 0.0  # no joystick moved
     peak_deg: float = 90.0
     beyond_m: float = 0.0  # farthest that an axis went beyond the target
 
@@ -126,17 +116,10 @@ def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> 
 def do_work(
     source: Source, work: Work, on_frame: OnFrame | None = None, moves: int = MOVES
 ) -> list[Move]:
-    """Do one working cycle, or its first moves.
-
-    Args:
-        source: the machine.
-        work: what is done.
-        on_frame: called with every frame and its time in s; None where no one listens.
-        moves: how many.
-    """
+    """Do one working cycle, or its first moves; ``on_frame`` gets all frames, with times in s."""
     deployment, nominal = source.load(), changed_parameters([*source.changes])
     at, tick_s = places(nominal, work.seed), deployment.config.tick_ms / 1000.0
-    joysticks = _Joysticks("work", (), MOVES * (_GRIP_S + LIMIT_S))
+    joysticks = _Joysticks("work", (), (MOVES + 1) * (_GRIP_S + LIMIT_S))
     options: DriveOptions = {
         "parameters": replace(nominal, start_theta1_rad=at[0][0], start_radius_m=at[0][1]),
         "crane": driven_axes(deployment)[0],
@@ -160,33 +143,23 @@ def do_work(
             next(ticks)
         crane.pick_up(grapple)
         tip_m, most_deg = work.within
+        axes = zip(work.known, (slew_rad, radius_m), (radius_m, 1.0), modes, strict=True)
         task = [
             (Known(one.full_m_s * metre, one.fall, mode.omega_rad_s), target * metre)
-            for one, target, metre, mode in zip(
-                work.known, (slew_rad, radius_m), (radius_m, 1.0), modes, strict=True
-            )
+            for one, target, metre, mode in axes
         ]
         within = tip_m, math.radians(most_deg) * (grapple.l1_m + grapple.l2_m)
-        operator = OperatorModel(
-            work.skill,
-            work.techniques[number % 2],
-            task,
-            within,
-            seed=f"{work.seed} {number}",
-            tick_s=tick_s,
-        )
+        way, seed = work.techniques[number % 2], f"{work.seed} {number}"
+        operator = OperatorModel(work.skill, way, task, within, seed=seed, tick_s=tick_s)
         begin, _ = _seen(crane, radius_m)
         seconds = held_s = waiting_s = peak_deg = beyond_m = 0.0
-        begun = False
         while held_s < _HELD_S and seconds < LIMIT_S and not crane.swung_over:
             next(ticks)
             seconds += tick_s
             seen, swing_deg = _seen(crane, radius_m)
             operator.see(seconds, seen)
             joysticks.held.update(zip(AXES, operator.joysticks, strict=True))
-            moves_now = any(operator.joysticks)
-            begun = begun or moves_now
-            waiting_s += tick_s * (begun and not moves_now)
+            waiting_s += tick_s * (not any(operator.joysticks))
             off_m = [place - target for (place, _), (_, target) in zip(seen, task, strict=True)]
             for (start, _), (_, target), off in zip(begin, task, off_m, strict=True):
                 beyond_m = max(beyond_m, math.copysign(1.0, target - start) * off)
@@ -194,9 +167,9 @@ def do_work(
             near = math.hypot(*off_m) <= tip_m and swing_deg <= most_deg
             held_s = held_s + tick_s if near else 0.0
         joysticks.held.clear()
-        ends = held_s >= _HELD_S
-        took_s = seconds if ends else LIMIT_S
-        done.append(Move(load, ends, took_s, operator.taps, waiting_s, peak_deg, beyond_m))
+        in_time = held_s >= _HELD_S
+        took_s = seconds if in_time else LIMIT_S
+        done.append(Move(load, in_time, took_s, operator.taps, waiting_s, peak_deg, beyond_m))
     return done
 
 

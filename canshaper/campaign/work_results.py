@@ -37,16 +37,10 @@ def practised(
     within: tuple[float, float],
     do: Callable[[Sequence[Work]], Done],
 ) -> list[Work]:
-    """What each operator does, with anti-sway off and on; with each load as was the fastest.
-
-    Args:
-        source: the machine.
-        operators: what they can.
-        within: see ``Work``.
-        do: does working cycles, those of the practice.
+    """What each operator does, anti-sway off and on, with each load as was the fastest in practice.
 
     Raises:
-        CampaignError: the machine has no tip that slew and near-far move.
+        CampaignError: see ``learn``.
     """
     deployment, nominal = source.load(), changed_parameters([*source.changes])
     known = {bypass: learn(deployment, nominal, bypass=bypass) for bypass in (True, False)}

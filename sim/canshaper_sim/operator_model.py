@@ -72,7 +72,7 @@ class OperatorModel:
     """A person who does one move.
 
     Args:
-        skill: what the person can.
+        skill: what the person can do.
         technique: speed and catch of this person, parts of full deflection and of the swing.
         task: of each axis what is known of it, and where the tip has to be.
         within: how far off tip and load may be.

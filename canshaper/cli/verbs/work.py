@@ -58,8 +58,8 @@ def work(
     people = changed(Operators(), operators or [], "--operator")
     for given, (low, high), unit in zip(tolerance, (_CM, _DEG), ("cm", "degrees"), strict=True):
         if not low <= given <= high:
-            text = f"--tolerance: expected {low:g} .. {high:g} {unit}, got {given:g}"
-            raise UsageError(text)
+            expected = f"expected {low:g} .. {high:g} {unit}"
+            raise UsageError(f"--tolerance: {expected}, got {given:g}")
     deployment = loader(file)()
     results = Results("Seconds a move", deployment, report, picture)
     source = Source.of(deployment, deployment.config.uncertainty, changes or [])
