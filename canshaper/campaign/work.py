@@ -1,9 +1,9 @@
 """A working cycle with a model of an operator: empty grapple out to the pile, log back.
 
-A move ends when tip and load are within the tolerance for a while. One that is not done in time
-counts as that long; so do all from the one on in which the grapple swings above the horizontal.
-Between two moves the grapple stands on pile or bunk, the joysticks neutral. Lift and rotator do not
-move: they take their time in every set-up.
+A move ends when the tip is within the tolerance for a while, and the load swings no farther than
+that, left alone. One that is not done in time counts as that long; so do all from the one on in
+which the grapple swings above the horizontal. Between two moves the grapple stands on pile or bunk,
+the joysticks neutral. Lift and rotator do not move: they take their time in every set-up.
 """
 
 import math
@@ -42,7 +42,7 @@ class Work:
     skill: Skill
     known: tuple[Known, ...]  # of each axis; of slew a m is a rad
     techniques: tuple[tuple[float, float], ...]  # one for each load
-    within: tuple[float, float]  # tip from the target, m, and swing, degrees
+    within: tuple[float, float]  # tip from the target, m, and swing, degrees; infinite: any
     seed: str  # of places and operator
 
 
@@ -151,19 +151,19 @@ def do_work(
         within = tip_m, math.radians(most_deg) * (grapple.l1_m + grapple.l2_m)
         way, seed = work.techniques[number % 2], f"{work.seed} {number}"
         operator = OperatorModel(work.skill, way, task, within, seed=seed, tick_s=tick_s)
-        begin, _ = _seen(crane, radius_m)
+        begin, *_ = _seen(crane, radius_m)
         seconds = held_s = waiting_s = peak_deg = beyond_m = 0.0
         while held_s < _HELD_S and seconds < LIMIT_S and not crane.swung_over:
             next(ticks)
             seconds += tick_s
-            seen, swing_deg = _seen(crane, radius_m)
+            seen, tilt_deg, swing_deg = _seen(crane, radius_m)
             operator.see(seconds, seen)
             joysticks.held.update(zip(AXES, operator.joysticks, strict=True))
             waiting_s += tick_s * (not any(operator.joysticks))
             off_m = [place - target for (place, _), (_, target) in zip(seen, task, strict=True)]
             for (start, _), (_, target), off in zip(begin, task, off_m, strict=True):
                 beyond_m = max(beyond_m, math.copysign(1.0, target - start) * off)
-            peak_deg = max(peak_deg, swing_deg)
+            peak_deg = max(peak_deg, tilt_deg)
             near = math.hypot(*off_m) <= tip_m and swing_deg <= most_deg
             held_s = held_s + tick_s if near else 0.0
         joysticks.held.clear()
@@ -173,10 +173,15 @@ def do_work(
     return done
 
 
-def _seen(crane: Crane, radius_m: float) -> tuple[list[tuple[float, float]], float]:
-    """Tip and load, slewing in m there, and the swing in degrees; a lean in the wind is none."""
-    state, (across, along) = crane.state, crane.rest_rad
-    swing = state.theta5_rad - across, state.theta6_rad - along
-    out_m, across_m = crane.parameters.grapple.offset_m(*swing)
+def _seen(crane: Crane, radius_m: float) -> tuple[list[tuple[float, float]], float, float]:
+    """Tip and load, slewing in m there, and in degrees the tilt now and that of the next turn.
+
+    A lean in the wind is none.
+    """
+    state, grapple, (across, along) = crane.state, crane.parameters.grapple, crane.rest_rad
+    tilt = state.theta5_rad - across, state.theta6_rad - along
+    out_m, across_m = grapple.offset_m(*tilt)
+    rate5 = state.theta5_rate_rad_s / grapple.mode5.omega_rad_s
+    rate6 = state.theta6_rate_rad_s / grapple.mode6.omega_rad_s
     seen = [(state.theta1_rad * radius_m, across_m), (state.radius_m, out_m)]
-    return seen, math.degrees(math.hypot(*swing))
+    return seen, math.degrees(math.hypot(*tilt)), math.degrees(math.hypot(*tilt, rate5, rate6))

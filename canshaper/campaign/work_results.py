@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Techniques that are tried in practice, and in how many working cycles each.
-_SPEEDS, _CATCHES, _PRACTICE = (0.4, 0.6, 0.8, 1.0), (0.0, 0.5, 1.0), 3
+_SPEEDS, _CATCHES, _PRACTICE = (0.4, 0.6, 0.8, 1.0), (0.0, 0.5, 1.0), 2
 Done = dict[Work, list[Move]]
 """Moves of each working cycle, in the order of the seeds."""
 

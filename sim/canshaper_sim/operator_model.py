@@ -25,9 +25,9 @@ from canshaper_sim.ranges import check_ranges
 _ALLOWED = dict.fromkeys(("reaction_s", "ramp_s"), (0.05, 1.0)) | dict.fromkeys(
     ("timing_s", "aim_m", "motor", "run_on", "dead_m", "catch"), (0.0, 1.0)
 )
-# Chosen: a tap lasts so long where full deflection is not needed, and has at least this one; a way
-# still to come that disturbs no swing; parts of the tolerance worth a tap, and a catch.
-_TAP_S, _LEAST_LEVEL, _QUIET_M, _WORTH_A_TAP, _WORTH_A_CATCH = 0.3, 0.15, 0.03, 0.33, 0.7
+# Chosen: a tap lasts so long where full deflection is not needed, and has at least this one; parts
+# of the tolerance that are worth a tap, and a catch.
+_TAP_S, _LEAST_LEVEL, _WORTH_A_TAP, _WORTH_A_CATCH = 0.3, 0.15, 0.33, 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +179,6 @@ class _Axis:
 
     def caught_m(self, time_s: float, part: float) -> float:
         """Way of a tap that has to begin now, to be half done when the load turns; else 0."""
-        if abs(self._coming_m) > _QUIET_M:
-            return 0.0
         omega = self.known.omega_rad_s
         phase = math.atan2(-self._rate_m_s / omega, self._off_m)  # it turns at each pi
         for turn in range(math.ceil(phase / math.pi), math.ceil(phase / math.pi) + 3):

@@ -157,6 +157,9 @@ def test_a_swing_is_caught_and_the_tip_ends_where_it_was() -> None:
     assert max(caught.swing_deg[-100:]) < 4.5  # one plane after the other, two turns each
     assert caught.off_m[-1] < 0.05
     assert 4 <= caught.person.taps <= 6
+    plane = Drive(EXACT, to=(0.0, 5.0), sway=Sway(theta6_rad=math.radians(20.0))).go(4.0)
+    assert max(plane.swing_deg[-60:]) < 3.0
+    assert plane.person.taps == 2
 
 
 def tapped_m(skill: Skill, way_m: float, seed: str) -> float:

@@ -1,5 +1,6 @@
 """``canshaper work``: seconds a move that anti-sway gains a model of an operator."""
 
+import math
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -63,7 +64,7 @@ def work(
     deployment = loader(file)()
     results = Results("Seconds a move", deployment, report, picture)
     source = Source.of(deployment, deployment.config.uncertainty, changes or [])
-    within = tolerance[0] / 100.0, tolerance[1]
+    within = tolerance[0] / 100.0, tolerance[1] if tolerance[1] < _DEG[1] else math.inf
     with progress_bar("practice") as on_progress:
         do = partial(do_all, engine(processes, None), source, on_progress)
         plans = practised(source, people, within, do)
