@@ -20,6 +20,7 @@ from canshaper.errors import CampaignError
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator_model import Known, Operators, Skill
 from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.recorder import Recorder
 from tests.rigs.files import read
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -92,6 +93,18 @@ def test_moves_are_done_and_anti_sway_swings_less() -> None:
         assert -0.01 < other.beyond_m < 0.3
 
 
+def test_between_two_moves_the_joysticks_are_neutral_and_the_swing_is_damped_out() -> None:
+    recorder, work = Recorder(source().load()), works(bypass=True, within=(0.8, math.inf))
+    first, _ = do_work(source(), work, recorder.receive, moves=2)
+    recording = recorder.recording()
+    assert recording.crane
+    end = round((1.5 + first.seconds) / 0.02)
+    assert max(recording.crane.sway_deg[end - 60 : end]) > 8.0
+    assert max(recording.crane.sway_deg[end + 65 : end + 75]) < 3.0
+    for axis in AXES:
+        assert recording.axes[axis].joystick[end + 2 : end + 74] == [0.0] * 72
+
+
 def test_a_log_swings_on_where_an_empty_grapple_hangs_still() -> None:
     waits = replace(works(bypass=True), skill=Skill(catch=0.0))
     empty, log = do_work(source(), waits, moves=2)
@@ -129,6 +142,7 @@ def test_practice_chooses_the_fastest_technique_of_each_load() -> None:
         found = {}
         for one in trials:
             speed, catch = one.techniques[0]
+            assert catch <= one.skill.catch
             slower = abs(catch - 0.5 * one.skill.catch)
             seconds = dict(zip(LOADS, (9.0 - speed, 8.0 + speed), strict=True))
             found[one] = [Move(load, True, seconds[load] + slower) for load in LOADS]
