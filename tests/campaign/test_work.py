@@ -93,6 +93,22 @@ def test_moves_are_done_and_anti_sway_swings_less() -> None:
         assert -0.01 < other.beyond_m < 0.3
 
 
+def test_a_tip_that_passes_the_target_is_not_there() -> None:
+    unaware = tuple(one._replace(fall=(0.0,)) for one in known(bypass=True))
+    work = works(bypass=True, seed="2", speed=1.0, within=(0.2, math.inf))
+    recorder, work = Recorder(source().load()), replace(work, known=unaware)
+    (move,) = do_work(source(), work, recorder.receive, moves=1)
+    slew, radius_m = places(CraneParameters(), work.seed)[1]
+    target = radius_m * math.cos(slew), radius_m * math.sin(slew)
+    recording = recorder.recording()
+    assert recording.crane
+    end = round((1.5 + move.seconds) / 0.02)
+    inside = [math.dist(tip, target) < 0.21 for tip in recording.crane.tip_m[:end]]
+    assert all(inside[-15:])
+    assert any(inside[:-25])
+    assert not all(inside[-25:])
+
+
 def test_between_two_moves_the_joysticks_are_neutral_and_the_swing_is_damped_out() -> None:
     recorder, work = Recorder(source().load()), works(bypass=True, within=(0.8, math.inf))
     first, _ = do_work(source(), work, recorder.receive, moves=2)

@@ -133,8 +133,9 @@ def test_the_tip_stops_where_the_hand_meant_it_to() -> None:
     drive = Drive(replace(EXACT, catch=0.0, dead_m=0.5), to=(0.6, 6.0)).go(5.0)
     assert drive.person.taps == 0
     assert drive.off_m[-1] < 0.04
-    slow = replace(EXACT, catch=0.0, dead_m=0.5, reaction_s=0.5)
-    assert Drive(slow, to=(0.6, 6.0)).go(5.0).off_m[-1] < 0.10
+    for slower in ({"reaction_s": 0.5}, {"ramp_s": 0.6}):
+        slow = replace(EXACT, catch=0.0, dead_m=0.5, **slower)
+        assert Drive(slow, to=(0.6, 6.0)).go(5.0).off_m[-1] < 0.10
 
 
 def test_a_hand_takes_its_time() -> None:
