@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Techniques that are tried in practice, and in how many working cycles each.
-_SPEEDS, _CATCHES, _PRACTICE = (0.4, 0.6, 0.8, 1.0), (0.0, 0.5, 1.0), 2
+_SPEEDS, _CATCHES, _PRACTICE = (0.25, 0.5, 0.75, 1.0), (0.0, 0.5, 1.0), 2
 Done = dict[Work, list[Move]]
 """Moves of each working cycle, in the order of the seeds."""
 
@@ -128,7 +128,7 @@ def figure(source: Source, works: Sequence[Work]) -> "Figure":
 
     fig = style.new_figure(style.WIDTH_PX, 1200, dpi=style.PRINT_DPI)
     drives: list[tuple[CraneTrace, Sequence[range]]] = []
-    panel = fig.add_axes((0.45, 0.12, 0.53, 0.8))
+    panel = fig.add_axes((0.45, 0.16, 0.53, 0.76))
     for work, colour in zip(works, (style.RAW_COLOUR, style.SHAPED_COLOUR), strict=True):
         recorder = Recorder(source.load(), changed_parameters([*source.changes]))
         do_work(source, work, recorder.receive, 2)
@@ -139,5 +139,5 @@ def figure(source: Source, works: Sequence[Work]) -> "Figure":
     style.plain(panel, size=style.TEXT_PT)
     style.titled(panel, "Swing, deg, over s: empty out, log back", style.TITLE_PT)
     sizes = style.TEXT_PT, style.TITLE_PT
-    draw_top_views(fig, drives, (0.05, 0.12, 0.38, 0.93), sizes=sizes)
+    draw_top_views(fig, drives, (0.05, 0.16, 0.38, 0.92), sizes=sizes)
     return fig

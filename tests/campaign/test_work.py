@@ -170,7 +170,7 @@ def test_practice_chooses_the_fastest_technique_of_each_load() -> None:
     ]
     for one in chosen:
         catch = 0.5 if one.operator == "catching" else 0.0
-        assert one.techniques == ((1.0, catch), (0.4, catch))
+        assert one.techniques == ((1.0, catch), (0.25, catch))
         assert one.skill == getattr(Operators(), one.operator)
     assert sum(chosen[0].known[0].fall) < 0.25 * sum(chosen[3].known[0].fall)
 

@@ -36,7 +36,7 @@ def work(
     An operator swings the empty grapple out to the pile and a log back, ten moves, each until tip
     and load are within the tolerance for 0.3 s. Three work: skilled, catching the swing; skilled,
     waiting until it has decayed; novice. Each has practised with anti-sway off and on, and has the
-    technique that was the fastest. Both get the same seeds; bounds by the bootstrap.
+    technique that was the fastest. Both get the same seeds; bounds by the bootstrap. Takes minutes.
 
     Examples:
 
