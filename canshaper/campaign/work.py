@@ -29,7 +29,7 @@ _HELD_S, _GRIP_S = 0.3 - 1e-9, 1.5  # within the tolerance; between two moves, n
 _PLACES = ((-5.0, 5.0), (2.6, 3.4)), ((55.0, 125.0), (4.0, 7.0))
 # Log of 600 kg in a grapple of 300 kg, .4 m lower: the heaviest that a campaign draws.
 _LOG_MASS, _LOG_M = 3.0, 0.4
-_PRESS = (0.5, 3.2, 0.5, 0.0)  # start, duration, level, ramp
+_PRESS = (2.0, 3.2, 0.5, 0.0)  # start, duration, level, ramp
 _STANDS = 0.01  # of the speed before
 
 
@@ -97,7 +97,7 @@ def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> 
     options: DriveOptions = {"parameters": start, "crane": crane, "bypass": bypass}
     for axis in AXES:
         press = Stroke(axis, *_PRESS)
-        simulation = Simulation(deployment, Script("press", (press,), 8.0), **options)
+        simulation = Simulation(deployment, Script("press", (press,), 9.0), **options)
         speeds = list[float]()
         for time_ms in simulation.ticks():
             if time_ms < 1000.0 * press.end_s:

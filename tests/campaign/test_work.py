@@ -66,6 +66,11 @@ def test_practice_teaches_speed_and_run_on(run_on_s: float, *, bypass: bool) -> 
         assert all(-0.01 < later <= sooner for sooner, later in pairwise(one.fall))
 
 
+def test_a_machine_whose_nodes_have_to_boot_is_waited_for() -> None:
+    learned = learn(read(CONFIG / "canopen-forwarder.yaml"), CraneParameters(), bypass=True)
+    assert [one.full_m_s for one in learned] == pytest.approx([0.5, 1.0], rel=0.02)
+
+
 def test_a_crane_that_cannot_do_the_work_is_refused() -> None:
     joints, still = (
         CONFIG / "forwarder-joints.yaml",
