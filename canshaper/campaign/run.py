@@ -50,6 +50,10 @@ class Source:
         files = tuple((str(one), one.read_bytes()) for one in paths)
         return cls(str(path), files, ranges, tuple(changes))
 
+    def load(self) -> Deployment:
+        """Load the deployment, once in a process."""
+        return _loaded(self.path, self.files)
+
     @property
     def about(self) -> dict[str, Any]:
         """Identity of the drives: only drives with the same identity go together."""
@@ -81,7 +85,7 @@ def _loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deploymen
 
 def drive_all(source: Source, seeds: Seeds) -> list[Row]:
     """Draw, drive and measure each of some drives."""
-    deployment = _loaded(source.path, source.files)
+    deployment = source.load()
     nominal = changed_parameters([*source.changes])
     return [measured_drive(deployment, seed, source.ranges, nominal) for seed in seeds]
 

@@ -1,10 +1,12 @@
 """Parameters of the simulated crane by name, for the command line."""
 
 import dataclasses
-from typing import Any
+from typing import Any, TypeVar
 
 from canshaper.errors import DesignError, did_you_mean
 from canshaper_sim.crane import CraneParameters
+
+P = TypeVar("P")
 
 
 def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float]:
@@ -21,22 +23,26 @@ def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float
 
 
 def changed_parameters(changes: list[str]) -> CraneParameters:
-    """The nominal crane with NAME=VALUE changes put in, such as grapple.l2_m=1.5.
+    """The nominal crane with NAME=VALUE changes put in; see `changed`."""
+    return changed(CraneParameters(), changes, "--set")
+
+
+def changed(parameters: P, changes: list[str], option: str) -> P:
+    """Parameters with NAME=VALUE changes of this option put in, such as grapple.l2_m=1.5.
 
     Raises:
-        DesignError: no such parameter, no number, or a value that makes no crane.
+        DesignError: no such parameter, no number, or a value that cannot be.
     """
-    parameters = CraneParameters()
-    known = parameter_names()
+    known = parameter_names(parameters)
     for change in changes:
         name, _, text = change.partition("=")
         if name not in known:
             names = did_you_mean(name, known) or f"; there are {', '.join(known)}"
-            raise DesignError(f"--set {change}: expected a parameter, got {name!r}{names}")
+            raise DesignError(f"{option} {change}: expected a parameter, got {name!r}{names}")
         try:
             value = float(text)
         except ValueError:
-            raise DesignError(f"--set {change}: expected a number, got {text!r}") from None
+            raise DesignError(f"{option} {change}: expected a number, got {text!r}") from None
         parameters = _replaced(parameters, name, value)
     return parameters
 

@@ -35,6 +35,7 @@ NOT_PASTED = {
     "replay.md": "logs of a machine; tests/recording",
     "sensor.md": "a machine",
     "studio.md": "serves until it is stopped; tests/studio/test_playback.py opens drives",
+    "work.md": "minutes of drives; tests/campaign/test_work.py",
     "service.md": "installs the package; tests/systemd, and tools/image.sh tries the image",
 }
 # Outputs that are not compared, and why.

@@ -1,0 +1,187 @@
+"""A working cycle with a model of an operator: empty grapple out to the pile, log back.
+
+A move ends when the tip is within the tolerance for a while, and the load swings no farther than
+that, left alone. One that is not done in time counts as that long; so do all from the one on in
+which the grapple swings above the horizontal. Between two moves the grapple stands on pile or bunk,
+the joysticks neutral. Lift and rotator do not move: they take their time in every set-up.
+"""
+
+import math
+import random
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from canshaper.campaign.draw import driven_axes
+from canshaper.campaign.run import Source
+from canshaper.design.lockstep import DriveOptions, OnFrame, Simulation
+from canshaper.errors import CampaignError
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.axes import NEAR_FAR, SLEW
+from canshaper_sim.crane import Crane, CraneParameters
+from canshaper_sim.operator_model import Known, OperatorModel, Skill
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.strokes import Script, Stroke
+
+MOVES, LIMIT_S, LOADS, AXES = 10, 30.0, ("empty", "log"), (SLEW, NEAR_FAR)
+_HELD_S, _GRIP_S = 0.3 - 1e-9, 1.5  # within the tolerance; between two moves, not counted
+# Degrees and metres of the bunk, behind the cab, and of the pile, as loading was studied (Hartsch
+# et al. 2022, 2024: 45 to 135 degrees, 4 to 10 m) and this crane reaches.
+_PLACES = ((-5.0, 5.0), (2.6, 3.4)), ((55.0, 125.0), (4.0, 7.0))
+# Log of 600 kg in a grapple of 300 kg, .4 m lower: the heaviest that a campaign draws.
+_LOG_MASS, _LOG_M = 3.0, 0.4
+_PRESS = (2.0, 3.2, 0.5, 0.0)  # start, duration, level, ramp
+_STANDS = 0.01  # of the speed before
+
+
+@dataclass(frozen=True)
+class Work:
+    """One working cycle."""
+
+    bypass: bool  # with anti-sway switched off
+    operator: str
+    skill: Skill
+    known: tuple[Known, ...]  # of each axis; of slew a m is a rad
+    techniques: tuple[tuple[float, float], ...]  # one for each load
+    within: tuple[float, float]  # tip from the target, m, and swing, degrees; infinite: any
+    seed: str  # of places and operator
+
+
+class Move(NamedTuple):
+    """One move, as it was done."""
+
+    load: str
+    done: bool = False
+    seconds: float = LIMIT_S
+    taps: int = 0  # corrections and catches
+    waiting_s: float = 0.0  # no joystick moved
+    peak_deg: float = 90.0
+    beyond_m: float = 0.0  # farthest that an axis went beyond the target
+
+
+@dataclass(frozen=True, slots=True)
+class _Joysticks(Script):
+    """Joysticks that a model holds, by axis."""
+
+    held: dict[str, float] = field(default_factory=dict)
+
+    def command(self, axis: str, time_s: float) -> float:
+        """Joystick value -1 .. 1 of one axis, now."""
+        return self.held.get(axis, 0.0)
+
+
+def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
+    """Slew angle and radius of the tip: bunk, pile, bunk, ... one more than there are moves."""
+    source = random.Random(f"places {seed}")
+    side, at = source.choice((-1.0, 1.0)), []
+    for number in range(MOVES + 1):
+        degrees, metres = _PLACES[number % 2]
+        slew, radius_m = math.radians(side * source.uniform(*degrees)), source.uniform(*metres)
+        slew = min(max(slew, crane.slew_min_rad), crane.slew_max_rad)
+        at.append((slew, min(max(radius_m, crane.radius_min_m), crane.radius_max_m)))
+    return at
+
+
+def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> tuple[Known, ...]:
+    """Press and let go each joystick once: what practice teaches of a crane.
+
+    Raises:
+        CampaignError: it has no tip that slew and near-far move, or they do not move it.
+        ConfigError: the deployment does not fit the machine.
+    """
+    crane, axes = driven_axes(deployment)
+    if not {*AXES} <= {*axes}:
+        text = f"expected axes {' and '.join(AXES)}, got {', '.join(axes)}"
+        raise CampaignError(f"{deployment.path}: {text}")
+    middle_m, known = 0.5 * (nominal.radius_min_m + nominal.radius_max_m), []
+    start = replace(nominal, start_radius_m=middle_m)
+    options: DriveOptions = {"parameters": start, "crane": crane, "bypass": bypass}
+    for axis in AXES:
+        press = Stroke(axis, *_PRESS)
+        simulation = Simulation(deployment, Script("press", (press,), 9.0), **options)
+        speeds = list[float]()
+        for time_ms in simulation.ticks():
+            if time_ms < 1000.0 * press.end_s:
+                speeds.clear()
+            speeds.append(simulation.plant.crane.speed(axis))
+        if speeds[0] <= 0.0:
+            text = f"expected {axis} to move when its joystick is at {press.level:.0%}"
+            raise CampaignError(f"{deployment.path}: {text}; it stood")
+        fall = [speed / speeds[0] for speed in speeds]
+        while len(fall) > 1 and abs(fall[-1]) < _STANDS:
+            fall.pop()
+        known.append(Known(speeds[0] / press.level, tuple(fall)))
+    return tuple(known)
+
+
+def do_work(
+    source: Source, work: Work, on_frame: OnFrame | None = None, moves: int = MOVES
+) -> list[Move]:
+    """Do one working cycle, or its first moves; ``on_frame`` gets all frames, with times in s."""
+    deployment, nominal = source.load(), changed_parameters([*source.changes])
+    at, tick_s = places(nominal, work.seed), deployment.config.tick_ms / 1000.0
+    joysticks = _Joysticks("work", (), (MOVES + 1) * (_GRIP_S + LIMIT_S))
+    options: DriveOptions = {
+        "parameters": replace(nominal, start_theta1_rad=at[0][0], start_radius_m=at[0][1]),
+        "crane": driven_axes(deployment)[0],
+        "bypass": work.bypass,
+    }
+    simulation = Simulation(deployment, joysticks, on_frame, **options)
+    crane, ticks, done = simulation.plant.crane, simulation.ticks(), list[Move]()
+    for number, (slew_rad, radius_m) in enumerate(at[1 : 1 + moves]):
+        load, grapple = LOADS[number % 2], nominal.grapple
+        if crane.swung_over:
+            done.append(Move(load))
+            continue
+        if load == "log":
+            mass_kg, length_m = _LOG_MASS * grapple.m2_kg, grapple.l2_m + _LOG_M
+            grapple = replace(grapple, m2_kg=mass_kg, l2_m=length_m)
+        modes = grapple.mode5, grapple.mode6
+        unit = replace(grapple, c5_n_m_s_rad=1.0, c6_n_m_s_rad=1.0)
+        c5, c6 = 1.0 / unit.mode5.zeta, 1.0 / unit.mode6.zeta  # critical: it stands on the ground
+        crane.pick_up(replace(grapple, c5_n_m_s_rad=c5, c6_n_m_s_rad=c6))
+        for _ in range(round(_GRIP_S / tick_s)):
+            next(ticks)
+        crane.pick_up(grapple)
+        tip_m, most_deg = work.within
+        axes = zip(work.known, (slew_rad, radius_m), (radius_m, 1.0), modes, strict=True)
+        task = [
+            (Known(one.full_m_s * metre, one.fall, mode.omega_rad_s), target * metre)
+            for one, target, metre, mode in axes
+        ]
+        within = tip_m, math.radians(most_deg) * (grapple.l1_m + grapple.l2_m)
+        way, seed = work.techniques[number % 2], f"{work.seed} {number}"
+        operator = OperatorModel(work.skill, way, task, within, seed=seed, tick_s=tick_s)
+        begin, *_ = _seen(crane, radius_m)
+        seconds = held_s = waiting_s = peak_deg = beyond_m = 0.0
+        while held_s < _HELD_S and seconds < LIMIT_S and not crane.swung_over:
+            next(ticks)
+            seconds += tick_s
+            seen, tilt_deg, swing_deg = _seen(crane, radius_m)
+            operator.see(seconds, seen)
+            joysticks.held.update(zip(AXES, operator.joysticks, strict=True))
+            waiting_s += tick_s * (not any(operator.joysticks))
+            off_m = [place - target for (place, _), (_, target) in zip(seen, task, strict=True)]
+            for (start, _), (_, target), off in zip(begin, task, off_m, strict=True):
+                beyond_m = max(beyond_m, math.copysign(1.0, target - start) * off)
+            peak_deg = max(peak_deg, tilt_deg)
+            near = math.hypot(*off_m) <= tip_m and swing_deg <= most_deg
+            held_s = held_s + tick_s if near else 0.0
+        joysticks.held.clear()
+        in_time = held_s >= _HELD_S
+        took_s = seconds if in_time else LIMIT_S
+        done.append(Move(load, in_time, took_s, operator.taps, waiting_s, peak_deg, beyond_m))
+    return done
+
+
+def _seen(crane: Crane, radius_m: float) -> tuple[list[tuple[float, float]], float, float]:
+    """Tip and load, slewing in m there, and in degrees the tilt now and that of the next turn.
+
+    A lean in the wind is none.
+    """
+    state, grapple, (across, along) = crane.state, crane.parameters.grapple, crane.rest_rad
+    tilt = state.theta5_rad - across, state.theta6_rad - along
+    out_m, across_m = grapple.offset_m(*tilt)
+    rate5 = state.theta5_rate_rad_s / grapple.mode5.omega_rad_s
+    rate6 = state.theta6_rate_rad_s / grapple.mode6.omega_rad_s
+    seen = [(state.theta1_rad * radius_m, across_m), (state.radius_m, out_m)]
+    return seen, math.degrees(math.hypot(*tilt)), math.degrees(math.hypot(*tilt, rate5, rate6))

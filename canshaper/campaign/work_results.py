@@ -1,0 +1,143 @@
+"""Practice, then the work that counts, with and without anti-sway; a table and picture of it."""
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from itertools import product
+from statistics import fmean, median
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+from scipy import stats
+
+from canshaper.campaign.engine import Engine
+from canshaper.campaign.run import Source
+from canshaper.campaign.statistics import CONFIDENCE
+from canshaper.campaign.work import LIMIT_S, LOADS, Move, Work, do_work, learn
+from canshaper.report.console import OnProgress, new_table
+from canshaper_sim.operator_model import Operators
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.recorder import Recorder
+from canshaper_sim.recording import CraneTrace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Techniques that are tried in practice, and in how many working cycles each.
+_SPEEDS, _CATCHES, _PRACTICE = (0.25, 0.5, 0.75, 1.0), (0.0, 0.5, 1.0), 2
+Done = dict[Work, list[Move]]
+"""Moves of each working cycle, in the order of the seeds."""
+
+
+def practised(
+    source: Source,
+    operators: Operators,
+    within: tuple[float, float],
+    do: Callable[[Sequence[Work]], Done],
+) -> list[Work]:
+    """What each operator does, anti-sway off and on, with each load as was the fastest in practice.
+
+    Raises:
+        CampaignError: see ``learn``.
+    """
+    deployment, nominal = source.load(), changed_parameters([*source.changes])
+    known = {bypass: learn(deployment, nominal, bypass=bypass) for bypass in (True, False)}
+    works = [
+        Work(bypass, one.name, getattr(operators, one.name), known[bypass], (), within, "")
+        for bypass, one in product(known, fields(operators))
+    ]
+    trials = [
+        replace(one, techniques=(way,) * len(LOADS), seed=f"practice {number}")
+        for one, way, number in product(works, product(_SPEEDS, _CATCHES), range(_PRACTICE))
+        if way[1] <= one.skill.catch
+    ]
+    tried = defaultdict[Any, list[float]](list)
+    for one, moves in do(trials).items():
+        for move in moves:
+            key = one.bypass, one.operator, move.load, one.techniques[0]
+            tried[key].append(move.seconds)
+    order = sorted(tried, key=lambda key: fmean(tried[key]), reverse=True)
+    best = {key[:3]: key[3] for key in order}  # the fastest comes last
+    return [
+        replace(one, techniques=tuple(best[one.bypass, one.operator, load] for load in LOADS))
+        for one in works
+    ]
+
+
+def do_all(engine: Engine, source: Source, progress: OnProgress, works: Sequence[Work]) -> Done:
+    """Do all works."""
+    found: Done = {}
+    for work, moves in engine.run(partial(do_work, source), works):
+        found[work] = moves
+        progress(len(found) / len(works))
+    return {work: found[work] for work in works}
+
+
+def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, float]:
+    """Change of the mean in %, and its bounds by the bootstrap over pairs."""
+
+    def change(a: Any, b: Any, axis: int = -1) -> Any:
+        return 100.0 * (np.mean(b, axis) / np.mean(a, axis) - 1.0)
+
+    pairs, source = (raw, shaped), np.random.default_rng(0)
+    options: dict[str, Any] = {"method": "percentile", "random_state": source}
+    found = stats.bootstrap(pairs, change, paired=True, confidence_level=CONFIDENCE, **options)
+    bounds = found.confidence_interval
+    return float(change(raw, shaped)), float(bounds.low), float(bounds.high)
+
+
+_MEASURES: Sequence[tuple[str, str, Callable[[Move], float], Callable[..., float]]] = (
+    (f"in {LIMIT_S:g} s\n%", ".0f", lambda move: 100.0 * move.done, fmean),
+    ("taps\n", ".1f", lambda move: move.taps, fmean),
+    ("waits\ns", ".1f", lambda move: move.waiting_s, fmean),
+    ("peak\ndeg", ".0f", lambda move: move.peak_deg, median),
+    ("beyond\nm", ".2f", lambda move: move.beyond_m, fmean),
+)
+
+
+def table(done: Done) -> Table:
+    """A row for each operator and load, each measure with anti-sway off / on."""
+    heads = "seconds\n", "change, %\n95 %", *(head for head, *_ in _MEASURES)
+    drawn = new_table("a move, off / on", *heads)
+    for name, load in product(dict.fromkeys(one.operator for one in done), LOADS):
+        pair = [
+            [
+                [move for move in moves if move.load == load]
+                for one, moves in done.items()
+                if (one.bypass, one.operator) == (bypass, name)
+            ]
+            for bypass in (True, False)
+        ]
+        means = [[fmean(move.seconds for move in moves) for moves in cycles] for cycles in pair]
+        change, low, high = gain(*means)
+        cells = [" / ".join(f"{fmean(one):.1f}" for one in means)]
+        cells.append(f"{change:+.0f} ({low:+.0f}..{high:+.0f})")
+        for _, style, measure, mean in _MEASURES:
+            figures = (mean(measure(move) for moves in one for move in moves) for one in pair)
+            cells.append(" / ".join(f"{figure:{style}}" for figure in figures))
+        drawn.add_row(f"{name}, {load}", *cells)
+    return drawn
+
+
+def figure(source: Source, works: Sequence[Work]) -> "Figure":
+    """Picture of the first two moves of two works, anti-sway off and on."""
+    from canshaper.report import style  # noqa: PLC0415  (an extra)
+    from canshaper.report.top_view import draw_top_views  # noqa: PLC0415  (the same)
+
+    fig = style.new_figure(style.WIDTH_PX, 1200, dpi=style.PRINT_DPI)
+    drives: list[tuple[CraneTrace, Sequence[range]]] = []
+    panel = fig.add_axes((0.45, 0.16, 0.53, 0.76))
+    for work, colour in zip(works, (style.RAW_COLOUR, style.SHAPED_COLOUR), strict=True):
+        recorder = Recorder(source.load(), changed_parameters([*source.changes]))
+        do_work(source, work, recorder.receive, 2)
+        recording = recorder.recording()
+        if crane := recording.crane:
+            drives.append((crane, ()))
+            panel.plot(recording.t_s, crane.sway_deg, color=colour)
+    style.plain(panel, size=style.TEXT_PT)
+    style.titled(panel, "Swing, deg, over s: empty out, log back", style.TITLE_PT)
+    sizes = style.TEXT_PT, style.TITLE_PT
+    draw_top_views(fig, drives, (0.05, 0.16, 0.38, 0.92), sizes=sizes)
+    return fig

@@ -1,0 +1,274 @@
+"""``canshaper work``: places, practice, moves, bounds, and the command as a person uses it."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from canshaper.campaign import work_results
+from canshaper.campaign.run import Source
+from canshaper.campaign.work import AXES, LIMIT_S, LOADS, Move, Work, do_work, learn, places
+from canshaper.campaign.work_results import do_all, gain, practised, table
+from canshaper.cli.app import app
+from canshaper.errors import CampaignError
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.operator_model import Known, Operators, Skill
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.recorder import Recorder
+from tests.rigs.files import read
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+ROBUST = str(CONFIG / "forwarder-robust.yaml")
+WITHIN = 0.30, 6.0
+
+
+@cache
+def known(*, bypass: bool) -> tuple[Known, ...]:
+    return learn(read(Path(ROBUST)), CraneParameters(), bypass=bypass)
+
+
+def source(*changes: str, file: str = ROBUST) -> Source:
+    deployment = read(Path(file))
+    return Source.of(deployment, deployment.config.uncertainty, changes)
+
+
+def works(
+    *, bypass: bool, seed: str = "0", speed: float = 0.6, within: tuple[float, float] = WITHIN
+) -> Work:
+    learned, technique = known(bypass=bypass), (speed, 1.0)
+    return Work(bypass, "catching", Skill(), learned, (technique, technique), within, seed)
+
+
+def test_places_are_those_of_the_seed_and_within_reach() -> None:
+    crane = CraneParameters()
+    assert places(crane, "3") == places(crane, "3") != places(crane, "4")
+    for slew, radius_m in places(crane, "3")[1::2]:
+        assert 0.95 < abs(slew) < 2.19
+        assert 4.0 <= radius_m <= 7.0
+    short = changed_parameters(["radius_max_m=5", "slew_max_rad=0.5", "slew_min_rad=-0.5"])
+    for slew, radius_m in places(short, "3"):
+        assert abs(slew) <= 0.5
+        assert radius_m <= 5.0
+
+
+@pytest.mark.parametrize(("bypass", "run_on_s"), [(True, 0.16), (False, 0.95)])
+def test_practice_teaches_speed_and_run_on(run_on_s: float, *, bypass: bool) -> None:
+    for one, full in zip(known(bypass=bypass), (0.5, 1.0), strict=True):
+        assert one.full_m_s == pytest.approx(full, rel=0.02)
+        assert 0.02 * sum(one.fall) == pytest.approx(run_on_s, abs=0.02)
+        assert one.fall[0] == 1.0
+        assert all(-0.01 < later <= sooner for sooner, later in pairwise(one.fall))
+
+
+def test_a_machine_whose_nodes_have_to_boot_is_waited_for() -> None:
+    learned = learn(read(CONFIG / "canopen-forwarder.yaml"), CraneParameters(), bypass=True)
+    assert [one.full_m_s for one in learned] == pytest.approx([0.5, 1.0], rel=0.02)
+
+
+def test_a_crane_that_cannot_do_the_work_is_refused() -> None:
+    joints, still = (
+        CONFIG / "forwarder-joints.yaml",
+        changed_parameters(["slew_min_rad=0", "slew_max_rad=0"]),
+    )
+    with pytest.raises(
+        CampaignError, match="yaml: expected axes slew and near_far, got slew, lift"
+    ):
+        learn(read(joints), CraneParameters(), bypass=True)
+    with pytest.raises(CampaignError, match="expected slew to move when its joystick is at 50%"):
+        learn(read(Path(ROBUST)), still, bypass=True)
+
+
+def test_moves_are_done_and_anti_sway_swings_less() -> None:
+    raw, shaped = (do_work(source(), works(bypass=bypass), moves=2) for bypass in (True, False))
+    assert raw == do_work(source(), works(bypass=True), moves=2)
+    for one, other, load in zip(raw, shaped, LOADS, strict=True):
+        assert one.load == other.load == load
+        assert one.done
+        assert other.done
+        assert one.taps > other.taps
+        assert one.peak_deg > 1.5 * other.peak_deg
+        assert 3.0 < other.seconds < 12.0
+        assert 0.0 < other.waiting_s < other.seconds - 2.0
+        assert -0.01 < other.beyond_m < 0.3
+
+
+def test_a_tip_that_passes_the_target_is_not_there() -> None:
+    unaware = tuple(one._replace(fall=(0.0,)) for one in known(bypass=True))
+    work = works(bypass=True, seed="2", speed=1.0, within=(0.2, math.inf))
+    recorder, work = Recorder(source().load()), replace(work, known=unaware)
+    (move,) = do_work(source(), work, recorder.receive, moves=1)
+    slew, radius_m = places(CraneParameters(), work.seed)[1]
+    target = radius_m * math.cos(slew), radius_m * math.sin(slew)
+    recording = recorder.recording()
+    assert recording.crane
+    end = round((1.5 + move.seconds) / 0.02)
+    inside = [math.dist(tip, target) < 0.21 for tip in recording.crane.tip_m[:end]]
+    assert all(inside[-15:])
+    assert any(inside[:-25])
+    assert not all(inside[-25:])
+
+
+def test_between_two_moves_the_joysticks_are_neutral_and_the_swing_is_damped_out() -> None:
+    recorder, work = Recorder(source().load()), works(bypass=True, within=(0.8, math.inf))
+    first, _ = do_work(source(), work, recorder.receive, moves=2)
+    recording = recorder.recording()
+    assert recording.crane
+    end = round((1.5 + first.seconds) / 0.02)
+    assert max(recording.crane.sway_deg[end - 60 : end]) > 8.0
+    assert max(recording.crane.sway_deg[end + 65 : end + 75]) < 5.0
+    for axis in AXES:
+        assert recording.axes[axis].joystick[end + 2 : end + 74] == [0.0] * 72
+
+
+def test_a_log_swings_on_where_an_empty_grapple_hangs_still() -> None:
+    waits = replace(works(bypass=True), skill=Skill(catch=0.0))
+    empty, log = do_work(source(), waits, moves=2)
+    assert empty.seconds < 24.0 < log.seconds
+    assert log.taps == 0
+
+
+def test_where_only_the_tip_counts_anti_sway_is_slower() -> None:
+    raw, shaped = (
+        do_work(source(), works(bypass=bypass, speed=1.0, within=(0.3, math.inf)), moves=1)[0]
+        for bypass in (True, False)
+    )
+    assert raw.seconds < shaped.seconds - 1.0
+    assert raw.peak_deg > 25.0
+
+
+def test_the_crane_is_the_one_of_set_and_a_lean_in_the_wind_is_no_swing() -> None:
+    slow, windy = source("slew_full_speed_rad_s=0.2"), source("wind.speed_m_s=20", "wind.drag_m2=3")
+    assert do_work(slow, works(bypass=False), moves=1)[0].seconds > 9.0
+    assert do_work(windy, works(bypass=False), moves=1)[0].done
+
+
+def test_work_ends_where_the_grapple_swings_over() -> None:
+    wild = source("slew_full_speed_rad_s=1.5")
+    moves = do_work(wild, works(bypass=True, speed=1.0), moves=4)
+    swung = next(number for number, one in enumerate(moves) if not one.done)
+    assert 90.0 < moves[swung].peak_deg < 120.0
+    assert all((one.done, one.seconds) == (False, LIMIT_S) for one in moves[swung:])
+    assert moves[3].peak_deg == 90.0
+
+
+def test_practice_chooses_the_fastest_technique_of_each_load() -> None:
+    def do(trials: Sequence[Work]) -> dict[Work, list[Move]]:
+        """Empty it is best to be fast, with a log to be slow, and to catch by half."""
+        found = {}
+        for one in trials:
+            speed, catch = one.techniques[0]
+            assert catch <= one.skill.catch
+            slower = abs(catch - 0.5 * one.skill.catch)
+            seconds = dict(zip(LOADS, (9.0 - speed, 8.0 + speed), strict=True))
+            found[one] = [Move(load, True, seconds[load] + slower) for load in LOADS]
+        return found
+
+    chosen = practised(source(), Operators(), WITHIN, do)
+    assert [(one.bypass, one.operator) for one in chosen] == [
+        (bypass, name) for bypass in (True, False) for name in ("catching", "waiting", "novice")
+    ]
+    for one in chosen:
+        catch = 0.5 if one.operator == "catching" else 0.0
+        assert one.techniques == ((1.0, catch), (0.25, catch))
+        assert one.skill == getattr(Operators(), one.operator)
+    assert sum(chosen[0].known[0].fall) < 0.25 * sum(chosen[3].known[0].fall)
+
+
+def test_a_gain_is_that_of_the_pairs() -> None:
+    assert gain([10.0, 20.0, 30.0], [8.0, 16.0, 24.0]) == pytest.approx((-20.0, -20.0, -20.0))
+    change, low, high = gain([10.0, 12.0, 8.0, 11.0], [9.0, 13.0, 6.0, 10.0])
+    assert change == pytest.approx(-7.317, abs=0.01)
+    assert low < change < high
+    assert low > -26.0
+    assert high < 9.0
+
+
+def test_a_table_has_each_operator_and_load_off_and_on() -> None:
+    done = {}
+    for bypass in (True, False):
+        for seed in ("0", "1"):
+            late = 10.0 if bypass else 5.0
+            moves = [
+                Move(load, True, late + number, 3, 1.25, 20.0, 0.1)
+                for number, load in enumerate(LOADS)
+            ]
+            done[works(bypass=bypass, seed=seed)] = [*moves, moves[0]._replace(done=False)]
+    drawn = table(done)
+    cells = [[*column.cells] for column in drawn.columns]
+    assert cells[0] == ["catching, empty", "catching, log"]
+    assert cells[1] == ["10.0 / 5.0", "11.0 / 6.0"]
+    assert cells[2] == ["-50 (-50..-50)", "-45 (-45..-45)"]
+    assert cells[3:] == [
+        ["50 / 50", "100 / 100"],
+        *[[f"{one} / {one}"] * 2 for one in ("3.0", "1.2", "20", "0.10")],
+    ]
+
+
+def test_all_work_is_in_its_order_whoever_is_ready_first() -> None:
+    class Backwards:
+        """An engine whose last job is done first."""
+
+        def run(self, work: Any, jobs: Any) -> Iterator[Any]:
+            assert work.func is do_work
+            yield from ((one, [Move("log", taps=int(one.seed))]) for one in [*jobs][::-1])
+
+    shown: list[float] = []
+    ones = [works(bypass=False, seed=str(seed)) for seed in range(3)]
+    done = do_all(Backwards(), source(), lambda part, what=None: shown.append(part), ones)
+    assert [moves[0].taps for moves in done.values()] == [0, 1, 2]
+    assert shown == pytest.approx([1 / 3, 2 / 3, 1.0])
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["work", *arguments], env={"COLUMNS": "200"})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--tolerance", "0.5", "6"), "--tolerance: expected 1 .. 300 cm, got 0.5"),
+        (("--tolerance", "30", "91"), "--tolerance: expected 0.5 .. 90 degrees, got 91"),
+        (("--tolerance", "nan", "6"), "--tolerance: expected 1 .. 300 cm, got nan"),
+        (
+            ("--operator", "novice.reaction_s=0"),
+            "operator: reaction_s: expected 0.05 .. 1.0, got 0.0",
+        ),
+        (("--operator", "novice.skill=1"), "--operator novice.skill=1: expected a parameter, got"),
+        (("--operator", "waiting.aim_m=far"), "expected a number, got 'far'"),
+        (("--set", "pump=1"), "--set pump=1: expected a parameter, got 'pump'"),
+        (("--seeds", "1"), "greater than or equal to 2"),
+        ((str(CONFIG / "forwarder-joints.yaml"),), f"expected axes {' and '.join(AXES)}"),
+        (("--picture", "a.txt"), "--picture: expected a file with .png or .svg or .pdf"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_driven(
+    arguments: tuple[str, ...], text: str
+) -> None:
+    done = run(*arguments)
+    assert done.exit_code == 2
+    assert text in done.output
+    assert "Traceback" not in done.output
+
+
+@pytest.mark.slow
+def test_operators_work_and_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work_results, "_SPEEDS", (0.6, 1.0))
+    monkeypatch.setattr(work_results, "_CATCHES", (0.0, 1.0))
+    monkeypatch.setattr(work_results, "_PRACTICE", 1)
+    picture, report = tmp_path / "work.png", tmp_path / "work.html"
+    written = ("--picture", str(picture), "--report", str(report))
+    done = run(ROBUST, "--seeds", "2", "--tolerance", "30", "6", *written)
+    assert done.exit_code == 0, done.output
+    assert picture.stat().st_size > 20_000
+    assert "catching, log" in report.read_text()
+    rows = [
+        line.split() for line in done.output.splitlines() if ", empty" in line or ", log" in line
+    ]
+    assert [row[0] for row in rows] == ["catching,"] * 2 + ["waiting,"] * 2 + ["novice,"] * 2
+    assert all(float(row[2]) > float(row[4]) for row in rows)
