@@ -126,6 +126,15 @@ class TestSources:
         gate.receive(first[:3], first[3], timeout_ns + 2)
         assert axis.demand == -0.7
 
+    def test_another_one_moves_nothing_before_neutral(self) -> None:
+        """It comes between two ticks, neither of which sees a joystick that is silent."""
+        gate = Gate(record_of(load("j1939-forwarder")))
+        axis = gate.axes["slew"]
+        for now_ms, frame in ((0, bjm()), (101, bjm("BJM1", 0x34, X=50.0))):
+            gate.receive(frame[:3], frame[3], now_ms * MS)
+            gate.tick(-(-now_ms // 20) * 20 * MS, 0)
+            assert axis.armed is (now_ms == 0)
+
     def test_neither_our_own_nor_another_message_counts(self) -> None:
         gate = Gate(record_of(load("j1939-forwarder")))
         for frame in (

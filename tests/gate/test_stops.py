@@ -22,10 +22,11 @@ class TestStopsAtOnce:
         one = self.moving()
         one.gate.receive(one.key, bytes(2), one.now_ns)
         assert "why=second sender" in one.sends(60, near_far=1.0)
-        start = one.number
-        while (one.number - start) * 20_000_000 <= FOREIGN_NS:
-            one.sends(0, enable=one.number % 2 == 0)
+        for k in range(FOREIGN_NS // 20_000_000):
+            one.sends(0, enable=k != 20)
             assert not one.axis.armed
+        one.rests(5)  # a press within the second is no reset
+        assert not one.axis.armed
         one.sends(0, enable=False)
         one.rests()
         assert one.axis.armed
@@ -85,15 +86,26 @@ class TestStopsAtOnce:
 class TestStopsShaped:
     """Rule 2: for ``stop_s`` it may fall, and then neutral comes first."""
 
-    def test_a_stick_that_stands_still(self) -> None:
+    def stuck(self) -> Bench:
+        """A stick may stand still for a second."""
         deployment = load("forwarder")
         left = deployment.joysticks["left"]
         config = left.config.model_copy(update={"stuck_s": 1.0})
         joysticks = {**deployment.joysticks, "left": replace(left, config=config)}
-        one = Bench(replace(deployment, joysticks=joysticks), "near_far")
+        return Bench(replace(deployment, joysticks=joysticks), "near_far")
+
+    def test_a_stick_that_stands_still(self) -> None:
+        one = self.stuck()
         one.ramp(60, near_far=0.5)
         armed = []
         for _ in range(60):
             assert not one.sends(60, near_far=0.5)
             armed.append(one.axis.armed)
         assert armed.index(False) == 50 - 15 + 1  # stuck_s, less the ramp
+
+    def test_a_stick_that_stands_still_in_neutral(self) -> None:
+        """At the edge of it, and for longer."""
+        one = self.stuck()
+        one.rests(60, near_far=0.02)
+        assert one.axis.of.stick.band == one.axis.demand
+        assert one.axis.armed
