@@ -1,6 +1,7 @@
 """Rule 7: how far an axis goes, by itself and by what a motion adds."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -42,11 +43,12 @@ class TestDistance:
 
     @signs
     def test_what_falls_goes_on(self, sign: int) -> None:
-        one = bench(tail_s=2.0, stop_distance_m=0.5, fall_per_s=5.0)
+        one = bench(tail_s=2.0, stop_distance_m=0.5, fall_per_s=4.8)
         one.ramp(sign * FULL, near_far=float(sign))
         for _ in range(25):
             assert not one.sends(sign * FULL)
-        for steps in range(FULL - 12, 0, -12):
+        # as slowly as may be: 12 steps in a tick, but for one of rounding
+        for steps in range(FULL - 11, 0, -11):
             assert not one.sends(sign * steps)
             assert one.axis.ran >= 0.5
 
@@ -138,6 +140,29 @@ def test_a_stop_forgets_what_may_run_on_and_not_what_was_asked() -> None:
     ]
 
 
+@signs
+def test_what_a_motion_may_go_on_counts_for_its_axis(sign: int) -> None:
+    free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0, "stop_distance_m": None}
+    one = Bench(limited(load("forwarder-robust"), "near_far", **free), "near_far")
+    one.rests()
+    for _ in range(5):
+        assert not one.sends(sign * FULL, near_far=float(sign))
+    left = [one.sends(sign * FULL) for _ in range(110)]
+    first = [bool(why) for why in left].index(True)
+    assert first * 0.02 == pytest.approx(SWING_SLACK + 0.3, abs=0.021)
+    assert "limit=distance" in left[first]
+
+
+def test_what_ran_too_far_is_forgotten_with_the_tail() -> None:
+    of, asked = bench(tail_s=0.2).axis.of, Asked()
+    asked.note(1.0, 0.02, 0, of)
+    asked.remaining -= 1.0
+    for period in range(1, 12):
+        assert asked.remaining < 0.0
+        asked.note(0.0, 0.0, period, of)
+    assert asked.remaining == 0.0
+
+
 class TestSound:
     """Sequences in which a sound filter goes farthest beyond what was asked."""
 
@@ -184,8 +209,8 @@ class TestSound:
 class TestAdded:
     """Slew and near-far of forwarder-robust add velocities to each other."""
 
-    def robust(self, axis: str = "near_far") -> Bench:
-        free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}
+    def robust(self, axis: str = "near_far", **limits: Any) -> Bench:
+        free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0} | limits
         return Bench(limited(load("forwarder-robust"), axis, **free), axis)
 
     @signs
@@ -203,6 +228,29 @@ class TestAdded:
         one = self.robust()
         one.rests()
         assert "limit=asked" in one.sends(-sign * 10, slew=1.0, near_far=sign * 0.3)
+
+    @signs
+    def test_not_against_it_by_what_was_asked_before_a_trip(self, sign: int) -> None:
+        one = self.robust()
+        one.ramp(sign * 60, near_far=sign * 0.5)
+        one.sends(0, enable=False)
+        one.rests()
+        assert not one.sends(sign * 60, slew=1.0)
+        one.rests(slew=1.0)
+        assert "limit=asked allowed=0.000" in one.sends(sign * 10, slew=1.0, near_far=-sign * 0.3)
+
+    @signs
+    def test_where_it_is_asked_nothing_is_added(self, sign: int) -> None:
+        one = self.robust()
+        one.rests()
+        why = one.sends(sign * 31, slew=1.0, near_far=sign * 0.1)
+        assert "limit=asked allowed=0.100" in why
+
+    @signs
+    def test_where_the_file_allows_it_faster_in_a_motion_too(self, sign: int) -> None:
+        one = self.robust(allow_faster=True)
+        one.rests()
+        assert not one.sends(sign * 125, slew=1.0, near_far=sign * 0.1)
 
     @signs
     def test_without_a_demand_nothing_is_added(self, sign: int) -> None:

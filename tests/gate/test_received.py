@@ -268,7 +268,7 @@ def test_a_measurement_is_the_demand_while_the_stick_rests() -> None:
     one.rests()
     for part in (0.01, 0.2, 0.4):
         one.gate.measure("near_far", part)
-        assert not one.sends(round(part * 125))
+        assert not one.sends(round(part * 125), near_far=0.02)
     one.gate.measure("near_far", 0.8)
     assert "limit=asked allowed=0.400" in one.sends(51)
     one = bench()

@@ -29,6 +29,12 @@ class TestDirectionAndSize:
         assert why == f"axis=near_far limit=asked allowed=0.800 speed={sign * 0.808:.3f}"
 
     @signs
+    def test_as_soon_as_neutral_was_seen(self, sign: int) -> None:
+        one = bench()
+        one.rests(1)
+        assert not one.sends(sign * 10, near_far=sign * 0.5)
+
+    @signs
     def test_against_the_stick(self, sign: int) -> None:
         one = bench()
         one.ramp(0, near_far=-sign * 0.5)
@@ -106,19 +112,28 @@ class TestRates:
     """Rules 5 and 6."""
 
     @signs
-    @pytest.mark.parametrize(("steps", "passes"), [(36, True), (37, False)])
+    @pytest.mark.parametrize(("steps", "passes"), [(39, True), (40, False)])
     def test_faster_than_the_last_by_the_rise(self, sign: int, steps: int, passes: bool) -> None:
-        one = bench(rise_per_s=4.0)  # 0.08 in a tick
+        one = bench(rise_per_s=5.0)  # 0.1 in a tick
         one.ramp(sign * 25, near_far=float(sign))
         why = one.sends(sign * steps, near_far=float(sign))
         # 0.2, a step, the rise, and half a step
-        assert ("limit=rise allowed=0.292" in why) is not passes
+        assert ("limit=rise allowed=0.312" in why) is not passes
 
     @signs
     def test_missed_deadlines_give_no_more_rise(self, sign: int) -> None:
         one = bench(rise_per_s=4.0)
         one.ramp(sign * 25, near_far=float(sign))
         assert "limit=rise" in one.sends(sign * 37, missed=5, near_far=float(sign))
+
+    @signs
+    def test_a_tick_without_a_frame_gives_no_more_rise(self, sign: int) -> None:
+        one = bench(rise_per_s=4.0)
+        one.ramp(sign * 25, near_far=float(sign))
+        one.receive(one.joysticks(near_far=float(sign)))
+        one.gate.tick(one.now_ns, 0)
+        one.number += 1
+        assert "limit=rise" in one.sends(sign * 37, near_far=float(sign))
 
     @signs
     @pytest.mark.parametrize(("silent", "passes"), [(9, True), (10, False)])
@@ -135,9 +150,9 @@ class TestRates:
         assert ("limit=rise" in why) is not passes
 
     @signs
-    @pytest.mark.parametrize(("steps", "passes"), [(80, True), (79, False)])
+    @pytest.mark.parametrize(("steps", "passes"), [(72, True), (71, False)])
     def test_slower_than_the_last_by_the_fall(self, sign: int, steps: int, passes: bool) -> None:
-        one = bench(fall_per_s=2.0)  # 0.04 in a tick
+        one = bench(fall_per_s=5.0)  # 0.1 in a tick
         one.ramp(sign * 86, near_far=float(sign))
         why = one.sends(sign * steps, near_far=float(sign))
         assert ("limit=fall" in why) is not passes
@@ -155,6 +170,20 @@ class TestRates:
         one = bench(fall_per_s=2.0)
         one.ramp(sign * 60, near_far=float(sign))
         assert "limit=rise allowed=0.012" in one.sends(-sign * 60, near_far=-float(sign))
+
+    @signs
+    @pytest.mark.parametrize(("steps", "passes"), [(14, True), (15, False)])
+    def test_a_step_over_zero_is_a_fall_to_zero(self, sign: int, steps: int, passes: bool) -> None:
+        one = bench(fall_per_s=5.0)
+        one.ramp(sign * steps, near_far=float(sign))
+        # 0.1 and a step and a half are 14 steps
+        assert ("limit=fall" in one.sends(-sign, near_far=-float(sign))) is not passes
+
+    @signs
+    def test_a_step_over_zero_against_the_stick(self, sign: int) -> None:
+        one = bench(fall_per_s=5.0)
+        one.ramp(sign * 13, near_far=float(sign))
+        assert "limit=asked" in one.sends(-sign, near_far=float(sign))
 
     @signs
     def test_a_small_step_over_zero_takes_a_part_of_the_tick(self, sign: int) -> None:
