@@ -224,7 +224,7 @@ def test_a_joystick_of_every_second_tick(
     """In a gateway rates count from the last frame: 0.19 of full command in two ticks."""
     world = World("gateway-forwarder")
     world.go(25)
-    world.go(20, slew=(speed - 0.05) / 0.95 + 0.01)
+    world.go(150, slew=(speed - 0.05) / 0.95 + 0.01)
     axis = world.guarded._gate.axes["slew"]
     world.go(2, world.commands(slew=speed), slew=abs(stick))
     world.go(1, world.commands(slew=speed), slew=stick)
