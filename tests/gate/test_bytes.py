@@ -66,8 +66,9 @@ def test_a_message_besides_leaves_some_times_in_a_tick() -> None:
 
 def test_the_log_names_what_is_wrong() -> None:
     one = bench()
-    one.gate.tick(0, 0)
     data = one.frame(0)
+    assert one.gate.leaving(one.key, data) == "limit=one frame a tick"  # before the first one
+    one.gate.tick(0, 0)
     assert one.gate.leaving(one.key, data + b"\0") == "limit=length length=3 expected=2"
     assert not one.gate.leaving(one.key, data)
     assert one.gate.leaving(one.key, one.frame(0)) == "limit=one frame a tick"

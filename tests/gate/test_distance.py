@@ -255,8 +255,9 @@ class TestAdded:
     @signs
     def test_without_a_demand_nothing_is_added(self, sign: int) -> None:
         one = self.robust()
-        one.rests()
-        assert "limit=asked" in one.sends(sign * 10)
+        for _ in range(3):  # from the first tick on
+            assert "limit=asked" in one.sends(sign * 10)
+            one.sends(0, enable=False)
 
     def test_as_far_as_the_file_says(self) -> None:
         one = self.robust()

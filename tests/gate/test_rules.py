@@ -82,6 +82,14 @@ class TestDirectionAndSize:
             assert not one.sends(sign * steps, near_far=sign * 0.2), steps
 
     @signs
+    def test_faster_is_not_the_other_way(self, sign: int) -> None:
+        one = bench(allow_faster=True)
+        one.ramp(sign * 60, near_far=sign * 0.5)
+        assert not one.sends(sign * 125)
+        assert not one.sends(0)
+        assert "limit=asked allowed=0.000" in one.sends(-sign * 10)
+
+    @signs
     def test_the_other_way_as_fast_as_was_asked_only(self, sign: int) -> None:
         one = bench(allow_reverse=True)
         one.rests()

@@ -31,6 +31,21 @@ class TestStopsAtOnce:
         one.rests()
         assert one.axis.armed
 
+    def test_the_log_names_why_it_stands(self) -> None:
+        assert "limit=stopped why=start speed=" in bench().sends(10, near_far=0.5)
+        for why, stop in (
+            ("send failed", lambda gate: gate.send_failed(gate.axes["near_far"].of.valve)),
+            ("decoders disagree", lambda gate: gate.disagrees([gate.axes["near_far"]])),
+            ("second sender", lambda gate: gate.receive(gate.axes["near_far"].of.valve, b"", 0)),
+        ):
+            one = self.moving()
+            stop(one.gate)
+            assert f"limit=stopped why={why} speed=" in one.sends(60, near_far=1.0)
+        one = self.moving(stop_s=0.1)
+        one.change = lambda frame: None
+        left = [one.sends(60) for _ in range(20)]
+        assert "limit=stopped why=joystick speed=" in next(filter(None, left))
+
     def test_what_a_frame_says_after_the_tick_began_counts_for_the_next_frame(self) -> None:
         one = self.moving()
         one.receive(one.joysticks(near_far=1.0))
