@@ -59,7 +59,7 @@ def bounds(axis: AxisState) -> tuple[float, float]:
         least, most = low and -1.0, high and 1.0
     if of.reverse:
         least, most = min(least, -most), max(most, -least)
-    elif axis.held >= of.reversal and not axis.stop_left:
+    elif axis.held >= of.reversal:
         if now > 0.0:
             least = 0.0
         elif now < 0.0:

@@ -76,6 +76,71 @@ class TestDistance:
         assert one.axis.forth.remaining == pytest.approx(1.0)
 
     @signs
+    def test_over_missed_deadlines_the_demand_before_was_held(self, sign: int) -> None:
+        one = bench()
+        one.rests()
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        for missed, at, remaining in ((0, 0.5, 0.01), (3, 0.5, 0.05), (2, 0.1, 0.072)):
+            assert not one.sends(0, missed=missed, near_far=sign * at)
+            assert asked.remaining == pytest.approx(remaining)
+
+    @signs
+    def test_a_turn_without_a_frame_counts(self, sign: int) -> None:
+        one = bench(stop_distance_m=4.0)
+        one.ramp(sign * 60, near_far=sign * 0.48)
+        assert not one.sends(sign * 60)
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        ran, remaining = one.axis.ran, asked.remaining
+        one.receive(one.joysticks())
+        one.gate.tick(one.now_ns, 0)
+        one.number += 1
+        assert not one.sends(sign * 60)
+        assert one.axis.ran - ran == pytest.approx(0.48 * 0.04)
+        assert remaining - asked.remaining == pytest.approx(0.48 * 0.04)
+
+    @signs
+    def test_a_fall_from_what_was_asked_counts_no_distance(self, sign: int) -> None:
+        one = bench(fall_per_s=4.8)  # 12 steps in a tick, each 0.008
+        one.rests()
+        assert one.axis.way_back == pytest.approx(0.008)
+        one.ramp(sign * 60, near_far=sign * 0.48)
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        before = asked.remaining
+        assert not one.sends(sign * 49)  # but for a step of rounding
+        assert asked.remaining == before
+        for turns, way_back in ((1, 37), (2, 13)):
+            for _ in range(turns - 1):
+                one.receive(one.joysticks())
+                one.gate.tick(one.now_ns, 0)
+                one.number += 1
+            assert not one.sends(sign * 49)
+            assert one.axis.way_back == pytest.approx(way_back * 0.008)
+        assert before - asked.remaining == pytest.approx(49 * 0.008 * 0.06)
+        one.sends(0)
+        assert one.axis.way_back == pytest.approx(0.008)
+
+    @signs
+    @pytest.mark.parametrize(("forth", "back"), [(6, 9), (13, 1)])
+    def test_the_first_frame_of_the_other_way_counts(
+        self, sign: int, forth: int, back: int
+    ) -> None:
+        one = bench(rise_per_s=5.0, fall_per_s=5.0)
+        one.ramp(sign * forth, near_far=float(sign))
+        assert not one.sends(-sign * back, near_far=-float(sign))
+        asked = one.axis.back if sign > 0 else one.axis.forth
+        assert asked.remaining == pytest.approx((1.0 - 0.008 * back) * 0.02)
+
+    @signs
+    def test_what_fades_is_added_to_what_was_not_run(self, sign: int) -> None:
+        one = bench()
+        one.ramp(sign * 60, near_far=float(sign))
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        before = asked.remaining
+        assert before > 0.1
+        one.axis.change_filter()
+        assert asked.remaining - before == pytest.approx(0.48 * BLEND_S)
+
+    @signs
     def test_a_saw_tooth_counts_its_falls(self, sign: int) -> None:
         """Only the way back from what was asked last is free."""
         one = bench(tail_s=2.0, fall_per_s=5.0)
@@ -291,6 +356,61 @@ class TestAdded:
         assert one.axis.dropped(one.gate.made) == 0.0
         slew.halt("refused", one.gate.made, latch=True)
         assert one.axis.dropped(one.gate.made) == 1.0
+
+    @signs
+    @pytest.mark.parametrize(
+        ("slew", "stops", "steps", "passes"),
+        # 0.48 less 0.1, a step and a half; less 0.25 too where it is not known whether slew stopped
+        [(0.5, False, 46, True), (0.5, False, 45, False), (0.0, False, 15, True),
+         (0.0, False, 14, False), (0.5, True, 1, True)],
+    )  # fmt: skip
+    def test_it_falls_where_the_other_one_stops(
+        self, sign: int, slew: float, stops: bool, steps: int, passes: bool
+    ) -> None:
+        one = self.robust(fall_per_s=5.0)
+        one.ramp(sign * 60, near_far=sign * 0.5)
+        other = one.gate.axes["slew"]
+        if not slew:
+            other.left(0.0, one.gate.made, one.number)
+        other.last, other.sent_at = slew, one.number
+        if stops:
+            other.armed = False  # on its run-on
+            one.gate.refused(other.of.valve)
+        why = one.sends(sign * steps, near_far=sign * 0.5)
+        assert ("limit=fall" in why) is not passes
+
+    @signs
+    @pytest.mark.parametrize(("later", "passes"), [(0, True), (1, True), (2, False)])
+    def test_it_falls_in_two_ticks_or_no_more(self, sign: int, later: int, passes: bool) -> None:
+        one = self.robust(fall_per_s=5.0)
+        one.ramp(sign * 60, near_far=sign * 0.5)
+        other = one.gate.axes["slew"]
+        one.gate.refused(other.of.valve)
+        other.last, other.sent_at = 0.5, one.number
+        for _ in range(later):
+            assert not one.sends(sign * 60, near_far=sign * 0.5)
+        assert ("limit=fall" in one.sends(sign * 20, near_far=sign * 0.5)) is not passes
+
+    @signs
+    @pytest.mark.parametrize(("steps", "goes_on"), [(44, True), (45, False)])
+    def test_to_neutral_by_what_is_added_and_a_fall(
+        self, sign: int, steps: int, goes_on: bool
+    ) -> None:
+        one = self.robust(fall_per_s=4.8)
+        one.ramp(sign * steps, near_far=sign * 0.5)
+        assert not one.sends(0, near_far=sign * 0.5)
+        assert one.axis.armed is goes_on
+
+    @signs
+    def test_while_both_are_asked_there_is_no_end(self, sign: int) -> None:
+        one = self.robust()
+        one.ramp(sign * FULL, near_far=float(sign))
+        assert not any(one.sends(sign * FULL, near_far=float(sign), slew=1.0) for _ in range(250))
+
+    def test_a_pause_is_no_part_of_its_time(self) -> None:
+        one = self.robust("slew")
+        one.rests()
+        assert not any(one.sends(10 * (k % 2), near_far=1.0) for k in range(450))
 
     def test_a_motion_of_slew_alone_moves_nothing_else(self) -> None:
         one = Bench(load("forwarder"), "near_far")

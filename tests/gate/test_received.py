@@ -201,6 +201,7 @@ class TestReload:
         pressed = stop.protection.check.protect(b"\1\1", 0)
         one.gate.receive(stop.key, pressed, one.now_ns)
         after = self.reloaded(one)
+        assert after.axis.latches
         after.axis.hard, after.axis.latches = "", False  # as if a tick had seen it before
         after.gate.tick(after.now_ns, 0)
         assert after.axis.latched

@@ -35,6 +35,14 @@ class TestDirectionAndSize:
         assert not one.sends(sign * 10, near_far=sign * 0.5)
 
     @signs
+    def test_what_was_asked_before_neutral_was_seen_counts_for_nothing(self, sign: int) -> None:
+        one = bench()
+        for _ in range(3):
+            assert not one.sends(0, near_far=sign * 0.5)
+        one.rests(1)
+        assert "limit=asked" in one.sends(sign * 10)
+
+    @signs
     def test_against_the_stick(self, sign: int) -> None:
         one = bench()
         one.ramp(0, near_far=-sign * 0.5)
@@ -65,6 +73,21 @@ class TestDirectionAndSize:
         for steps in (96, 91, 86):
             assert not one.sends(sign * steps)
         assert "limit=asked" in one.sends(sign * 86)
+
+    @signs
+    def test_by_less_than_a_step_too(self, sign: int) -> None:
+        """Rounding is given once, not with each frame: else it would never end."""
+        one = bench(tail_s=0.0, fall_per_s=0.2)  # half a step in a tick
+        one.ramp(sign * 100, near_far=float(sign))
+        left = [one.sends(sign * 100) for _ in range(4)]
+        assert [bool(why) for why in left] == [False, False, True, True]
+        one = bench(tail_s=0.0, fall_per_s=0.2)
+        one.ramp(sign * 100, near_far=float(sign))
+        one.receive(one.joysticks())
+        one.gate.tick(one.now_ns, 0)
+        one.number += 1
+        assert not one.sends(sign * 100)
+        assert one.axis.top == pytest.approx(0.8)  # a step more, and two ticks less
 
     @signs
     def test_missed_deadlines_give_no_time_to_be_higher(self, sign: int) -> None:
@@ -102,6 +125,8 @@ class TestDirectionAndSize:
     def test_a_reversal_may_be_braked_along_the_filter(self, sign: int) -> None:
         one = bench(reversal="brake_shaped", reversal_s=0.4)
         one.ramp(sign * 60, near_far=sign * 0.5)
+        for _ in range(5):  # neutral is no part of it
+            assert not one.sends(sign * 60)
         for _ in range(20):
             assert not one.sends(sign * 60, near_far=-sign * 0.5)
         assert "limit=asked" in one.sends(sign * 60, near_far=-sign * 0.5)
@@ -171,7 +196,24 @@ class TestRates:
         one.ramp(sign * 60, near_far=float(sign))
         assert not one.sends(0, near_far=float(sign))
         assert not one.axis.armed
+        assert not one.axis.latched
         assert "why=fell to neutral at once" in one.sends(sign * 5, near_far=float(sign))
+
+    @signs
+    @pytest.mark.parametrize(
+        ("steps", "turns", "goes_on"), [(13, 1, True), (14, 1, False), (25, 2, True), (26, 2, False)]
+    )
+    def test_by_the_fall_to_neutral_is_none(
+        self, sign: int, steps: int, turns: int, goes_on: bool
+    ) -> None:
+        one = bench(fall_per_s=4.8)  # 12 steps in a tick, and a step and a half
+        one.ramp(sign * steps, near_far=float(sign))
+        for _ in range(turns - 1):
+            one.receive(one.joysticks(near_far=float(sign)))
+            one.gate.tick(one.now_ns, 0)
+            one.number += 1
+        assert not one.sends(0, near_far=float(sign))
+        assert one.axis.armed is goes_on
 
     @signs
     def test_the_other_way_by_way_of_zero(self, sign: int) -> None:

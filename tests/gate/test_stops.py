@@ -5,7 +5,8 @@ from typing import Any
 
 from canshaper.gate.axis import FOREIGN_NS
 from tests.faults import variants
-from tests.gate.bench import Bench, bench, load
+from tests.gate.bench import Bench, bench, load, signs
+from tests.promises.world import World
 
 FULL = 125
 
@@ -62,6 +63,22 @@ class TestStopsAtOnce:
         one.rests(10)
         assert not one.restarts(10, near_far=0.5)
 
+    def test_released_and_pressed_between_two_ticks(self) -> None:
+        """Whichever was first: a press that may be the later one is a reset."""
+        one = self.moving()
+        one.receive(one.joysticks(enable=False))
+        one.rests(1)
+        assert not one.axis.armed
+        one.rests(1)
+        assert one.axis.armed
+
+    def test_a_switch_at_rest_latches_nothing(self) -> None:
+        world = World("ecu-forwarder")
+        for world.agree in (True, False, True):
+            world.go(25)
+        axes = world.guarded._gate.axes.values()
+        assert all(axis.armed for axis in axes)
+
     def test_a_reset_is_a_press_too(self) -> None:
         one = self.moving()
         assert one.sends(-FULL, near_far=1.0)
@@ -100,6 +117,16 @@ class TestStopsAtOnce:
 
 class TestStopsShaped:
     """Rule 2: for ``stop_s`` it may fall, and then neutral comes first."""
+
+    @signs
+    def test_when_neutral_was_seen_again_nothing_runs_against_the_stick(self, sign: int) -> None:
+        one = bench()
+        one.ramp(sign * 60, near_far=sign * 0.5)
+        one.change = lambda frame: None
+        assert not any(one.sends(sign * 60) for _ in range(10))
+        one.change = lambda frame: frame
+        assert not one.sends(sign * 60)
+        assert "limit=asked" in one.sends(sign * 60, near_far=-sign * 0.5)
 
     def stuck(self) -> Bench:
         """A stick may stand still for a second."""
