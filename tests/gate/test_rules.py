@@ -83,9 +83,7 @@ class TestDirectionAndSize:
         assert [bool(why) for why in left] == [False, False, True, True]
         one = bench(tail_s=0.0, fall_per_s=0.2)
         one.ramp(sign * 100, near_far=float(sign))
-        one.receive(one.joysticks())
-        one.gate.tick(one.now_ns, 0)
-        one.number += 1
+        one.skips()
         assert not one.sends(sign * 100)
         assert one.axis.top == pytest.approx(0.8)  # a step more, and two ticks less
 
@@ -163,9 +161,7 @@ class TestRates:
     def test_a_tick_without_a_frame_gives_no_more_rise(self, sign: int) -> None:
         one = bench(rise_per_s=4.0)
         one.ramp(sign * 25, near_far=float(sign))
-        one.receive(one.joysticks(near_far=float(sign)))
-        one.gate.tick(one.now_ns, 0)
-        one.number += 1
+        one.skips(near_far=float(sign))
         assert "limit=rise" in one.sends(sign * 37, near_far=float(sign))
 
     @signs
@@ -176,9 +172,7 @@ class TestRates:
         one = bench(rise_per_s=4.0)
         one.ramp(sign * 60, near_far=float(sign))
         for _ in range(silent):  # 200 ms are its timeout
-            one.receive(one.joysticks(near_far=float(sign)))
-            one.gate.tick(one.now_ns, 0)
-            one.number += 1
+            one.skips(near_far=float(sign))
         why = one.sends(sign * 60, near_far=float(sign))
         assert ("limit=rise" in why) is not passes
 
@@ -201,7 +195,8 @@ class TestRates:
 
     @signs
     @pytest.mark.parametrize(
-        ("steps", "turns", "goes_on"), [(13, 1, True), (14, 1, False), (25, 2, True), (26, 2, False)]
+        ("steps", "turns", "goes_on"),
+        [(13, 1, True), (14, 1, False), (25, 2, True), (26, 2, False)],
     )
     def test_by_the_fall_to_neutral_is_none(
         self, sign: int, steps: int, turns: int, goes_on: bool
@@ -209,9 +204,7 @@ class TestRates:
         one = bench(fall_per_s=4.8)  # 12 steps in a tick, and a step and a half
         one.ramp(sign * steps, near_far=float(sign))
         for _ in range(turns - 1):
-            one.receive(one.joysticks(near_far=float(sign)))
-            one.gate.tick(one.now_ns, 0)
-            one.number += 1
+            one.skips(near_far=float(sign))
         assert not one.sends(0, near_far=float(sign))
         assert one.axis.armed is goes_on
 
@@ -256,9 +249,7 @@ class TestRates:
         def turn(steps: int, at: float) -> str:
             why = one.sends(steps, near_far=at)
             for _ in range(2):
-                one.receive(one.joysticks(near_far=at))
-                one.gate.tick(one.now_ns, 0)
-                one.number += 1
+                one.skips(near_far=at)
             return why
 
         for size, at in ((0, 0.0), (0, 0.0), (0, float(sign)), (25, float(sign))):
