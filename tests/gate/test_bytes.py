@@ -25,6 +25,7 @@ def test_what_was_withheld_leaves_no_gap() -> None:
         assert not one.gate.leaving(one.key, bytes([0, number]))
     one.gate.withheld(one.key)
     one.gate.tick(10, 0)
+    assert one.gate.leaving(one.key, b"\0\x0a") == "limit=counter value=10"
     assert not one.gate.leaving(one.key, b"\0\x09")
 
 

@@ -154,6 +154,15 @@ class TestSources:
         gate.receive(elsewhere, bytes(8), 5)
         assert gate.axes["slew"].foreign_ns == 5
 
+    @pytest.mark.parametrize(("to", "ours"), [(0x20, True), (0xFF, True), (0x30, False)])
+    def test_a_command_to_us_or_to_all(self, to: int, ours: bool) -> None:
+        """Of a message with a destination."""
+        gate = Gate(record_of(load("j1939-forwarder")))
+        valve, axes = gate.valves.pop(gate.axes["slew"].of.valve)
+        gate.valves["crane", 0x0CEF2080, True] = replace(valve, group=0x03FF0000), axes
+        gate.receive(("crane", 0x0CEF0021 | to << 8, True), bytes(8), 5)
+        assert (gate.axes["slew"].foreign_ns == 5) is ours
+
     def test_who_only_listens_is_no_ones_rival(self) -> None:
         gate = Gate(record_of(load("forwarder").listening()))
         gate.receive(gate.axes["slew"].of.valve, bytes(2), 5)

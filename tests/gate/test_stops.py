@@ -3,6 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from canshaper.gate.axis import FOREIGN_NS
 from tests.faults import variants
 from tests.gate.bench import Bench, bench, load, signs
@@ -63,6 +65,50 @@ class TestStopsAtOnce:
         one.rests(10)
         assert not one.restarts(10, near_far=0.5)
 
+    def test_the_log_names_what_came_between_tick_and_frame(self) -> None:
+        for why, stop in (
+            ("loop stalled", lambda gate: gate.stalled()),
+            ("decoders disagree", lambda gate: gate.disagrees([gate.axes["near_far"]])),
+            ("second sender", lambda gate: gate.receive(gate.axes["near_far"].of.valve, b"", 0)),
+        ):
+            one = self.moving()
+            one.receive(one.joysticks(near_far=1.0))
+            one.gate.tick(one.now_ns, 0)
+            stop(one.gate)
+            assert f"why={why} speed=" in one.gate.leaving(one.key, one.frame(60))
+
+    def test_a_second_sender_that_is_read_late_latches(self) -> None:
+        one = bench()
+        one.rests()
+        one.gate.receive(one.key, bytes(2), one.now_ns)
+        one.number += 60
+        one.rests()
+        assert one.axis.latched
+
+    @pytest.mark.parametrize("failed", [True, False])
+    def test_a_press_just_before_it_is_no_reset(self, failed: bool) -> None:
+        one = self.moving()
+        assert not one.sends(60, near_far=1.0, reset=True)
+        one.gate.send_failed(one.key) if failed else one.gate.stalled()
+        one.rests(5, reset=True)
+        assert not one.axis.armed
+        one.rests(1)
+        one.rests(2, reset=True)
+        assert one.axis.armed
+
+    def test_a_press_just_after_it_is_one(self) -> None:
+        one = self.moving()
+        one.gate.send_failed(one.key)
+        one.rests(2, reset=True)
+        assert one.axis.armed
+
+    def test_a_standstill_at_rest_latches_nothing(self) -> None:
+        one = bench()
+        one.rests()
+        one.gate.stalled()
+        one.rests()
+        assert one.axis.armed
+
     def test_released_and_pressed_between_two_ticks(self) -> None:
         """Whichever was first: a press that may be the later one is a reset."""
         one = self.moving()
@@ -109,7 +155,7 @@ class TestStopsAtOnce:
                 pressed = frame._replace(data=stop.protection.check.protect(b"\1\1", 0))
                 one.gate.receive(stop.key, pressed.data, one.now_ns)
         one.rests(10)
-        assert "why=emergency stop" in one.sends(10, near_far=1.0)
+        assert "why=emergency stop speed=" in one.sends(10, near_far=1.0)
         one.rests(10, enable=False)
         one.rests(10)
         assert not one.sends(10, near_far=1.0)
