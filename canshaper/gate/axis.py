@@ -129,7 +129,6 @@ class AxisState(Pending):
             self.latched, self.cause = True, made
         self.forth.forget()
         self.back.forget()
-        self.least = self.most = 0.0
 
     def look(
         self,
@@ -165,8 +164,7 @@ class AxisState(Pending):
             self.stop_left = left
             self.now = demand if self.armed else 0.0
         else:
-            moving = self.last or self.forth.most or self.back.most
-            self.stop_left = left if moving else 0
+            self.stop_left = 0
             # The cause is noted in the axis' turn, which may be a period after it was received: a
             # press since the turn before may be the later one of the two, and counts.
             if not self.latched or self.joystick.press >= self.cause - of.period:

@@ -56,21 +56,21 @@ def bounds(axis: AxisState) -> tuple[float, float]:
     of, low, high, now = axis.of, -axis.back.most, axis.forth.most, axis.now
     least, most = low, high
     if of.faster:
-        least, most = (-1.0 if low else 0.0), (1.0 if high else 0.0)
+        least, most = low and -1.0, high and 1.0
     if of.reverse:
         least, most = min(least, -most), max(most, -least)
-    elif axis.held >= of.reversal and not axis.stop_left:
+    elif axis.held >= of.reversal:
         if now > 0.0:
             least = 0.0
         elif now < 0.0:
             most = 0.0
     if of.added and axis.armed and axis.asked:
+        added = 0.0 if now else of.added
         if now <= 0.0:
-            least = min(least, -axis.back.before, 0.0 if now else -of.added)
+            least = min(least, -axis.back.before, -added)
         if now >= 0.0:
-            most = max(most, axis.forth.before, 0.0 if now else of.added)
-    maximum = of.maximum
-    return (-maximum if least < -maximum else least), (maximum if most > maximum else most)
+            most = max(most, axis.forth.before, added)
+    return max(least, -of.maximum), min(most, of.maximum)
 
 
 def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
@@ -89,7 +89,7 @@ def rise(axis: AxisState, velocity: float, ticks: int) -> str:
     if velocity * axis.last >= 0.0:
         highest = axis.top + most + UP * step  # ``top`` has the rounding down
     else:  # a part of the time goes by on the way to zero
-        left = 1.0 - max(last - step, 0.0) / (of.fall * ticks) if ticks else 0.0
+        left = 1.0 - max(last - step, 0.0) / (of.fall * max(ticks, 1))
         highest = max(left, 0.0) * most + ROUNDING * step
     return "" if abs(velocity) <= highest + EPSILON else f"limit=rise allowed={highest:.3f}"
 
@@ -116,7 +116,7 @@ def distance(axis: AxisState, velocity: float) -> str:
         ahead = asked.remaining + of.slack + of.path
         if abs(velocity) * of.period_s > ahead:
             return f"limit=distance allowed={ahead:.3f}"
-    elif of.added and not (axis.forth.most or axis.back.most):
+    elif of.added:
         if axis.alone > of.most_periods + 1:
             return "limit=time of added velocity"
         way = axis.way + velocity * of.period_s

@@ -83,6 +83,12 @@ class Bench:
         self.receive(self.joysticks(**joysticks))
         return self.sent(steps, missed)
 
+    def skips(self, **joysticks: Any) -> None:
+        """A tick without a frame of the valve."""
+        self.receive(self.joysticks(**joysticks))
+        self.gate.tick(self.now_ns, 0)
+        self.number += 1
+
     def rests(self, ticks: int = 3, **held: Any) -> None:
         """Joystick in neutral: the axis is ready."""
         for _ in range(ticks):

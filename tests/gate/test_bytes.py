@@ -25,6 +25,7 @@ def test_what_was_withheld_leaves_no_gap() -> None:
         assert not one.gate.leaving(one.key, bytes([0, number]))
     one.gate.withheld(one.key)
     one.gate.tick(10, 0)
+    assert one.gate.leaving(one.key, b"\0\x0a") == "limit=counter value=10"
     assert not one.gate.leaving(one.key, b"\0\x09")
 
 
@@ -64,6 +65,29 @@ def test_a_message_besides_leaves_some_times_in_a_tick() -> None:
     assert not any(nmt.leaving(("crane", 0, False), one) for one in starts for _ in range(2))
 
 
+def test_the_log_names_what_is_wrong() -> None:
+    one = bench()
+    data = one.frame(0)
+    assert one.gate.leaving(one.key, data) == "limit=one frame a tick"  # before the first one
+    one.gate.tick(0, 0)
+    assert one.gate.leaving(one.key, data + b"\0") == "limit=length length=3 expected=2"
+    assert not one.gate.leaving(one.key, data)
+    assert one.gate.leaving(one.key, one.frame(0)) == "limit=one frame a tick"
+    assert one.gate.leaving(("crane", 0x601, False), data) == "limit=identifier"
+    (key, _), *_ = one.gate.record.others.items()
+    assert one.gate.leaving(key, b"") == "limit=content"
+    for name, change, why in (
+        ("canopen-forwarder", 0, "limit=word"),  # none of CiA 408
+        ("canfd-forwarder", 1, "limit=checksum"),
+        ("j1939-forwarder", 1 << 63, "limit=bits wrong=8000000000000000"),
+    ):
+        one = Bench(load(name), "near_far")
+        one.gate.tick(0, 0)
+        data = one.frame(0)
+        word = int.from_bytes(data, "little") ^ change
+        assert one.gate.leaving(one.key, word.to_bytes(len(data), "little")) == why
+
+
 class Gateway:
     """The left joystick of gateway-forwarder, and what its frames leave as."""
 
@@ -87,6 +111,14 @@ class Gateway:
 
     def ticks(self) -> None:
         self.gate.tick(self.number * 20_000_000, 0)
+
+
+def test_a_frame_is_made_from_one_of_its_length() -> None:
+    one = Gateway()
+    data = one.receives().data
+    one.ticks()
+    assert "limit=bits" in one.gate.leaving(one.key, data, data[:-1])
+    assert not one.gate.leaving(one.key, data, data)
 
 
 def test_a_frame_of_our_own_asks_for_nothing() -> None:

@@ -7,7 +7,7 @@ import pytest
 from canshaper.gate.axis import BLEND_S, Asked
 from canshaper.gate.build import SLACK, SPREADING, SWING_SLACK, slack_of
 from canshaper.shaping.registry import BUILT_IN
-from tests.gate.bench import Bench, bench, limited, load, signs
+from tests.gate.bench import bench, load, signs
 from tests.promises.world import World
 
 FULL = 125
@@ -42,11 +42,12 @@ class TestDistance:
 
     @signs
     def test_what_falls_goes_on(self, sign: int) -> None:
-        one = bench(tail_s=2.0, stop_distance_m=0.5, fall_per_s=5.0)
+        one = bench(tail_s=2.0, stop_distance_m=0.5, fall_per_s=4.8)
         one.ramp(sign * FULL, near_far=float(sign))
         for _ in range(25):
             assert not one.sends(sign * FULL)
-        for steps in range(FULL - 12, 0, -12):
+        # as slowly as may be: 12 steps in a tick, but for one of rounding
+        for steps in range(FULL - 11, 0, -11):
             assert not one.sends(sign * steps)
             assert one.axis.ran >= 0.5
 
@@ -72,6 +73,65 @@ class TestDistance:
         for _ in range(500):
             assert not one.sends(0, near_far=1.0)
         assert one.axis.forth.remaining == pytest.approx(1.0)
+
+    @signs
+    def test_over_missed_deadlines_the_demand_before_was_held(self, sign: int) -> None:
+        one = bench()
+        one.rests()
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        for missed, at, remaining in ((0, 0.5, 0.01), (3, 0.5, 0.05), (2, 0.1, 0.072)):
+            assert not one.sends(0, missed=missed, near_far=sign * at)
+            assert asked.remaining == pytest.approx(remaining)
+
+    @signs
+    def test_a_turn_without_a_frame_counts(self, sign: int) -> None:
+        one = bench(stop_distance_m=4.0)
+        one.ramp(sign * 60, near_far=sign * 0.48)
+        assert not one.sends(sign * 60)
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        ran, remaining = one.axis.ran, asked.remaining
+        one.skips()
+        assert not one.sends(sign * 60)
+        assert one.axis.ran - ran == pytest.approx(0.48 * 0.04)
+        assert remaining - asked.remaining == pytest.approx(0.48 * 0.04)
+
+    @signs
+    def test_a_fall_from_what_was_asked_counts_no_distance(self, sign: int) -> None:
+        one = bench(fall_per_s=4.8)  # 12 steps in a tick, each 0.008
+        one.rests()
+        assert one.axis.way_back == pytest.approx(0.008)
+        one.ramp(sign * 60, near_far=sign * 0.48)
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        before = asked.remaining
+        assert not one.sends(sign * 49)  # but for a step of rounding
+        assert asked.remaining == before
+        one.skips()
+        assert not one.sends(sign * 49)
+        assert one.axis.way_back == pytest.approx(25 * 0.008)
+        assert before - asked.remaining == pytest.approx(49 * 0.008 * 0.04)
+        one.sends(0)
+        assert one.axis.way_back == pytest.approx(0.008)
+
+    @signs
+    @pytest.mark.parametrize(("forth", "back"), [(6, 9), (13, 1)])
+    def test_the_first_frame_of_the_other_way_counts(
+        self, sign: int, forth: int, back: int
+    ) -> None:
+        one = bench(rise_per_s=5.0, fall_per_s=5.0)
+        one.ramp(sign * forth, near_far=float(sign))
+        assert not one.sends(-sign * back, near_far=-float(sign))
+        asked = one.axis.back if sign > 0 else one.axis.forth
+        assert asked.remaining == pytest.approx((1.0 - 0.008 * back) * 0.02)
+
+    @signs
+    def test_what_fades_is_added_to_what_was_not_run(self, sign: int) -> None:
+        one = bench()
+        one.ramp(sign * 60, near_far=float(sign))
+        asked = one.axis.forth if sign > 0 else one.axis.back
+        before = asked.remaining
+        assert before > 0.1
+        one.axis.change_filter()
+        assert asked.remaining - before == pytest.approx(0.48 * BLEND_S)
 
     @signs
     def test_a_saw_tooth_counts_its_falls(self, sign: int) -> None:
@@ -138,6 +198,16 @@ def test_a_stop_forgets_what_may_run_on_and_not_what_was_asked() -> None:
     ]
 
 
+def test_what_ran_too_far_is_forgotten_with_the_tail() -> None:
+    of, asked = bench(tail_s=0.2).axis.of, Asked()
+    asked.note(1.0, 0.02, 0, of)
+    asked.remaining -= 1.0
+    for period in range(1, 12):
+        assert asked.remaining < 0.0
+        asked.note(0.0, 0.0, period, of)
+    assert asked.remaining == 0.0
+
+
 class TestSound:
     """Sequences in which a sound filter goes farthest beyond what was asked."""
 
@@ -179,71 +249,3 @@ class TestSound:
             assert not refusals(world, wait)
         assert not refusals(world, ticks, slew=slew)
         assert not refusals(world, 120)
-
-
-class TestAdded:
-    """Slew and near-far of forwarder-robust add velocities to each other."""
-
-    def robust(self, axis: str = "near_far") -> Bench:
-        free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}
-        return Bench(limited(load("forwarder-robust"), axis, **free), axis)
-
-    @signs
-    @pytest.mark.parametrize("axis", ["slew", "near_far"])
-    def test_as_fast_as_the_file_says(self, sign: int, axis: str) -> None:
-        other = {"slew": "near_far", "near_far": "slew"}[axis]
-        for steps, passes in ((31, True), (32, False)):  # 25 %
-            one = self.robust(axis)
-            one.rests()
-            why = one.sends(sign * steps, **{other: 1.0})
-            assert ("limit=asked allowed=0.250" in why) is not passes
-
-    @signs
-    def test_not_against_a_stick_that_is_held(self, sign: int) -> None:
-        one = self.robust()
-        one.rests()
-        assert "limit=asked" in one.sends(-sign * 10, slew=1.0, near_far=sign * 0.3)
-
-    @signs
-    def test_without_a_demand_nothing_is_added(self, sign: int) -> None:
-        one = self.robust()
-        one.rests()
-        assert "limit=asked" in one.sends(sign * 10)
-
-    def test_as_far_as_the_file_says(self) -> None:
-        one = self.robust()
-        one.rests()
-        left = [one.sends(31, slew=1.0) for _ in range(200)]
-        first = [bool(why) for why in left].index(True)
-        assert "limit=path" in left[first]
-        way_m = first * 0.02 * 0.248 * one.axis.of.full_m_s
-        assert way_m == pytest.approx(1.1 * one.axis.of.path_m, abs=0.02)
-        assert one.axis.of.path_m == 0.3
-        one = self.robust()
-        one.rests()
-        assert not any(one.sends(31 if n // 20 % 2 else -31, slew=1.0) for n in range(200))
-
-    def test_as_long_as_the_file_says(self) -> None:
-        one = self.robust("slew")
-        one.rests()
-        left = [one.sends(10, near_far=1.0) for _ in range(400)]
-        first = [bool(why) for why in left].index(True)
-        assert "limit=time" in left[first]
-        assert first == round(6.0 / 0.02) + 2
-
-    def test_it_ends_at_once_where_the_other_one_stops(self) -> None:
-        one = Bench(limited(load("forwarder-robust"), "near_far", deadband_pct=0.0), "near_far")
-        one.rests()
-        for steps in (10, 20, 31):
-            assert not one.sends(steps, slew=1.0)
-        slew = one.gate.axes["slew"]
-        assert one.axis.dropped(one.gate.made) == 0.25  # at rest: when it stopped is not known
-        slew.last = 0.5
-        assert one.axis.dropped(one.gate.made) == 0.0
-        slew.halt("refused", one.gate.made, latch=True)
-        assert one.axis.dropped(one.gate.made) == 1.0
-
-    def test_a_motion_of_slew_alone_moves_nothing_else(self) -> None:
-        one = Bench(load("forwarder"), "near_far")
-        assert not one.axis.of.added
-        assert one.axis.partner is None

@@ -211,3 +211,25 @@ def test_two_frames_of_a_joystick_in_a_tick(stick: float, first: float, second: 
         world.evil.plant = world.commands(slew=speed + change)
         world.receive(world.joystick("left"))
         assert axis.latched is latched
+
+
+@pytest.mark.parametrize(
+    ("speed", "stick", "then", "latched"),
+    [(0.4, 1.0, 0.59, False), (0.4, 1.0, 0.593, True), (0.4, 0.4, 0.209, False),
+     (0.4, 0.4, 0.207, True), (0.145, -1.0, -0.145, False), (0.145, -1.0, -0.15, True)],
+)  # fmt: skip
+def test_a_joystick_of_every_second_tick(
+    speed: float, stick: float, then: float, latched: bool
+) -> None:
+    """In a gateway rates count from the last frame: 0.19 of full command in two ticks."""
+    world = World("gateway-forwarder")
+    world.go(25)
+    world.go(150, slew=(speed - 0.05) / 0.95 + 0.01)
+    axis = world.guarded._gate.axes["slew"]
+    world.go(2, world.commands(slew=speed), slew=abs(stick))
+    world.go(1, world.commands(slew=speed), slew=stick)
+    world.change = lambda frame: []
+    world.step()
+    world.evil.plant = world.commands(slew=then)
+    world.receive(world.joystick("left"))
+    assert axis.latched is latched

@@ -126,6 +126,15 @@ class TestSources:
         gate.receive(first[:3], first[3], timeout_ns + 2)
         assert axis.demand == -0.7
 
+    def test_another_one_moves_nothing_before_neutral(self) -> None:
+        """It comes between two ticks, neither of which sees a joystick that is silent."""
+        gate = Gate(record_of(load("j1939-forwarder")))
+        axis = gate.axes["slew"]
+        for now_ms, frame in ((0, bjm()), (101, bjm("BJM1", 0x34, X=50.0))):
+            gate.receive(frame[:3], frame[3], now_ms * MS)
+            gate.tick(-(-now_ms // 20) * 20 * MS, 0)
+            assert axis.armed is (now_ms == 0)
+
     def test_neither_our_own_nor_another_message_counts(self) -> None:
         gate = Gate(record_of(load("j1939-forwarder")))
         for frame in (
@@ -144,6 +153,15 @@ class TestSources:
         assert gate.axes["slew"].foreign_ns < 0
         gate.receive(elsewhere, bytes(8), 5)
         assert gate.axes["slew"].foreign_ns == 5
+
+    @pytest.mark.parametrize(("to", "ours"), [(0x20, True), (0xFF, True), (0x30, False)])
+    def test_a_command_to_us_or_to_all(self, to: int, ours: bool) -> None:
+        """Of a message with a destination."""
+        gate = Gate(record_of(load("j1939-forwarder")))
+        valve, axes = gate.valves.pop(gate.axes["slew"].of.valve)
+        gate.valves["crane", 0x0CEF2080, True] = replace(valve, group=0x03FF0000), axes
+        gate.receive(("crane", 0x0CEF0021 | to << 8, True), bytes(8), 5)
+        assert (gate.axes["slew"].foreign_ns == 5) is ours
 
     def test_who_only_listens_is_no_ones_rival(self) -> None:
         gate = Gate(record_of(load("forwarder").listening()))
@@ -192,6 +210,7 @@ class TestReload:
         pressed = stop.protection.check.protect(b"\1\1", 0)
         one.gate.receive(stop.key, pressed, one.now_ns)
         after = self.reloaded(one)
+        assert after.axis.latches
         after.axis.hard, after.axis.latches = "", False  # as if a tick had seen it before
         after.gate.tick(after.now_ns, 0)
         assert after.axis.latched
@@ -259,7 +278,7 @@ def test_a_measurement_is_the_demand_while_the_stick_rests() -> None:
     one.rests()
     for part in (0.01, 0.2, 0.4):
         one.gate.measure("near_far", part)
-        assert not one.sends(round(part * 125))
+        assert not one.sends(round(part * 125), near_far=0.02)
     one.gate.measure("near_far", 0.8)
     assert "limit=asked allowed=0.400" in one.sends(51)
     one = bench()

@@ -3,9 +3,12 @@
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from canshaper.gate.axis import FOREIGN_NS
 from tests.faults import variants
-from tests.gate.bench import Bench, bench, load
+from tests.gate.bench import Bench, bench, load, signs
+from tests.promises.world import World
 
 FULL = 125
 
@@ -22,13 +25,29 @@ class TestStopsAtOnce:
         one = self.moving()
         one.gate.receive(one.key, bytes(2), one.now_ns)
         assert "why=second sender" in one.sends(60, near_far=1.0)
-        start = one.number
-        while (one.number - start) * 20_000_000 <= FOREIGN_NS:
-            one.sends(0, enable=one.number % 2 == 0)
+        for k in range(FOREIGN_NS // 20_000_000):
+            one.sends(0, enable=k != 20)
             assert not one.axis.armed
+        one.rests(5)  # a press within the second is no reset
+        assert not one.axis.armed
         one.sends(0, enable=False)
         one.rests()
         assert one.axis.armed
+
+    def test_the_log_names_why_it_stands(self) -> None:
+        assert "limit=stopped why=start speed=" in bench().sends(10, near_far=0.5)
+        for why, stop in (
+            ("send failed", lambda gate: gate.send_failed(gate.axes["near_far"].of.valve)),
+            ("decoders disagree", lambda gate: gate.disagrees([gate.axes["near_far"]])),
+            ("second sender", lambda gate: gate.receive(gate.axes["near_far"].of.valve, b"", 0)),
+        ):
+            one = self.moving()
+            stop(one.gate)
+            assert f"limit=stopped why={why} speed=" in one.sends(60, near_far=1.0)
+        one = self.moving(stop_s=0.1)
+        one.change = lambda frame: None
+        left = [one.sends(60) for _ in range(20)]
+        assert "limit=stopped why=joystick speed=" in next(filter(None, left))
 
     def test_what_a_frame_says_after_the_tick_began_counts_for_the_next_frame(self) -> None:
         one = self.moving()
@@ -45,6 +64,66 @@ class TestStopsAtOnce:
         assert one.sends(-FULL, near_far=1.0)
         one.rests(10)
         assert not one.restarts(10, near_far=0.5)
+
+    def test_the_log_names_what_came_between_tick_and_frame(self) -> None:
+        for why, stop in (
+            ("loop stalled", lambda gate: gate.stalled()),
+            ("decoders disagree", lambda gate: gate.disagrees([gate.axes["near_far"]])),
+            ("second sender", lambda gate: gate.receive(gate.axes["near_far"].of.valve, b"", 0)),
+        ):
+            one = self.moving()
+            one.receive(one.joysticks(near_far=1.0))
+            one.gate.tick(one.now_ns, 0)
+            stop(one.gate)
+            assert f"why={why} speed=" in one.gate.leaving(one.key, one.frame(60))
+
+    def test_a_second_sender_that_is_read_late_latches(self) -> None:
+        one = bench()
+        one.rests()
+        one.gate.receive(one.key, bytes(2), one.now_ns)
+        one.number += 60
+        one.rests()
+        assert one.axis.latched
+
+    @pytest.mark.parametrize("failed", [True, False])
+    def test_a_press_just_before_it_is_no_reset(self, failed: bool) -> None:
+        one = self.moving()
+        assert not one.sends(60, near_far=1.0, reset=True)
+        one.gate.send_failed(one.key) if failed else one.gate.stalled()
+        one.rests(5, reset=True)
+        assert not one.axis.armed
+        one.rests(1)
+        one.rests(2, reset=True)
+        assert one.axis.armed
+
+    def test_a_press_just_after_it_is_one(self) -> None:
+        one = self.moving()
+        one.gate.send_failed(one.key)
+        one.rests(2, reset=True)
+        assert one.axis.armed
+
+    def test_a_standstill_at_rest_latches_nothing(self) -> None:
+        one = bench()
+        one.rests()
+        one.gate.stalled()
+        one.rests()
+        assert one.axis.armed
+
+    def test_released_and_pressed_between_two_ticks(self) -> None:
+        """Whichever was first: a press that may be the later one is a reset."""
+        one = self.moving()
+        one.receive(one.joysticks(enable=False))
+        one.rests(1)
+        assert not one.axis.armed
+        one.rests(1)
+        assert one.axis.armed
+
+    def test_a_switch_at_rest_latches_nothing(self) -> None:
+        world = World("ecu-forwarder")
+        for world.agree in (True, False, True):
+            world.go(25)
+        axes = world.guarded._gate.axes.values()
+        assert all(axis.armed for axis in axes)
 
     def test_a_reset_is_a_press_too(self) -> None:
         one = self.moving()
@@ -76,7 +155,7 @@ class TestStopsAtOnce:
                 pressed = frame._replace(data=stop.protection.check.protect(b"\1\1", 0))
                 one.gate.receive(stop.key, pressed.data, one.now_ns)
         one.rests(10)
-        assert "why=emergency stop" in one.sends(10, near_far=1.0)
+        assert "why=emergency stop speed=" in one.sends(10, near_far=1.0)
         one.rests(10, enable=False)
         one.rests(10)
         assert not one.sends(10, near_far=1.0)
@@ -85,15 +164,36 @@ class TestStopsAtOnce:
 class TestStopsShaped:
     """Rule 2: for ``stop_s`` it may fall, and then neutral comes first."""
 
-    def test_a_stick_that_stands_still(self) -> None:
+    @signs
+    def test_when_neutral_was_seen_again_nothing_runs_against_the_stick(self, sign: int) -> None:
+        one = bench()
+        one.ramp(sign * 60, near_far=sign * 0.5)
+        one.change = lambda frame: None
+        assert not any(one.sends(sign * 60) for _ in range(10))
+        one.change = lambda frame: frame
+        assert not one.sends(sign * 60)
+        assert "limit=asked" in one.sends(sign * 60, near_far=-sign * 0.5)
+
+    def stuck(self) -> Bench:
+        """A stick may stand still for a second."""
         deployment = load("forwarder")
         left = deployment.joysticks["left"]
         config = left.config.model_copy(update={"stuck_s": 1.0})
         joysticks = {**deployment.joysticks, "left": replace(left, config=config)}
-        one = Bench(replace(deployment, joysticks=joysticks), "near_far")
+        return Bench(replace(deployment, joysticks=joysticks), "near_far")
+
+    def test_a_stick_that_stands_still(self) -> None:
+        one = self.stuck()
         one.ramp(60, near_far=0.5)
         armed = []
         for _ in range(60):
             assert not one.sends(60, near_far=0.5)
             armed.append(one.axis.armed)
         assert armed.index(False) == 50 - 15 + 1  # stuck_s, less the ramp
+
+    def test_a_stick_that_stands_still_in_neutral(self) -> None:
+        """At the edge of it, and for longer."""
+        one = self.stuck()
+        one.rests(60, near_far=0.02)
+        assert one.axis.of.stick.band == one.axis.demand
+        assert one.axis.armed

@@ -111,7 +111,7 @@ def test_direction_and_size(monkeypatch: pytest.MonkeyPatch) -> None:
         within = size(v) <= of.maximum + EPSILON
         usual = no(either(of.faster, of.reverse, of.added > 0.0))
         held = either(both(forth, axis.now < 0.0), both(no(forth), axis.now > 0.0))
-        free = either(of.reverse, axis.held < of.reversal, axis.stop_left > 0)
+        free = either(of.reverse, axis.held < of.reversal)
         return both(
             either(way_back, within),
             implies(usual, either(way_back, size(v) <= asked + EPSILON)),
