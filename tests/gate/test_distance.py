@@ -28,6 +28,17 @@ class TestDistance:
         assert "limit=distance" in left[first]
 
     @signs
+    def test_a_small_demand_gives_no_more_than_it_is(self, sign: int) -> None:
+        one = bench(tail_s=2.0)
+        one.rests()
+        for _ in range(5):
+            assert not one.sends(sign * FULL, near_far=float(sign))
+        left = [one.sends(sign * FULL, near_far=sign * 0.1) for _ in range(95)]
+        first = [bool(why) for why in left].index(True)
+        assert first * 0.02 * 0.9 == pytest.approx(SWING_SLACK, abs=0.021)
+        assert "limit=distance" in left[first]
+
+    @signs
     @pytest.mark.parametrize("after", [0.0, 0.3])
     def test_no_farther_than_the_file_says(self, sign: int, after: float) -> None:
         """Beyond the demand; a new stroke has the whole way again."""
