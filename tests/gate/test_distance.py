@@ -52,6 +52,18 @@ class TestDistance:
         assert "limit=stop_distance_m allowed=0.500" in left[first]
 
     @signs
+    @pytest.mark.parametrize(("steps", "at", "more"), [(FULL, 1.0, 24), (0, 0.0, 5)])
+    def test_what_is_asked_again_begins_it_and_a_pause_does_not(
+        self, sign: int, steps: int, at: float, more: int
+    ) -> None:
+        one = bench(tail_s=2.0, stop_distance_m=0.5)
+        one.ramp(sign * FULL, near_far=float(sign))
+        assert not any(one.sends(sign * FULL) for _ in range(20))
+        assert not any(one.sends(sign * steps, near_far=sign * at) for _ in range(3))
+        left = [one.sends(sign * FULL) for _ in range(30)]
+        assert [bool(why) for why in left].index(True) == pytest.approx(more, abs=2)
+
+    @signs
     def test_what_falls_goes_on(self, sign: int) -> None:
         one = bench(tail_s=2.0, stop_distance_m=0.5, fall_per_s=4.8)
         one.ramp(sign * FULL, near_far=float(sign))
