@@ -108,6 +108,9 @@ class TestAdded:
         assert one.axis.dropped(one.gate.made) == 0.0
         slew.halt("refused", one.gate.made, latch=True)
         assert one.axis.dropped(one.gate.made) == 1.0
+        one.axis.of.period = 3
+        assert one.axis.dropped(one.gate.made + 6) == 1.0
+        assert one.axis.dropped(one.gate.made + 7) == 0.0
 
     @signs
     @pytest.mark.parametrize(

@@ -28,6 +28,17 @@ class TestDistance:
         assert "limit=distance" in left[first]
 
     @signs
+    def test_a_small_demand_gives_no_more_than_it_is(self, sign: int) -> None:
+        one = bench(tail_s=2.0)
+        one.rests()
+        for _ in range(5):
+            assert not one.sends(sign * FULL, near_far=float(sign))
+        left = [one.sends(sign * FULL, near_far=sign * 0.1) for _ in range(95)]
+        first = [bool(why) for why in left].index(True)
+        assert first * 0.02 * 0.9 == pytest.approx(SWING_SLACK, abs=0.021)
+        assert "limit=distance" in left[first]
+
+    @signs
     @pytest.mark.parametrize("after", [0.0, 0.3])
     def test_no_farther_than_the_file_says(self, sign: int, after: float) -> None:
         """Beyond the demand; a new stroke has the whole way again."""
@@ -39,6 +50,18 @@ class TestDistance:
         first = [bool(why) for why in left].index(True)
         assert (24 + first) * 0.02 * (1.0 - after) == pytest.approx(0.5, abs=0.021)
         assert "limit=stop_distance_m allowed=0.500" in left[first]
+
+    @signs
+    @pytest.mark.parametrize(("steps", "at", "more"), [(FULL, 1.0, 24), (0, 0.0, 5)])
+    def test_what_is_asked_again_begins_it_and_a_pause_does_not(
+        self, sign: int, steps: int, at: float, more: int
+    ) -> None:
+        one = bench(tail_s=2.0, stop_distance_m=0.5)
+        one.ramp(sign * FULL, near_far=float(sign))
+        assert not any(one.sends(sign * FULL) for _ in range(20))
+        assert not any(one.sends(sign * steps, near_far=sign * at) for _ in range(3))
+        left = [one.sends(sign * FULL) for _ in range(30)]
+        assert [bool(why) for why in left].index(True) == pytest.approx(more, abs=2)
 
     @signs
     def test_what_falls_goes_on(self, sign: int) -> None:

@@ -177,6 +177,14 @@ class TestRates:
         assert ("limit=rise" in why) is not passes
 
     @signs
+    def test_a_valve_that_has_closed_opens_again(self, sign: int) -> None:
+        one = bench(rise_per_s=4.0, fall_per_s=4.0)
+        one.ramp(sign * 60, near_far=float(sign))
+        for _ in range(10):
+            one.skips(near_far=float(sign))
+        assert not one.sends(sign * 10, near_far=float(sign))
+
+    @signs
     @pytest.mark.parametrize(("steps", "passes"), [(72, True), (71, False)])
     def test_slower_than_the_last_by_the_fall(self, sign: int, steps: int, passes: bool) -> None:
         one = bench(fall_per_s=5.0)  # 0.1 in a tick

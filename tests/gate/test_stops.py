@@ -77,6 +77,11 @@ class TestStopsAtOnce:
             stop(one.gate)
             assert f"why={why} speed=" in one.gate.leaving(one.key, one.frame(60))
 
+    def test_with_the_stick_in_neutral_it_may_not_fall_either(self) -> None:
+        one = self.moving(fall_per_s=2.0)
+        one.gate.send_failed(one.key)
+        assert "why=send failed" in one.sends(56)
+
     def test_a_second_sender_that_is_read_late_latches(self) -> None:
         one = bench()
         one.rests()
