@@ -41,6 +41,7 @@ NOT_PASTED = {
 # Outputs that are not compared, and why.
 NOT_COMPARED = {
     "compare": "minutes; tests/design holds its table",
+    "work": "minutes; tests/campaign/test_work.py holds its table",
     "monitor forwarder.yaml, next to run, sim and operator": "a picture of one moment",
 }
 
