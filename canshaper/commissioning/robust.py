@@ -1,7 +1,6 @@
 """The robust shaper of an axis: designed for its swing in the file, shown, and written there."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -12,19 +11,28 @@ from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import Filter, designed, filter_of
 from canshaper.config.section import shortened
 from canshaper.design.profiles import swinging_axis
-from canshaper.design.tuning.evaluate import Evaluation, Machine, evaluate
+from canshaper.design.tuning.evaluate import (
+    Evaluation,
+    Machine,
+    ShaperFor,
+    evaluate,
+    shaper_of,
+)
+from canshaper.design.tuning.formulation import check_swing
 from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual
 from canshaper.design.tuning.robust import RobustShaper, least_residual, shortest
+from canshaper.design.tuning.verdict import GOOD, Verdict, judge
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
 from canshaper.report.console import new_table
-from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sway import SwayMode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Times the duration of a shaper that leaves too much.
+_LONGER = (1.15, 1.3, 1.5, 2.0)
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
 
@@ -42,6 +50,7 @@ class RobustDesign:
         measured: what it does through the limits of the machine.
         section: the filter section of the file.
         needed_s: tail that it needs, where that of the file is shorter.
+        verdict: whether it damps over its range.
         second: a second mode that it covers too, and the shaper without that.
     """
 
@@ -53,12 +62,13 @@ class RobustDesign:
     measured: Evaluation
     section: dict[str, Any]
     needed_s: float | None
+    verdict: Verdict
     second: tuple[SecondMode, RobustShaper] | None = None
 
     @property
     def chosen(self) -> Filter:
         """The filter as the file describes it."""
-        return filter_of("robust", **{k: v for k, v in self.section.items() if k != "kind"})
+        return filter_of(**self.section)
 
 
 def design_robust(
@@ -92,10 +102,28 @@ def design_robust(
         raise UsageError("expected one of --duration and --residual, got both")
     requirements: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
     two = _second(second, mode, tick_s, rate)
+    machine = Machine.of(bound)
     try:
+        check_swing(mode)
         without = _designed(mode, None, duration_s, residual_pct, requirements)
         shaper = _designed(mode, two, duration_s, residual_pct, requirements) if two else without
-        measured = _evaluated(bound, mode, tick_s, shaper)
+
+        def in_file(one: RobustShaper) -> tuple[dict[str, Any], ShaperFor]:
+            made = _section(one, mode, requirements, tick_ms, two)
+            return made, shaper_of(filter_of(**made), tick_s, rate)
+
+        section, shaper_for = in_file(shaper)
+        measured = evaluate(mode, tick_s, shaper_for, machine)
+        verdict = judge(mode, tick_s, shaper_for, machine, range_pct)
+        for times in _LONGER if verdict.word != "good" and residual_pct is None else ():
+            seconds = round(times * shaper.duration_s / tick_s) * tick_s
+            shaper_for = in_file(_designed(mode, two, seconds, None, requirements))[1]
+            limits = replace(machine.limits, tail_s=max(machine.limits.tail_s, seconds + 0.1))
+            longer = replace(machine, limits=limits)
+            left = judge(mode, tick_s, shaper_for, longer, range_pct).left
+            if left <= GOOD:
+                verdict = verdict.with_cure(left, f"--duration {seconds:.2g}")
+                break
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
     tail_s = bound.config.limits.tail_s
@@ -106,8 +134,9 @@ def design_robust(
         range_pct,
         shaper,
         measured,
-        _section(shaper, mode, requirements, tick_ms, two),
+        section,
         round(shaper.duration_s + 0.1, 1) if tail_s < shaper.duration_s else None,
+        verdict,
         (two, without) if two else None,
     )
 
@@ -129,6 +158,7 @@ def print_design(deployment: Deployment, one: RobustDesign, console: Console) ->
     console.print(_table(one.measured))
     if one.second:
         console.print(_second_table(one))
+    console.print(f"Verdict: {one.verdict}.", style="bold")
     if one.needed_s is not None:
         tail_s = one.bound.config.limits.tail_s
         console.print(
@@ -149,17 +179,10 @@ def figure(one: RobustDesign) -> "Figure":
     from canshaper.design.tuning import robust_plot  # noqa: PLC0415  # pictures alone need it
 
     rate = one.bound.config.limits.slowest_per_s
-
-    def build(chosen: Filter) -> Callable[..., Any]:
-        parameters = chosen.parameters()
-        return lambda model: build_shaper(
-            chosen.kind, one.tick_s, model, valve_rate_per_s=rate, **parameters
-        )
-
     present = one.bound.config.filter
     filters = [
-        robust_plot.Candidate("this one", build(one.chosen)),
-        robust_plot.Candidate(f"in the file, {present.kind}", build(present)),
+        robust_plot.Candidate("this one", shaper_of(one.chosen, one.tick_s, rate)),
+        robust_plot.Candidate(f"in the file, {present.kind}", shaper_of(present, one.tick_s, rate)),
     ]
     return robust_plot.figure(
         one.bound.name,
@@ -168,19 +191,6 @@ def figure(one: RobustDesign) -> "Figure":
         machine=Machine.of(one.bound),
         filters=filters,
         range_pct=one.range_pct,
-    )
-
-
-def _evaluated(bound: BoundAxis, mode: SwayMode, tick_s: float, shaper: RobustShaper) -> Evaluation:
-    """Measure the shaper on the axis, with the taps as they stand in the file."""
-
-    rate = bound.config.limits.slowest_per_s
-    taps = [round(tap, _DIGITS) for tap in shaper.taps]
-    return evaluate(
-        mode,
-        tick_s,
-        lambda model: build_shaper("robust", tick_s, model, valve_rate_per_s=rate, taps=taps),
-        Machine.of(bound),
     )
 
 

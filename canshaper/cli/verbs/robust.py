@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import FILE, PICTURE, REPORT, echo, loader, refuse_shipped
+from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, echo, loader, refuse_shipped
 
 if TYPE_CHECKING:
     from canshaper.commissioning.robust import RobustDesign
@@ -32,6 +32,7 @@ def robust(
         help="A second mode too: s, damping ratio, +- % of its length.",
     ),
     write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
+    force: bool = typer.Option(False, "--force", help="Write what leaves half of the swing too."),
     as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
     picture: Path | None = PICTURE,
     report: Path | None = REPORT,
@@ -39,8 +40,8 @@ def robust(
     """Design the shaper that leaves least swing over a range of pendulum lengths.
 
     A non-negative impulse response within the valve's rate, by linear programming, with a least tap
-    that makes one movement of a tap of the joystick. Prints what it does and, without --write, the
-    lines for the file.
+    that makes one movement of a tap of the joystick. Prints what it does, whether that is good and,
+    without --write, the lines for the file. Exit code 1 where more than half of the swing is left.
 
     With --second it leaves a second mode in peace too, such as that of grapple and rotator with
     long logs, and prints what that costs and gains. The picture, with --picture or --report, has
@@ -83,6 +84,8 @@ def robust(
     print_design(deployment, one, results)
     if path := results.picture(None, lambda: figure(one)):
         results.picture_line(path)
+    useless = one.verdict.useless and not force
+    write = write and not useless
     changed = write_design(deployment, one) if write else []
     if as_json:
         files = {"picture": path, "written": deployment.path if write else None}
@@ -90,6 +93,8 @@ def robust(
     lines = [*changed, written_line(deployment.path)] if write else [f"filter: {flow(one.section)}"]
     results.print("\n".join(lines), soft_wrap=True)
     results.write()
+    if useless:
+        raise typer.Exit(EXIT_USELESS)
 
 
 def _result(one: "RobustDesign") -> dict[str, Any]:
@@ -101,4 +106,5 @@ def _result(one: "RobustDesign") -> dict[str, Any]:
         "mean_delay_s": one.shaper.mean_delay_s,
         "measures": asdict(one.measured),
         "tail_needed_s": one.needed_s,
+        "verdict": one.verdict.as_dict(),
     }

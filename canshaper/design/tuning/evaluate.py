@@ -9,12 +9,15 @@ import cmath
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Self
 
+from canshaper.config.filters import Filter
 from canshaper.design.tuning.formulation import SETTLED, at_length
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
@@ -90,6 +93,7 @@ class Evaluation:
             crane runs on.
         mean_delay_s: area between command and output: how much further the crane goes after a
             release, in seconds of full speed.
+        dip: largest fall of the output, through the limits, while the joystick is held.
         residuals: residual sway over the length error.
     """
 
@@ -98,6 +102,7 @@ class Evaluation:
     rise_s: float
     run_on_s: float
     mean_delay_s: float
+    dip: float
     residuals: tuple[Residual, ...]
 
     def worst(self, within_pct: float = 30.0) -> float:
@@ -121,6 +126,14 @@ class Traces:
 def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
     """G_FF of any axis with these poles."""
     return lambda sway: Gff(sway, poles_rad_s, third_pole_rad_s=third_pole_rad_s)
+
+
+def shaper_of(chosen: Filter, tick_s: float, valve_rate_per_s: float) -> ShaperFor:
+    """A filter as a file describes it."""
+    parameters = chosen.parameters()
+    return lambda sway: build_shaper(
+        chosen.kind, tick_s, sway, valve_rate_per_s=valve_rate_per_s, **parameters
+    )
 
 
 def evaluate(
@@ -151,7 +164,7 @@ def evaluate(
     hold_s = min(_LONGEST_S, max(4.0, 2.0 * run_on_s + 1.0, machine.limits.tail_s + 1.0))
     shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
     raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
-    residuals = []
+    residuals, sent = [], shaped[0][1]
     for percent in lengths_pct:
         true = at_length(mode, 1.0 + percent / 100.0)
         left, unshaped = (
@@ -159,6 +172,8 @@ def evaluate(
             for moves in (shaped, raw)
         )
         worst = max(a / b for a, b in zip(left, unshaped, strict=True))
+        if sent[-1] < 0.5 * machine.limits.maximum:
+            worst = max(worst, 1.0)  # no swing, because its first steps are rounded to none
         residuals.append(Residual(percent, _gain_at(true, tick_s, y), worst))
     return Evaluation(
         first_jump=y[0],
@@ -166,6 +181,7 @@ def evaluate(
         rise_s=(below[-1] + 1) * tick_s if below else 0.0,
         run_on_s=run_on_s,
         mean_delay_s=sum(1.0 - value / end for value in y) * tick_s,
+        dip=max(top - value for top, value in zip(accumulate(sent, max), sent, strict=True)),
         residuals=tuple(residuals),
     )
 
