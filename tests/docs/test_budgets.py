@@ -53,7 +53,7 @@ BUDGET = {
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 600,
     "docs/tuning.md": 700,
-    "studies/README.md": 720,
+    "studies/README.md": 760,
 }
 
 # Lines of Python, and why so many.
