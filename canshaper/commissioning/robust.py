@@ -31,8 +31,7 @@ from canshaper.shaping.sway import SwayMode
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Times the duration of a shaper that leaves too much.
-_LONGER = (1.15, 1.3, 1.5, 2.0)
+_LONGER = (1.15, 1.3, 1.5, 2.0)  # times the duration of a shaper that leaves too much
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
 
@@ -118,8 +117,8 @@ def design_robust(
         for times in _LONGER if verdict.word != "good" and residual_pct is None else ():
             seconds = round(times * shaper.duration_s / tick_s) * tick_s
             shaper_for = in_file(_designed(mode, two, seconds, None, requirements))[1]
-            limits = replace(machine.limits, tail_s=max(machine.limits.tail_s, seconds + 0.1))
-            longer = replace(machine, limits=limits)
+            tail_s = max(machine.limits.tail_s, seconds + 0.1)
+            longer = replace(machine, limits=replace(machine.limits, tail_s=tail_s))
             left = judge(mode, tick_s, shaper_for, longer, range_pct).left
             if left <= GOOD:
                 verdict = verdict.with_cure(left, f"--duration {seconds:.2g}")

@@ -122,28 +122,16 @@ def design_tuned(
     setting = deploy.deployed(tuning, task.mode, task.tick_s, machine)
     shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
     verdict = judge(task.mode, task.tick_s, shaper, machine, task.length_range_pct or 0.0)
-    before = None
+    before, tail = None, deploy.tail_for(setting, task.mode, task.tick_s, machine)
     if bound.config.filter.kind == "gff":
         parameters = bound.config.filter.parameters()
         before = deploy.from_parameters(parameters, task.mode, task.tick_s, machine)
         verdict = verdict.with_cure(before.measures.worst(0.0), "the filter in the file")
     others = {"horizon_s", *_AIMS[2]} if wanted is not None or task.length_range_pct else set()
-    objective = {
-        name: asked[name]
-        for name in Objective.model_fields
-        if asked[name] is not None and name not in others
-    }
-    return TunedDesign(
-        bound,
-        task,
-        tuning,
-        setting,
-        before,
-        deploy.tail_for(setting, task.mode, task.tick_s, machine),
-        verdict,
-        None if method == "manual" else objective,
-        choices,
-    )
+    kept = (name for name in Objective.model_fields if name not in others)
+    objective = {name: asked[name] for name in kept if asked[name] is not None}
+    again = objective if method == "optimal" else None
+    return TunedDesign(bound, task, tuning, setting, before, tail, verdict, again, choices)
 
 
 def _asked(bound: BoundAxis, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -196,11 +184,9 @@ def write_tuned(deployment: Deployment, one: TunedDesign) -> list[str]:
         "objective": one.objective,
     }
     designed_for = designed(one.task.mode) | {k: v for k, v in found.items() if v is not None}
-    values = {"kind": "gff", **one.setting.values(), "designed_for": designed_for}
-    gone = one.bound.config.filter.model_dump(exclude_none=True).keys() - values.keys()
-    return write_filter(
-        deployment, one.bound.name, dict.fromkeys(sorted(gone)) | values, tail_s, "tune"
-    )
+    values = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True))
+    values |= {"kind": "gff", **one.setting.values(), "designed_for": designed_for}
+    return write_filter(deployment, one.bound.name, values, tail_s, "tune")
 
 
 def as_dict(one: TunedDesign) -> dict[str, Any]:

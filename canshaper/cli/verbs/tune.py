@@ -33,13 +33,9 @@ def tune(
     states: str | None = typer.Option(
         None, "--states", help="What Q weighs: sway (default), deviation, companion, none."
     ),
-    horizon_s: float | None = typer.Option(
-        None, "--horizon", help="Seconds that a step is watched, by default 3."
-    ),
+    horizon_s: float | None = typer.Option(None, "--horizon", help="Seconds of a step (3)."),
     pole_distance: str | None = typer.Option(
-        None,
-        "--pole-distance",
-        help="Eq. 14e: text (at least 5 times, default), printed (at most), off.",
+        None, "--pole-distance", help="Eq. 14e: text (at least 5 times), printed (at most), off."
     ),
     within_command: bool | None = typer.Option(
         None,
@@ -55,9 +51,7 @@ def tune(
         help="Rate of the valve, full speeds/s, inf for none. Default: rise and fall of the axis.",
     ),
     third_pole: bool | None = typer.Option(
-        None,
-        "--third-pole/--two-poles",
-        help="A third pole, so that no part of a step comes out at once.",
+        None, "--third-pole/--two-poles", help="A third pole: no part of a step comes at once."
     ),
     max_run_on_s: float | None = typer.Option(
         None, "--max-run-on", help="Seconds until a step has settled to 5 %."

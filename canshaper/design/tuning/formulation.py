@@ -133,11 +133,7 @@ class Requirements:
 
 
 def check_swing(mode: SwayMode) -> None:
-    """Refuse a design for a tool that swings out by itself: a filter would only prolong it.
-
-    Raises:
-        DesignError: the damping ratio is above ``MOST_DAMPED``.
-    """
+    """DesignError for a tool that swings out by itself: a filter would only prolong it."""
     if mode.damping_ratio > MOST_DAMPED:
         raise DesignError(
             f"damping ratio: expected 0 to {MOST_DAMPED:g}, got {mode.damping_ratio:.3g}: the tool"

@@ -1,10 +1,9 @@
 """One number from quicker to calmer, in place of weights: settings along a Pareto front.
 
-Each setting of a grid of two or three real poles that keeps the requirements is measured, through
-the limits of the axis. Those stay that no other one beats in rise time, run-on, dip and swing left
-at once. The number then weighs what is quick (rise and run-on) against what is calm (dip and swing
-left): the larger of both, each as a part of its span on the front, is least (Chebyshev), so that
-every setting of a front of any form can be the answer, and more of the number is never quicker.
+Each setting of a grid of two or three real poles that keeps the requirements is measured through
+the limits of the axis. The number weighs what is quick (rise and run-on) against what is calm (dip
+and swing left): the larger of both, each as a part of its span on the front, is least (Chebyshev),
+so that every setting of the front can be the answer, and more of the number is never quicker.
 """
 
 from collections.abc import Callable, Iterator
@@ -100,9 +99,9 @@ def table(choices: list[Choice], preference: float, full_speed_m_s: float) -> Ta
         poles = " ".join(f"{pole:.2f}" for pole in one.poles_rad_s)
         rise_s, run_on_s, dip, worst = one.felt
         cells = [f"{row:g}", poles, f"{rise_s:.2f}", f"{100 * dip:.0f}"]
-        cells += [f"{run_on_s * full_speed_m_s:.2f}"]
-        cells += [f"{100 * left:.1f}" for left in (one.measures.worst(0.0), worst)]
-        result.add_row(*cells, style="bold" if row == preference else None)
+        cells += [f"{run_on_s * full_speed_m_s:.2f}", f"{100 * one.measures.worst(0.0):.1f}"]
+        style = "bold" if row == preference else None
+        result.add_row(*cells, f"{100 * worst:.1f}", style=style)
     return result
 
 

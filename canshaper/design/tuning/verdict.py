@@ -18,9 +18,8 @@ from canshaper.shaping.sway import SwayMode
 
 # Of the swing: up to GOOD is left by a good filter, more than USELESS by one that is not written.
 GOOD, USELESS = 0.10, 0.50
-# Changes that are tried: tails up to the longest of a file in s, and times the rate of the valve.
-_TAILS_S = tuple(0.1 * tenths for tenths in range(1, 51))
-_FASTER = (1.5, 2.0, 3.0, 5.0)
+_LONGEST_TENTHS = 50  # of a second: the longest tail of a file
+_FASTER = (1.5, 2.0, 3.0, 5.0)  # times the rate of the valve
 # A change is worth naming that leaves less than this part.
 _HELPS = 0.8
 
@@ -105,9 +104,8 @@ def judge(
 
 
 def _longer(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
-    for tail_s in _TAILS_S:
-        if tail_s > machine.limits.tail_s:
-            yield f"tail_s: {tail_s:.1f}", {"tail_s": tail_s}
+    for tenths in range(int(10.0 * machine.limits.tail_s) + 1, _LONGEST_TENTHS + 1):
+        yield f"tail_s: {tenths / 10.0:g}", {"tail_s": tenths / 10.0}
 
 
 def _faster(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -24,7 +24,7 @@ MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 DESIGNED = (
     "designed_for: { period_s: 2.356, damping_ratio: 0.038, duration_s: 2.8,"
     " valve_rate_per_s: 5.0, objective: { q: [1.0, 1.0], r: 1.0, s: 3.0, p: 1.0, states: sway,"
-    " horizon_s: 3.0, pole_distance: text, within_command: true } }"
+    " pole_distance: text, horizon_s: 3.0, third_pole: false, within_command: true } }"
 )
 UNSTATED = (", stop_distance_m: 1 }", " }")
 
