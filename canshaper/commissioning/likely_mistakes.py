@@ -25,9 +25,8 @@ def warnings_of(deployment: Deployment) -> list[Problem]:
     source = Source(deployment.path)
     config = deployment.config
     poor = ((place, str(one)) for place, one in verdicts(deployment) if one.word != "good")
-    numbers = (*unfit(config), *poor, *unstated(deployment))
-    numbers += (*rehearsed(config), *assumptions(config))
-    every = (*_pump(deployment), *numbers, *likely_mistakes(deployment))
+    numbers = (*unfit(config), *unstated(deployment), *rehearsed(config), *assumptions(config))
+    every = (*_pump(deployment), *poor, *numbers, *likely_mistakes(deployment))
     return [source.problem(*one) for one in every]
 
 

@@ -161,8 +161,7 @@ def _draw_front(panel: Axes, choices: Sequence[Choice], chosen: Evaluation) -> N
     plain(panel)
     rise_s = [one.felt[0] for one in choices]
     for at, text, colour in ((2, "dip while held", "#56A0D3"), (3, "left, ±10 %", SHAPED_COLOUR)):
-        percent = [100.0 * one.felt[at] for one in choices]
-        panel.plot(rise_s, percent, "o", color=colour, label=text)
+        panel.plot(rise_s, [100.0 * one.felt[at] for one in choices], "o", color=colour, label=text)
     panel.axvline(chosen.rise_s, color="#888888", linewidth=1.0, linestyle=":")
     panel.set_xlabel("rise to 95 %, s: quick to calm; dotted: this setting", **_LABEL)
     panel.set_ylabel("%", **_LABEL)
