@@ -6,6 +6,7 @@ from canshaper.codec.sense import turned
 from canshaper.codec.signals import find_signal
 from canshaper.commissioning.assumed import assumptions
 from canshaper.config.source import Place, Source
+from canshaper.design.tuning.verdict import verdicts
 from canshaper.errors import Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import unfit
@@ -23,8 +24,9 @@ def warnings_of(deployment: Deployment) -> list[Problem]:
     """Filters that do not fit, travel that no one has stated, guesses, likely mistakes."""
     source = Source(deployment.path)
     config = deployment.config
+    poor = ((place, str(one)) for place, one in verdicts(deployment) if one.word != "good")
     numbers = (*unfit(config), *unstated(deployment), *rehearsed(config), *assumptions(config))
-    every = (*_pump(deployment), *numbers, *likely_mistakes(deployment))
+    every = (*_pump(deployment), *poor, *numbers, *likely_mistakes(deployment))
     return [source.problem(*one) for one in every]
 
 

@@ -75,7 +75,8 @@ def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console
     for one in designs:
         name = names[-1 if one.at is None else one.at]
         console.print(f"{name}: {summary_line(one)}")
-        shaper, machine = shaper_of(bound, one.tick_s, one.chosen), Machine.of(bound)
+        shaper = shaper_of(one.chosen, one.tick_s, bound.config.limits.slowest_per_s)
+        machine = Machine.of(bound)
         left = swing_left(one.mode, one.tick_s, shaper, machine, [*loads.values()])
         table.add_row(name, *(f"{100.0 * part:.1f}" for part in left))
     console.print(table)

@@ -15,9 +15,18 @@ from canshaper.config.limits import Sway
 from canshaper.config.section import shortened
 from canshaper.config.source import Place
 from canshaper.design.profiles import swinging_axis
-from canshaper.design.tuning.evaluate import LENGTHS_PCT, Evaluation, Machine, evaluate, shaper_of
+from canshaper.design.tuning.evaluate import (
+    LENGTHS_PCT,
+    Evaluation,
+    Machine,
+    ShaperFor,
+    evaluate,
+    shaper_of,
+)
+from canshaper.design.tuning.formulation import check_swing
 from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual
 from canshaper.design.tuning.robust import LEAST_TAP, RobustShaper, least_residual, shortest
+from canshaper.design.tuning.verdict import GOOD, Verdict, judge
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
@@ -32,6 +41,7 @@ if TYPE_CHECKING:
 _LEAST_TAPS = (LEAST_TAP, LEAST_TAP / 3.0, 0.0)
 # Length of the response in swings: with a range that of ZVD, which is zero twice in its middle.
 _SWINGS, _SWINGS_OF_RANGE = 0.77, 1.0
+_LONGER = (1.15, 1.3, 1.5, 2.0)  # times the duration of a shaper that leaves too much
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
 
@@ -49,6 +59,7 @@ class RobustDesign:
         measured: what it does through the limits of the machine.
         section: the filter section of the file.
         needed_s: tail that it needs, where that of the file is shorter.
+        verdict: whether it damps over its range.
         second: a second mode that it covers too, and the shaper without that.
         lengths_m: shortest and longest pendulum that it was designed for, in place of a range.
         sway: what the file has to have as the swing then, by key.
@@ -63,6 +74,7 @@ class RobustDesign:
     measured: Evaluation
     section: dict[str, Any]
     needed_s: float | None
+    verdict: Verdict
     second: tuple[SecondMode, RobustShaper] | None = None
     lengths_m: tuple[float, float] | None = None
     sway: dict[str, float] = field(default_factory=dict)
@@ -71,7 +83,7 @@ class RobustDesign:
     @property
     def chosen(self) -> Filter:
         """The filter as the file describes it."""
-        return filter_of("robust", **{k: v for k, v in self.section.items() if k != "kind"})
+        return filter_of(**self.section)
 
 
 def design_robust(
@@ -105,7 +117,8 @@ def design_robust(
     """
     bound, sway = swinging_axis(deployment, axis)
     sway = sway if at is None else bound.config.gain_schedule[at].sway
-    mode, lengths_pct = sway.mode(), LENGTHS_PCT
+    mode = sway.mode()
+    lengths_pct: Sequence[float] = LENGTHS_PCT
     changes: dict[str, float] = {}
     if lengths_m is not None:
         mode, range_pct, changes = _between(sway, lengths_m)
@@ -119,28 +132,47 @@ def design_robust(
     two = _second(second, mode, tick_s, rate)
     swings = _SWINGS_OF_RANGE if lengths_m else _SWINGS
     duration_s = duration_s or round(swings * mode.period_s / tick_s) * tick_s
+    machine = Machine.of(bound)
 
-    def design(second: SecondMode | None, least_tap: float) -> RobustShaper:
-        if residual_pct is not None:
+    def design(
+        second: SecondMode | None, least_tap: float, seconds: float | None = None
+    ) -> RobustShaper:
+        if residual_pct is not None and seconds is None:
             return shortest(mode, residual_pct=residual_pct, second=second, **requirements)
-        given = requirements | {"duration_s": duration_s, "least_tap": least_tap}
+        given = requirements | {"duration_s": seconds or duration_s, "least_tap": least_tap}
         return least_residual(mode, second=second, first=first, **given)
 
-    def evaluated(shaper: RobustShaper) -> Evaluation:
-        machine, taps = Machine.of(bound), [round(tap, _DIGITS) for tap in shaper.taps]
-        if lengths_m:  # with the tail that is written with it
-            limits = replace(machine.limits, tail_s=max(tail_s, shaper.duration_s))
-            machine = replace(machine, limits=limits)
-        shaper_for = shaper_of(bound, tick_s, filter_of("robust", tick_ms=tick_ms, taps=taps))
-        return evaluate(mode, tick_s, shaper_for, machine, lengths_pct)
+    def in_file(one: RobustShaper) -> tuple[dict[str, Any], ShaperFor]:
+        made = _section(one, mode, requirements, tick_ms, two)
+        return made, shaper_of(filter_of(**made), tick_s, rate)
+
+    def with_tail(tail_s: float) -> Machine:
+        limits = replace(machine.limits, tail_s=max(machine.limits.tail_s, tail_s))
+        return replace(machine, limits=limits)
+
+    def evaluated(one: RobustShaper) -> Evaluation:
+        # Of a range with the tail that is written with it.
+        of = with_tail(one.duration_s) if lengths_m else machine
+        return evaluate(mode, tick_s, in_file(one)[1], of, lengths_pct)
 
     try:
+        check_swing(mode)
         shapers = [design(two, one) for one in _LEAST_TAPS[: 3 if lengths_m else 1]]
         without = design(None, LEAST_TAP) if two else shapers[0]
         measures = [(evaluated(one), one) for one in shapers]
+        measured, shaper = min(measures, key=lambda one: one[0].worst(range_pct))
+        section, shaper_for = in_file(shaper)
+        of = with_tail(shaper.duration_s) if lengths_m else machine
+        verdict = judge(mode, tick_s, shaper_for, of, range_pct)
+        for times in _LONGER if verdict.word != "good" and residual_pct is None else ():
+            seconds = round(times * shaper.duration_s / tick_s) * tick_s
+            shaper_for = in_file(design(two, LEAST_TAP, seconds))[1]
+            left = judge(mode, tick_s, shaper_for, with_tail(seconds + 0.1), range_pct).left
+            if left <= GOOD:
+                verdict = verdict.with_cure(left, f"--duration {seconds:.2g}")
+                break
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
-    measured, shaper = min(measures, key=lambda one: one[0].worst(range_pct))
     return RobustDesign(
         bound,
         mode,
@@ -148,8 +180,9 @@ def design_robust(
         range_pct,
         shaper,
         measured,
-        _section(shaper, mode, requirements, tick_ms, two),
+        section,
         round(shaper.duration_s + 0.1, 1) if tail_s < shaper.duration_s else None,
+        verdict,
         (two, without) if two else None,
         lengths_m,
         changes,
@@ -190,6 +223,7 @@ def print_design(deployment: Deployment, one: RobustDesign, console: Console) ->
     console.print(_table(one))
     if one.second:
         console.print(_second_table(one))
+    console.print(f"Verdict: {one.verdict}.", style="bold")
     print_consequences(deployment, one, console)
 
 
@@ -222,10 +256,11 @@ def figure(one: RobustDesign) -> "Figure":
     """The new filter next to that of the file."""
     from canshaper.design.tuning import robust_plot  # noqa: PLC0415  # pictures alone need it
 
+    rate = one.bound.config.limits.slowest_per_s
     present = one.bound.config.filter
     filters = [
-        robust_plot.Candidate(name, shaper_of(one.bound, one.tick_s, chosen))
-        for name, chosen in (("this one", one.chosen), (f"in the file, {present.kind}", present))
+        robust_plot.Candidate("this one", shaper_of(one.chosen, one.tick_s, rate)),
+        robust_plot.Candidate(f"in the file, {present.kind}", shaper_of(present, one.tick_s, rate)),
     ]
     return robust_plot.figure(
         one.bound.name,

@@ -35,6 +35,30 @@ class SecondMode(Section):
     ]
 
 
+_Weight = Annotated[float, number(0, 1e6, "", "weight, as of the option of tune")]
+
+
+class Objective(Section):
+    """What the poles of a G_FF were chosen by (Eq. 14-15), with which ``tune`` makes them again."""
+
+    q: list[Annotated[float, number(-1e6, 1e6, "", "weight")]] = Field(
+        [1.0, 1.0], max_length=4, description="Q: one number, its diagonal, or the matrix by rows"
+    )
+    r: _Weight = 1.0
+    s: _Weight = 3.0
+    p: _Weight = 1.0
+    states: str = Field("sway", description="what Q weighs")
+    preference: Annotated[float, number(0, 1, "", "instead: 0 quickest, 1 calmest")] | None = None
+    pole_distance: Annotated[
+        str, BeforeValidator(lambda word: "off" if word is False else word)  # as YAML 1.1 reads it
+    ] = Field("text", description="sense of Eq. 14e")
+    horizon_s: Annotated[float, number(0.2, 60, "s", "how long a step is watched")] = 3.0
+    third_pole: bool = Field(False, description="three poles")
+    within_command: bool | None = Field(None, description="the output never passes the command")
+    max_jump: Annotated[float, number(0.01, 100, "", "most that comes at once")] | None = None
+    max_run_on_s: Annotated[float, number(0.05, 20, "s", "longest run-on to 5 %")] | None = None
+
+
 class DesignedFor(Section):
     """Swing and valve that a filter was designed for; compared with the file when it is loaded."""
 
@@ -53,6 +77,7 @@ class DesignedFor(Section):
         Annotated[float, number(0, 100, "full speeds per s", "rate of the valve that it keeps to")]
         | None
     ) = None
+    objective: Objective | None = Field(None, description="what tune chose the poles by")
     origin: Origin | None = Field(None, description="where the filter, and its swing, come from")
 
     def faults(

@@ -17,7 +17,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
     """Check that every filter that the axis may get runs at the period of its valve."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
-    parts, filters = _parts(place, axis), _filters(place, axis)
+    parts, filters = _parts(place, axis), every_filter(place, axis)
     for at, part in parts:
         if part.gain_schedule and not lookup.config.load_state:
             add((*at, "gain_schedule"), "expected load_state, which chooses them, got none")
@@ -65,7 +65,7 @@ def _parts(place: Place, axis: AxisSection) -> list[tuple[Place, AxisSection | P
     return [(place, axis), *(((*place, "profiles", name), one) for name, one in profiles)]
 
 
-def _filters(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway | None]]:
+def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway | None]]:
     """Every filter that the axis may get, by its place, with the sway data that it runs with."""
     filters: list[tuple[Place, Filter, Sway | None]] = []
     for at, part in _parts(place, axis):
@@ -78,7 +78,7 @@ def _filters(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
     """Yield filters that were designed for another swing or valve than the file has: where, why."""
     for name, axis in config.axes.items():
-        for place, chosen, sway in _filters(("axes", name), axis):
+        for place, chosen, sway in every_filter(("axes", name), axis):
             design = chosen.design()
             if design and sway:
                 rate = axis.limits.slowest_per_s

@@ -1,7 +1,7 @@
 """Metrics of a pair of drives: swing, speed of response and feel of each axis, raw and shaped."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -36,6 +36,7 @@ __all__ = [
 
 MIN_RAW_DEG = 0.05  # five steps of the sway signal: a reduction of less is a quotient of noise
 
+HORIZONTAL_DEG = 90.0
 _DIGITS = {"_deg": 2, "_s": 2, "_pct": 1}  # resolution of the sway frame, of the sampling, of both
 # Fractions of full command and speed, where a step of the command frame is 0.004; metres.
 _DIGITS_FRACTION = 3
@@ -165,19 +166,17 @@ def report_dict(
 
 def _compare(raw: Recording, shaped: Recording, still_deg: float) -> dict[str, AxisComparison]:
     raw_strokes, shaped_strokes = find_strokes(raw), find_strokes(shaped)
-    comparison = {}
+    comparison, reduced = {}, _reduction_of(raw)
     for axis in raw.axes:
         off = _measure(raw, raw_strokes[axis], axis, still_deg)
         on = _measure(shaped, shaped_strokes[axis], axis, still_deg)
         comparison[axis] = AxisComparison(
             raw=off,
             shaped=on,
-            peak_reduction_pct=_reduction_pct(off.peak_deg, on.peak_deg),
-            rms_reduction_pct=_reduction_pct(off.rms_deg, on.rms_deg),
-            residual_reduction_pct=_reduction_pct(off.residual_deg, on.residual_deg),
-            cross_residual_reduction_pct=_reduction_pct(
-                off.cross_residual_deg, on.cross_residual_deg
-            ),
+            peak_reduction_pct=reduced(off.peak_deg, on.peak_deg),
+            rms_reduction_pct=reduced(off.rms_deg, on.rms_deg),
+            residual_reduction_pct=reduced(off.residual_deg, on.residual_deg),
+            cross_residual_reduction_pct=reduced(off.cross_residual_deg, on.cross_residual_deg),
         )
     return comparison
 
@@ -221,6 +220,19 @@ def _largest(values: Iterable[float | None]) -> float | None:
     return max((value for value in values if value is not None), default=None)
 
 
+def swings_over(recording: Recording) -> bool:
+    """Whether its grapple swings above the horizontal; a real one falls into its rotator there."""
+    if recording.crane:
+        return (crane_metrics(recording, recording.crane).peak_deg or 0.0) > HORIZONTAL_DEG
+    swings = (sway for trace in recording.axes.values() for sway in trace.sway_deg or ())
+    return any(abs(sway) > HORIZONTAL_DEG for sway in swings)
+
+
+def _reduction_of(raw: Recording) -> Callable[[float | None, float | None], float | None]:
+    """How a reduction against this drive is computed: of one that swings over there is none."""
+    return (lambda _raw, _shaped: None) if swings_over(raw) else _reduction_pct
+
+
 def _reduction_pct(raw: float | None, shaped: float | None) -> float | None:
     if raw is None or shaped is None or raw < MIN_RAW_DEG:
         return None
@@ -235,7 +247,7 @@ def _crane_dict(raw: Recording, shaped: Recording, still_deg: float) -> dict[str
         for recording, crane in ((raw, raw.crane), (shaped, shaped.crane))
     )
     reductions = {
-        f"{name}_reduction_pct": _reduction_pct(off[f"{name}_deg"], on[f"{name}_deg"])
+        f"{name}_reduction_pct": _reduction_of(raw)(off[f"{name}_deg"], on[f"{name}_deg"])
         for name in ("peak", "rms", "residual")
     }
     return {**_rounded(reductions), "raw": _rounded(off), "shaped": _rounded(on)}

@@ -8,13 +8,11 @@ from rich.table import Table
 from rich.text import Text
 
 from canshaper.report.console import new_table
-from canshaper.report.metrics import MIN_RAW_DEG
+from canshaper.report.metrics import HORIZONTAL_DEG, MIN_RAW_DEG
 
 PairRow = tuple[str, str, float, int]  # words, name of the measure, scale, digits
 
 NOTHING = "-"
-# A real grapple falls into its rotator there.
-_HORIZONTAL_DEG = 90.0
 _DRIVES = {"filters off": "raw", "filters on": "shaped"}
 _AXES_A_TABLE = 3  # as many as fit 80 columns
 _SWAY_ROWS = (
@@ -44,6 +42,10 @@ def print_report(report: Mapping[str, Any], console: Console) -> None:
     """
     arrow = "→" if (console.encoding or "").lower().startswith("utf") else "->"
     if crane := report["crane"]:
+        peaks = {name: crane[one]["peak_deg"] or 0.0 for name, one in _DRIVES.items()}
+        if over := [name for name, peak in peaks.items() if peak > HORIZONTAL_DEG]:
+            text = f"The grapple swung above the horizontal with {' and '.join(over)}"
+            console.print(Text(f"{text}: these figures say nothing", "bold red"))
         console.print(_table({"whole crane": crane}, _CRANE_ROWS, arrow))
     axes = list(report["axes"].items())
     for first in range(0, len(axes), _AXES_A_TABLE):
@@ -56,14 +58,7 @@ def print_report(report: Mapping[str, Any], console: Console) -> None:
         line = _cross_line(name, axis, arrow)
         if line is not None:
             console.print(line)
-    if crane and (over := [name for name, one in _DRIVES.items() if _swings_over(crane[one])]):
-        text = f"The grapple swung above the horizontal with {' and '.join(over)}"
-        console.print(Text(f"{text}: these figures say nothing", "bold red"))
     console.print(_drive_line(report))
-
-
-def _swings_over(measures: Mapping[str, float | None]) -> bool:
-    return (measures["peak_deg"] or 0.0) > _HORIZONTAL_DEG
 
 
 def axis_title(name: str) -> str:

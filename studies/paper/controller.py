@@ -18,7 +18,7 @@ from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.grapple import Grapple
 from studies.paper import printed
 from studies.paper.bode import BodeCurve, Slewing, apart_pct, dc_gains_are_zero
-from studies.paper.plants import TICK_S, printed_mode
+from studies.paper.plants import TICK_S, printed_mode, swinging_deg
 from studies.paper.reductions import METRIC_WORDS
 from studies.paper.runs import METRICS, Metric, Run
 
@@ -27,6 +27,7 @@ _WEIGHTS: Final[dict[str, Weights]] = {"slew": PAPER_SLEW, "near_far": PAPER_NEA
 _FREE: Final = Requirements(within_command=False)
 _FITTED_HORIZON_S: Final = 1.0  # N = 50
 TUNINGS: Final = 5
+_START_DEG: Final = 10.0
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,20 @@ def facts(
         result.append(_roots(axis))
         result.append(_optimum(axis, on_progress))
     result += [_pole_distance(on_progress), _manual_rule(), *_poles_and_sway(ladders)]
-    return [*result, *_model(curves, turning)]
+    return [*result, *_model(curves, turning), _initial_sway()]
+
+
+def _initial_sway() -> Fact:
+    left, still = swinging_deg(_START_DEG)
+    return Fact(
+        "1, 5",
+        f"Initial sway, here {_START_DEG:g} deg",
+        "robust, adaptable",
+        f"{left:.1f} deg left, {still:.1f} standing still",
+        None,
+        "near-far stroke with the near-far filter, linear valve, later than 2.5 s after release: it"
+        " adds hardly any swing, and takes none of that away: no feedforward filter knows of it",
+    )
 
 
 def _roots(axis: str) -> Fact:

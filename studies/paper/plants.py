@@ -17,16 +17,18 @@ from typing import Final
 from canshaper.config.filters import filter_of
 from canshaper.design.lockstep import drive
 from canshaper.machine.deployment import Deployment
+from canshaper.report.strokes import RESIDUAL_DWELL_S
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper_sim.actuator import Actuator
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
 from canshaper_sim.crane import Crane, CraneParameters
-from canshaper_sim.grapple import Grapple
+from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.recording import AxisTrace, Recording
 from canshaper_sim.strokes import Script, Stroke
 from canshaper_sim.tip_boom import TipBoom
 from canshaper_sim.valve import ValveParameters
+from studies.paper.printed import optimal_poles
 from studies.paper.runs import Run
 
 LINEAR, REAL = "linear", "real"
@@ -91,6 +93,24 @@ def _slow_first(poles_rad_s: tuple[float, float]) -> tuple[float, float]:
     return max(poles_rad_s), min(poles_rad_s)
 
 
+def swinging_deg(start_deg: float) -> tuple[float, float]:
+    """Swing along the boom later than 2.5 s after a near-far stroke, begun while it swings so much.
+
+    Returns:
+        With the printed near-far filter, and of a crane that stands still all the time.
+    """
+    script, grapple = stroke(NEAR_FAR), Grapple()
+    still = replace(script, strokes=())
+    poles = optimal_poles(NEAR_FAR)
+    settled = round((PRESS_S + HOLD_S + RESIDUAL_DWELL_S) / TICK_S)
+    left = []
+    for one in (script, still):
+        sway = _linear_drive(NEAR_FAR, one, poles, grapple, start_deg).axes[NEAR_FAR].sway_deg
+        assert sway is not None
+        left.append(max(map(abs, sway[settled:])))
+    return left[0], left[1]
+
+
 class _LinearBoom(TipBoom):
     """A boom whose valves lag and do nothing else."""
 
@@ -110,11 +130,16 @@ class _LinearBoom(TipBoom):
 
 @cache
 def _linear_drive(
-    axis: str, script: Script, poles_rad_s: tuple[float, float] | None, grapple: Grapple
+    axis: str,
+    script: Script,
+    poles_rad_s: tuple[float, float] | None,
+    grapple: Grapple,
+    start_deg: float = 0.0,
 ) -> Recording:
     """The stroke on the linear valve; one row a tick, as the recorder of the plant writes them."""
     parameters = CraneParameters(grapple=grapple)
-    crane = Crane(parameters, boom=_LinearBoom(parameters))
+    start = Sway(theta6_rad=math.radians(start_deg))
+    crane = Crane(parameters, start, _LinearBoom(parameters))
     sway = SwayModel(printed_mode(grapple), TICK_S)
     shaper = Gff(sway, poles_rad_s) if poles_rad_s else None
     full = {

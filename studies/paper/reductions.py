@@ -43,6 +43,7 @@ CLAIMS: Final = (
 )
 AVERAGE_PCT: Final = 60.0  # abstract: "averaging a decrease of more than 60%"
 _AVERAGED: Final = CLAIMS[:3]
+_BOTH: Final = CLAIMS[0], CLAIMS[2]  # across the boom by slewing, along it by near-far
 
 
 def reduction_pct(runs: Runs, claim: Claim, plant: str, metric: Metric) -> float:
@@ -53,7 +54,7 @@ def reduction_pct(runs: Runs, claim: Claim, plant: str, metric: Metric) -> float
 
 
 def rows(runs: Runs) -> list[dict[str, Any]]:
-    """One row a claim and one for the average: the claim, ours in each reading, where it holds."""
+    """One row a claim, for the average and for both: the claim, ours in each reading, where so."""
     result = []
     for claim in CLAIMS:
         ours = {
@@ -75,7 +76,13 @@ def rows(runs: Runs) -> list[dict[str, Any]]:
         "more_than_pct": AVERAGE_PCT,
         "remark": "mean of the first three rows",
     }
-    return [*result, average | _judged(mean, AVERAGE_PCT)]
+    least = {
+        plant: {m: min(reduction_pct(runs, c, plant, m) for c in _BOTH) for m in METRICS}
+        for plant in PLANTS
+    }
+    both = average | {"section": "5", "plane": "least"}
+    both["remark"] = "as the sentence of the conclusion reads: smaller of rows 1 and 3"
+    return [*result, average | _judged(mean, AVERAGE_PCT), both | _judged(least, AVERAGE_PCT)]
 
 
 def _judged(ours: dict[str, dict[Metric, float]], more_than_pct: float) -> dict[str, Any]:

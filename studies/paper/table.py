@@ -56,6 +56,8 @@ def _reductions(rows: list[dict[str, Any]]) -> Table:
 def _what(row: Mapping[str, Any]) -> str:
     if row["plane"] == "average":
         return "mean of rows 1 to 3"
+    if row["plane"] == "least":
+        return "smaller of 1 and 3"
     return f"{row['axis'].replace('_', '-')}, {row['plane']}"
 
 

@@ -15,6 +15,8 @@ from canshaper.design.lockstep import Simulation, drive
 from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from canshaper.report.metrics import axis_metrics
+from canshaper.report.stroke_metrics import crane_metrics
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
@@ -134,6 +136,31 @@ def test_a_reversal_brakes_along_the_filter(
     print(f"{max(tilt[-150:]):.2f} degrees left, peak {max(tilt):.1f}")
     assert max(tilt[-150:]) < residual_deg
     assert max(tilt) < peak_deg
+
+
+# The demo with each filter, as one motion and apart: degrees left, run-on in m, dip of an axis.
+ALIKE = {
+    ("forwarder-gff", True): (1.3, 1.78, 0.08),
+    ("forwarder-gff", False): (5.0, 1.86, 0.06),
+    ("forwarder-robust", True): (0.9, 1.84, 0.02),
+    ("forwarder-robust", False): (5.8, 1.93, 0.0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "motion"), ALIKE)
+def test_filters_are_compared_with_the_motion_on_both_or_off_both(name: str, motion: bool) -> None:
+    deployment = load_deployment(FILE.with_name(f"{name}.yaml"))
+    if not motion:
+        deployment = dataclasses.replace(deployment, motions={})
+    recording = drive(deployment, SCRIPTS["demo"])
+    assert recording.crane is not None
+    crane = crane_metrics(recording, recording.crane)
+    dips = [axis_metrics(recording, axis).dip or 0.0 for axis in ("slew", "near_far")]
+    left, run_on_m, dip = ALIKE[name, motion]
+    assert crane.residual_deg == pytest.approx(left, abs=0.05)
+    assert crane.run_on_m == pytest.approx(run_on_m, abs=0.0051)
+    assert max(dips) == pytest.approx(dip, abs=0.005)
 
 
 @pytest.mark.slow

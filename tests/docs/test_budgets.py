@@ -20,7 +20,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 770,
+    "CHANGELOG.md": 800,
     "CONTRIBUTING.md": 560,
     "README.md": 600,
     "SECURITY.md": 430,
@@ -31,7 +31,7 @@ BUDGET = {
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 650,
-    "docs/comparison.md": 720,
+    "docs/comparison.md": 610,
     "docs/decisions.md": 895,
     "docs/deployment.md": 2210,
     "docs/devices.md": 540,
@@ -52,9 +52,9 @@ BUDGET = {
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 600,
-    "docs/tuning.md": 580,
+    "docs/tuning.md": 700,
     "docs/work.md": 250,
-    "studies/README.md": 720,
+    "studies/README.md": 760,
 }
 
 # Lines of Python, and why so many.
@@ -64,8 +64,8 @@ LINES = {
         4_830,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (57_350, "a new ability takes the room of an old one"),
-    "tests": (90_550, "one level for each behaviour"),
+    "canshaper": (57_420, "a new ability takes the room of an old one"),
+    "tests": (90_800, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (348, "one that only hands on is joined to its reader")}

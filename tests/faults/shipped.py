@@ -13,6 +13,7 @@ CONFIG = ROOT / "config"
 NAMES = (
     "forwarder",
     "forwarder-robust",
+    "forwarder-gff",
     "forwarder-sensor",
     "forwarder-joints",
     "j1939-forwarder",
@@ -84,10 +85,12 @@ def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
     """
     ranges: dict[str, tuple[float, float]] = {}
     for name, axis in machine.axes.items():
-        if load_config(CONFIG / f"{machine.name}.yaml")[0].axes[name].profiles:
+        config = load_config(CONFIG / f"{machine.name}.yaml")[0].axes[name]
+        if config.profiles:
             continue
         ranges[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
         if axis.filter == "gff":
-            ranges[f"axes.{name}.filter.a1"] = (0.6, 0.8)
-            ranges[f"axes.{name}.filter.a2"] = (0.08, 0.16)
+            numbers = config.filter.parameters()
+            ranges[f"axes.{name}.filter.a1"] = (0.85 * numbers["a1"], 1.13 * numbers["a1"])
+            ranges[f"axes.{name}.filter.a2"] = (0.67 * numbers["a2"], 1.33 * numbers["a2"])
     return ranges

@@ -201,3 +201,18 @@ def test_a_pole_that_is_not_negative_or_too_fast_for_the_tick_is_refused(bad: fl
         with pytest.raises(ValueError, match=says):
             Gff(sway, poles)
     Gff(sway, (-50.0, -3.0))
+
+
+def test_other_discretisations_bring_swing_back() -> None:
+    """Eq. 13 at 20 ms by a zero-order hold and by Tustin, at the poles of the swing it is for."""
+    left: dict[str, list[float]] = {"zoh": [], "bilinear": []}
+    for mode in (SwayMode.from_grapple(1.2, 120.0, 300.0), SwayMode.from_period(2.356, 0.038)):
+        w, zeta = mode.omega_rad_s, mode.damping_ratio
+        at = np.exp(mode.pole * 0.02)
+        for a1, a2 in ((0.42, 0.043), (0.708, 0.12)):
+            for method, found in left.items():
+                eq_13 = ([1.0 / w**2, 2.0 * zeta / w, 1.0], [a2, a1, 1.0])
+                b, a, _ = signal.cont2discrete(eq_13, 0.02, method)
+                found.append(float(100.0 * abs(np.polyval(b.ravel(), at) / np.polyval(a, at))))
+    assert [round(f(left["zoh"]), 1) for f in (min, max)] == [3.0, 9.0]
+    assert round(max(left["bilinear"]), 2) == 0.04

@@ -47,8 +47,9 @@ def check(
     is a warning; so is an interface of this machine that is not the device of its bus, and an axis
     that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
     not start; and a filter that was designed for another swing, valve or tail than the file has
-    now; and what was measured on a simulated crane, or is assumed; and what a machine may have but
-    is more often a mistake, such as one joystick signal on two valves.
+    now, and one that leaves more than a tenth of the swing; and what was measured on a simulated
+    crane, or is assumed; and what a machine may have but is more often a mistake, such as one
+    joystick signal on two valves.
 
     Examples:
 
@@ -77,6 +78,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
     """Everything as plain data; travel in seconds of full speed."""
     from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import stopping
+    from canshaper.design.tuning.verdict import verdicts
 
     config, loads = (
         deployment.config,
@@ -101,6 +103,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
             for name, bus in config.buses.items()
         },
         "hydraulics": config.hydraulics and config.hydraulics.model_dump(exclude_none=True),
+        "filters": [{"place": [*place], **one.as_dict()} for place, one in verdicts(deployment)],
         "codes": [code._asdict() for code in deployment.codes],
         "start_values": [one._asdict() for one in deployment.starts],
         "axes": {
@@ -123,6 +126,7 @@ def _print(deployment: "Deployment") -> None:
     """Everything for people."""
     from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import print_stopping
+    from canshaper.design.tuning.verdict import verdicts
     from canshaper.gate.build import record_of
     from canshaper.report.console import SafeConsole
 
@@ -145,8 +149,10 @@ def _print(deployment: "Deployment") -> None:
         )
         for line in _of_axis(deployment, name):
             echo(f"    {line}")
-    for motion in config.motion.values():
-        echo(_motion(deployment, motion))
+    judged = sorted(verdicts(deployment), key=lambda one: one[1].left)[-1:]
+    lines = [f"  worst filter: {place[1]}, {verdict}" for place, verdict in judged]
+    for line in (*lines, *(_motion(deployment, motion) for motion in config.motion.values())):
+        echo(line)
     moved = {motion.slew for motion in config.motion.values()}
     for name, section in config.axes.items():
         if section.slewing and section.sway and name not in moved:
@@ -242,13 +248,13 @@ def _pendulums(bound: "BoundAxis", tick_s: float, usual_pct: "Sequence[float]") 
     from canshaper.design.tuning.evaluate import gain_at, shaper_of, step_response
     from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
-    config = bound.config
+    config, rate = bound.config, bound.config.limits.slowest_per_s
     own = "load not known " if config.gain_schedule else ""
     loads = [(f"at {one.breakpoint:g} ", one.sway, one.filter) for one in config.gain_schedule]
     for name, sway, chosen in (*loads, (own, config.sway, config.filter)):
         assert sway is not None
         mode, percents = sway.mode(), usual_pct
-        steps = step_response(mode, tick_s, shaper_of(bound, tick_s, chosen))
+        steps = step_response(mode, tick_s, shaper_of(chosen, tick_s, rate))
         if (design := chosen.design()) and (range_pct := design.length_range_pct):
             mode = SwayMode.from_period(design.period_s, design.damping_ratio)
             percents = -range_pct, range_pct

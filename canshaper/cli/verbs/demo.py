@@ -93,7 +93,7 @@ def demo(
 
       canshaper demo --lockstep --script pulse-slew --rest 20
 
-      canshaper demo forwarder.yaml --lockstep  # the paper's filter
+      canshaper demo forwarder-gff.yaml --lockstep  # the paper's filter
 
       canshaper demo --set grapple.l2_m=1.5
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import FILE, PICTURE, REPORT, echo, loader, refuse_shipped
+from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, echo, loader, refuse_shipped
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def robust(
         help="A second mode too: s, damping ratio, +- % of its length.",
     ),
     write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
+    force: bool = typer.Option(False, "--force", help="Write what leaves half of the swing too."),
     as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
     picture: Path | None = PICTURE,
     report: Path | None = REPORT,
@@ -52,8 +53,8 @@ def robust(
     """Design the shaper that leaves least swing over a range of pendulum lengths.
 
     A non-negative impulse response within the valve's rate, by linear programming, with a least tap
-    that makes one movement of a tap of the joystick. Prints what it does and, without --write, the
-    lines for the file.
+    that makes one movement of a tap of the joystick. Prints what it does, whether that is good and,
+    without --write, the lines for the file. Exit code 1 where more than half of the swing is left.
 
     With --lengths one response holds from an empty grapple to a full one; the swing in the file
     becomes that of the middle. Of several least taps the one counts that leaves least through the
@@ -102,6 +103,8 @@ def robust(
         print_design(deployment, designs[0], results)
     if path := results.picture(None, lambda: figure(designs[0])):
         results.picture_line(path)
+    useless = any(one.verdict.useless for one in designs) and not force
+    write = write and not useless
     changed = write_design(deployment, *designs) if write else []
     if as_json:
         data = {"loads": [*map(_result, designs)]} if loads else _result(designs[0])
@@ -112,6 +115,8 @@ def robust(
     lines = [*changed, written_line(deployment.path)] if write else lines
     results.print("\n".join(lines), soft_wrap=True)
     results.write()
+    if useless:
+        raise typer.Exit(EXIT_USELESS)
 
 
 def _result(one: "RobustDesign") -> dict[str, Any]:
@@ -123,4 +128,5 @@ def _result(one: "RobustDesign") -> dict[str, Any]:
         "mean_delay_s": one.shaper.mean_delay_s,
         "measures": asdict(one.measured),
         "tail_needed_s": one.needed_s,
+        "verdict": one.verdict.as_dict(),
     }

@@ -70,8 +70,12 @@ def candidates(deployment: Deployment) -> list[Candidate]:
         designs.append(Candidate(name, filters, ours=True))
     every += designs
     if deployment.motions:
-        name = _short(designs[1].name) + " apart"
-        every.append(replace(designs[1], name=name, motion=False))
+        alike = {designs[1].name: _short(designs[1].name), "G_FF third pole -4": "G_FF 3rd pole"}
+        every += [
+            replace(one, name=f"{alike[one.name]} apart", motion=False)
+            for one in every
+            if one.name in alike
+        ]
     configs = {axis: deployment.axes[axis].config for axis in AXES}
     if all(config.gain_schedule for config in configs.values()):
         own = {axis: config.filter for axis, config in configs.items()}

@@ -149,41 +149,6 @@ def flatness(tuning: Tuning) -> str:
     return f"{' and '.join(ranges)} rad/s cost at most {100 * FLAT:.0f} % more"
 
 
-def as_dict(tuning: Tuning, setting: Setting) -> dict[str, Any]:
-    """Everything of a tuning, for ``--json``."""
-    m = setting.measures
-    return {
-        "method": tuning.method,
-        "a1": setting.a1,
-        "a2": setting.a2,
-        "poles_rad_s": list(setting.poles_rad_s),
-        "third_pole_rad_s": setting.third_pole_rad_s,
-        "cost": tuning.cost,
-        "active": list(tuning.active),
-        "ranges_rad_s": [list(r) for r in tuning.ranges_rad_s],
-        "starts": tuning.starts,
-        "converged": tuning.converged,
-        "build_s": tuning.build_s,
-        "solve_s": tuning.solve_s,
-        **measures_dict(m),
-    }
-
-
-def measures_dict(m: Evaluation) -> dict[str, Any]:
-    """Measures of a setting; residuals as fractions."""
-    return {
-        "first_jump": m.first_jump,
-        "peak": m.peak,
-        "rise_s": m.rise_s,
-        "run_on_s": m.run_on_s,
-        "mean_delay_s": m.mean_delay_s,
-        "residuals": [
-            {"length_pct": r.length_pct, "linear": r.linear, "machine": r.machine}
-            for r in m.residuals
-        ],
-    }
-
-
 def _up(value: float) -> float:
     """Round up to ``_DIGITS`` significant digits."""
     digits = _DIGITS - 1 - math.floor(math.log10(value))
@@ -214,6 +179,7 @@ def table(setting: Setting, before: Setting | None, method: str) -> Table:
     row("first jump, %", lambda c: f"{100 * c.measures.first_jump:.0f}")
     row("largest output, %", lambda c: f"{100 * c.measures.peak:.0f}")
     row("rise to 95 %, s", lambda c: f"{c.measures.rise_s:.2f}")
+    row("dip while held, %", lambda c: f"{100 * c.measures.dip:.0f}")
     row("run-on, s", lambda c: f"{c.measures.run_on_s:.2f}")
     row("mean delay, s", lambda c: f"{c.measures.mean_delay_s:.2f}")
     result.add_row("swing left, %: machine | filter alone")

@@ -9,6 +9,7 @@ import cmath
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Self
 
 from canshaper.config.filters import Filter
@@ -23,12 +24,13 @@ from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
+Moves = Sequence[tuple[float, list[float]]]
 ShaperFor = Callable[[SwayModel], Shaper]
 
-LENGTHS_PCT: tuple[float, ...] = (-30, -20, -10, 0, 10, 20, 30)
+LENGTHS_PCT = (-30, -20, -10, 0, 10, 20, 30)
 RISEN = 0.95
 # A response is watched until it stays this close to its end, and no longer than this.
-_AT_END, _LONGEST_S = 1e-9, 120.0
+_AT_END, _LONGEST_S, _HELD_S = 1e-9, 120.0, 4.0
 # Longer than any plateau between two taps (half the longest second mode of 12 s).
 _STILL_S = 8.0
 
@@ -92,6 +94,7 @@ class Evaluation:
             crane runs on.
         mean_delay_s: area between command and output: how much further the crane goes after a
             release, in seconds of full speed.
+        dip: largest fall of the output, through the limits, while the joystick is held.
         residuals: residual sway over the length error.
     """
 
@@ -100,6 +103,7 @@ class Evaluation:
     rise_s: float
     run_on_s: float
     mean_delay_s: float
+    dip: float
     residuals: tuple[Residual, ...]
 
     def worst(self, within_pct: float = 30.0) -> float:
@@ -120,15 +124,17 @@ class Traces:
     swing_raw: tuple[float, ...]
 
 
-def shaper_of(bound: BoundAxis, tick_s: float, chosen: Filter) -> ShaperFor:
-    """A filter of an axis."""
-    rate, parameters = bound.config.limits.slowest_per_s, chosen.parameters()
-    return lambda sway: build_shaper(chosen.kind, tick_s, sway, valve_rate_per_s=rate, **parameters)
-
-
 def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
     """G_FF of any axis with these poles."""
     return lambda sway: Gff(sway, poles_rad_s, third_pole_rad_s=third_pole_rad_s)
+
+
+def shaper_of(chosen: Filter, tick_s: float, valve_rate_per_s: float) -> ShaperFor:
+    """A filter as a file describes it."""
+    parameters = chosen.parameters()
+    return lambda sway: build_shaper(
+        chosen.kind, tick_s, sway, valve_rate_per_s=valve_rate_per_s, **parameters
+    )
 
 
 def evaluate(
@@ -156,39 +162,23 @@ def evaluate(
     outside = [k for k, value in enumerate(y) if abs(value - end) > SETTLED * abs(end)]
     run_on_s = (outside[-1] + 1) * tick_s if outside else 0.0
     machine = machine or Machine()
-    hold_s = min(_LONGEST_S, max(4.0, 2.0 * run_on_s + 1.0, machine.limits.tail_s + 1.0))
-    trues = [at_length(mode, 1.0 + percent / 100.0) for percent in lengths_pct]
-    left = swing_left(mode, tick_s, shaper_for, machine, trues, hold_s=hold_s)
-    linear = [gain_at(true, tick_s, y) for true in trues]
-    residuals = map(Residual, lengths_pct, linear, left)
+    hold_s = min(_LONGEST_S, max(_HELD_S, 2.0 * run_on_s + 1.0, machine.limits.tail_s + 1.0))
+    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
+    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
+    residuals, sent = [], shaped[0][1]
+    for percent in lengths_pct:
+        true = at_length(mode, 1.0 + percent / 100.0)
+        worst = _worst(true, tick_s, machine, shaped, raw)
+        residuals.append(Residual(percent, gain_at(true, tick_s, y), worst))
     return Evaluation(
         first_jump=y[0],
         peak=max(y),
         rise_s=(below[-1] + 1) * tick_s if below else 0.0,
         run_on_s=run_on_s,
         mean_delay_s=sum(1.0 - value / end for value in y) * tick_s,
+        dip=max(top - value for top, value in zip(accumulate(sent, max), sent, strict=True)),
         residuals=tuple(residuals),
     )
-
-
-def swing_left(
-    mode: SwayMode,
-    tick_s: float,
-    shaper_for: ShaperFor,
-    machine: Machine,
-    trues: Sequence[SwayMode],
-    *,
-    hold_s: float = 4.0,
-) -> list[float]:
-    """See ``Residual.machine``, of each true pendulum; the joystick is held, then rests so long."""
-    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
-    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
-
-    def left(true: SwayMode, move: tuple[float, list[float]]) -> float:
-        return _swing_left(true, tick_s, machine.lag_s, move)
-
-    pairs = [*zip(shaped, raw, strict=True)]
-    return [max(left(true, one) / left(true, other) for one, other in pairs) for true in trues]
 
 
 def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[float]:
@@ -255,6 +245,37 @@ def _swing(
     """Angle of the true pendulum at each tick; see ``_modal``."""
     damped = mode.pole.imag
     return [c.imag / damped for c in _modal(mode, tick_s, lag_s, speed, sent)]
+
+
+def swing_left(
+    mode: SwayMode,
+    tick_s: float,
+    shaper_for: ShaperFor,
+    machine: Machine,
+    trues: Sequence[SwayMode],
+) -> list[float]:
+    """See ``Residual.machine``, of each true pendulum."""
+    shaped = _press_and_release(mode, tick_s, shaper_for, machine, _HELD_S)
+    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, _HELD_S)
+    return [_worst(true, tick_s, machine, shaped, raw) for true in trues]
+
+
+def _worst(
+    true: SwayMode,
+    tick_s: float,
+    machine: Machine,
+    shaped: Moves,
+    raw: Moves,
+) -> float:
+    """See ``Residual.machine``."""
+    left, unshaped = (
+        [_swing_left(true, tick_s, machine.lag_s, move) for move in moves]
+        for moves in (shaped, raw)
+    )
+    worst = max(a / b for a, b in zip(left, unshaped, strict=True))
+    if shaped[0][1][-1] < 0.5 * machine.limits.maximum:
+        return max(worst, 1.0)  # no swing, because its first steps are rounded to none
+    return worst
 
 
 def _swing_left(

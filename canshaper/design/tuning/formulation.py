@@ -28,6 +28,10 @@ POLE_DISTANCE = 5.0
 # second and 2.86 rad/s. Faster ones make the limit-aware filter chase a valve that cannot follow;
 # docs/tuning.md shows where it breaks.
 POLE_PER_RATE = 1.6
+# Poles slower than the swing leave more of it, so a slow valve may be chased up to there.
+SLOW_POLE_PER_RATE = 2.6
+# Above this damping ratio less than a seventh of a swing is left of the one before it.
+MOST_DAMPED = 0.3
 # The schema of the deployment file.
 SLOWEST_RAD_S, FASTEST_RAD_S = 0.1, 100.0
 # Part of full speed that the output must stay within for the run-on to be over.
@@ -48,27 +52,44 @@ class Weights:
     """Weights of Eq. 15; the defaults are those of the paper's slewing axis.
 
     Attributes:
-        q: diagonal of Q.
+        q: Q: one number for both states, its diagonal, or the rows of the symmetric matrix.
         r: weight R of the distance from 95 % of the command (rise time).
         s: weight S of the distance from the command.
         p: weight P of the change of the output from sample to sample.
 
     Raises:
-        DesignError: a weight is negative or no number, or R and S are both zero (then the best
-            filter would be one that never moves).
+        DesignError: a weight is negative or no number, Q is no positive semi-definite matrix, or R
+            and S are both zero (then the best filter would be one that never moves).
     """
 
-    q: tuple[float, float] = (1.0, 1.0)
+    q: tuple[float, ...] = (1.0, 1.0)
     r: float = 1.0
     s: float = 3.0
     p: float = 1.0
 
     def __post_init__(self) -> None:
-        named = (("Q", self.q[0]), ("Q", self.q[1]), ("R", self.r), ("S", self.s), ("P", self.p))
+        if len(self.q) not in (1, 2, 4):
+            text = "1 number, 2 of the diagonal or 4 of the rows"
+            raise DesignError(f"weight Q: expected {text}, got {len(self.q)}")
+        q11, q12, q22 = self.matrix
+        named = (("Q", q11), ("Q", q22), ("R", self.r), ("S", self.s), ("P", self.p))
         for name, value in named:
             in_range(f"weight {name}", value, 0.0, 1e6)
+        if len(self.q) == 4 and q12 != self.q[2]:
+            raise DesignError(
+                f"weight Q: expected a symmetric matrix, got {q12:g} and {self.q[2]:g}"
+            )
+        most = math.sqrt(q11 * q22)
+        if not abs(q12) <= most * (1.0 + 1e-12):
+            text = f"{-most:g} to {most:g} beside the diagonal (positive semi-definite)"
+            raise DesignError(f"weight Q: expected {text}, got {q12:g}")
         if self.r + self.s == 0.0:
             raise DesignError("weights R and S: expected one above 0, got both 0")
+
+    @property
+    def matrix(self) -> tuple[float, float, float]:
+        """Q as q11, q12, q22."""
+        return self.q[0], self.q[1] if len(self.q) == 4 else 0.0, self.q[-1]
 
 
 PAPER_SLEW = Weights()
@@ -111,6 +132,15 @@ class Requirements:
             in_range("run-on", self.max_run_on_s, 0.05, 20.0, "s")
 
 
+def check_swing(mode: SwayMode) -> None:
+    """DesignError for a tool that swings out by itself: a filter would only prolong it."""
+    if mode.damping_ratio > MOST_DAMPED:
+        raise DesignError(
+            f"damping ratio: expected 0 to {MOST_DAMPED:g}, got {mode.damping_ratio:.3g}: the tool"
+            " comes to rest by itself in a swing; filter: { kind: off }"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Task:
     """One tuning: sway mode, sampling, what to minimise and what to keep.
@@ -138,6 +168,7 @@ class Task:
     length_range_pct: float | None = None
 
     def __post_init__(self) -> None:
+        check_swing(self.mode)
         in_range("tick", self.tick_s, 1e-3, 0.2, "s")
         in_range("horizon", self.horizon_s, max(0.2, 5.0 * self.tick_s), 60.0, "s")
         if self.states not in get_args(States):
@@ -176,7 +207,8 @@ class Task:
         ]
         if self.require.max_rate_per_s is not None:
             at_rate = math.sqrt(self.require.max_rate_per_s * self.mode.omega_rad_s)
-            bounds.append((POLE_PER_RATE * at_rate, "rate of the valve"))
+            floor = min(SLOW_POLE_PER_RATE * at_rate, self.mode.omega_rad_s)
+            bounds.append((max(POLE_PER_RATE * at_rate, floor), "rate of the valve"))
         if self.require.pole_distance == "printed":
             bounds.append((POLE_DISTANCE * -self.mode.pole.real, "pole distance (14e, printed)"))
         return min(bounds)

@@ -4,6 +4,7 @@ Drawn through the object API of matplotlib, like ``canshaper.report.plot``.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
+from canshaper.design.tuning.preference import Choice
 from canshaper.report.style import (
     JOYSTICK_COLOUR,
     MINUS,
@@ -36,6 +38,7 @@ def figure(
     machine: Machine,
     full_speed_m_s: float,
     before: Setting | None = None,
+    choices: Sequence[Choice] = (),
 ) -> Figure:
     """The picture of a setting.
 
@@ -47,6 +50,7 @@ def figure(
         machine: what stands behind the filter.
         full_speed_m_s: speed of the tip at full command, for the swing in degrees.
         before: the setting in the file, to compare with.
+        choices: front of settings from quick to calm that it was chosen of, drawn below.
     """
     duration_s = max(3.0, 1.5 * setting.measures.run_on_s, 1.5 * mode.period_s)
     shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
@@ -60,9 +64,12 @@ def figure(
     left = halves[0].subgridspec(2, 1, hspace=0.12)
     command = fig.add_subplot(left[0])
     swing = fig.add_subplot(left[1], sharex=command)
-    length = fig.add_subplot(halves[1])
+    right = halves[1].subgridspec(2 if choices else 1, 1, hspace=0.3)
+    length = fig.add_subplot(right[0])
     for panel in (command, swing, length):
         plain(panel)
+    if choices:
+        _draw_front(fig.add_subplot(right[1]), choices, setting.measures)
     _draw_command(command, traces, setting.measures)
     to_deg = math.degrees(mode.angle_per_speed_rad * full_speed_m_s)
     _draw_swing(swing, traces, to_deg)
@@ -147,6 +154,18 @@ def _draw_swing(panel: Axes, traces: Traces, to_deg: float) -> None:
     panel.set_ylim(-1.15 * largest, 1.3 * largest)
     panel.set_ylabel("swing of the grapple, degrees", **_LABEL)
     panel.set_xlabel("time after a full press, s", **_LABEL)
+
+
+def _draw_front(panel: Axes, choices: Sequence[Choice], chosen: Evaluation) -> None:
+    """Dip and swing left over the rise of each setting that no other one beats."""
+    plain(panel)
+    rise_s = [one.felt[0] for one in choices]
+    for at, text, colour in ((2, "dip while held", "#56A0D3"), (3, "left, ±10 %", SHAPED_COLOUR)):
+        panel.plot(rise_s, [100.0 * one.felt[at] for one in choices], "o", color=colour, label=text)
+    panel.axvline(chosen.rise_s, color="#888888", linewidth=1.0, linestyle=":")
+    panel.set_xlabel("rise to 95 %, s: quick to calm; dotted: this setting", **_LABEL)
+    panel.set_ylabel("%", **_LABEL)
+    panel.legend(loc="upper right", frameon=False)
 
 
 def _draw_length(panel: Axes, measures: Evaluation, before: Evaluation | None) -> None:

@@ -223,9 +223,11 @@ def _cost(task: Task, z: Any) -> Any:
         "none": (0.0, 0.0),
     }
     x1, x2 = choices[task.states]
+    q11, q12, q22 = weights.matrix
     stage = (
-        weights.q[0] * x1**2
-        + weights.q[1] * x2**2
+        q11 * x1**2
+        + 2.0 * q12 * x1 * x2
+        + q22 * x2**2
         + weights.r * (y - 0.95) ** 2
         + weights.s * (y - 1.0) ** 2
         + weights.p * (y - y_before) ** 2

@@ -1,4 +1,6 @@
-"""What studies/README.md says of Eq. 7 - 9 and A3 as printed: held against the derived equations.
+"""What studies/README.md says of Eq. 7 - 11, A3 and A4 as printed, against the derived equations.
+
+Eq. 12 is in test_linear.py.
 
 The expressions are analytic in every argument, so agreement at two hundred random states to 1e-8
 is an identity, and one clear difference refutes one.
@@ -13,6 +15,8 @@ import pytest
 from studies.crane.config import GrappleData
 from studies.crane.dynamics import SwayDynamics, TipMotion
 from studies.crane.kinematics import Array
+from studies.crane.linear import OperatingPoint, closed_form, linearise
+from studies.crane.statespace import STATES, SwayStateSpace
 from studies.crane.tests.motion import SwayStates
 from studies.crane.tests.printed import (
     PRINTED_TURN,
@@ -179,6 +183,44 @@ def test_kinetic_energy_a3(grapple: GrappleData, states: SwayStates) -> None:
         worst.append(max(differences))
     assert worst[3] < 1e-9
     assert min(worst[:3]) > 50.0  # J
+
+
+def test_potential_energy_a4_is_right_as_printed(grapple: GrappleData, states: SwayStates) -> None:
+    """m g (z_tip - l3 cos theta5), of the one mass that A3 has."""
+    without_link = SwayDynamics(grapple.model_copy(update={"m1_kg": 0.0}))
+    for sway, _, tip in states.rows:
+        l3 = grapple.l1_m + grapple.l2_m * math.cos(sway[1])
+        printed = grapple.m2_kg * 9.81 * (tip.position[2] - l3 * math.cos(sway[0]))
+        potential = float(without_link.energy(sway, np.zeros(2), tip.position, np.zeros(3))[1])
+        assert potential == pytest.approx(printed, abs=1e-8)
+
+
+def test_equation_10_is_linearised_at_the_wrong_place(grapple: GrappleData) -> None:
+    """Its point has eight entries for seven states, with the radius of 3 m at place 7, the height.
+
+    Read so the radius is 0, and slewing does not swing the grapple across the boom.
+    """
+    printed, right = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0]
+    assert (len(printed), len(right)) == (8, len(STATES))
+    gain = SwayStateSpace(grapple).input_gain
+    heading, radius, height = (STATES.index(name) for name in ("theta1", "x", "z"))
+    for point, drive in ((printed, 0.0), (right, -2.178)):
+        tip = [point[heading], point[radius], point[height]]
+        across = float(gain([point[0], point[2]], tip)[0, 0])
+        assert across == pytest.approx(drive, abs=1e-3)
+
+
+def test_equation_11_is_simplified_for_a_reason_that_holds_for_every_entry(
+    grapple: GrappleData,
+) -> None:
+    """DC gains of 0 make none negligible: G11 and G22 do too. At rest four are 0 at any s."""
+    at_rest = closed_form(grapple, OperatingPoint(3.0))
+    assert [g(0.0) for row in at_rest for g in row] == [0.0] * 6
+    zero = [(i, j) for i in range(2) for j in range(3) if at_rest[i][j](2.0j) == 0.0]
+    assert zero == [(0, 1), (0, 2), (1, 0), (1, 2)]
+    turning = linearise(grapple, OperatingPoint(3.0, 0.5)).at(2.0j)
+    assert np.abs(turning).min() > 0.0
+    assert abs(turning[1, 0]) > 0.5 * abs(turning[0, 0])
 
 
 def test_poles_of_section_4() -> None:

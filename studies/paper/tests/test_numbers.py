@@ -103,6 +103,12 @@ def test_limit_aware_controller_on_a_real_valve_is_close_to_the_ideal(
         assert real > ideal - 3.0
 
 
+def test_both_directions_hold_for_the_residual_only(table: dict[str, Any]) -> None:
+    both = table["reductions"][-1]
+    assert (both["section"], both["plane"]) == ("5", "least")
+    assert both["holds_for"] == {"linear": ["residual"], "real": ["residual"]}
+
+
 def test_verdicts_follow_from_the_numbers(table: dict[str, Any]) -> None:
     for claim in table["reductions"]:
         for plant, values in claim["ours_pct"].items():
@@ -189,6 +195,7 @@ def test_printed_poles_and_optima(table: dict[str, Any]) -> None:
     assert facts["Fig. 3: poles far out"]["agrees"] is False
     assert facts["Fig. 4: poles far out"]["agrees"] is True
     assert facts["Factor 3 (the radius in m)"]["ours"] == "in G11"
+    assert facts["Initial sway, here 10 deg"]["ours"] == "4.0 deg left, 4.0 standing still"
 
 
 def test_json_has_no_nan(table: dict[str, Any], numbers: dict[int, dict[str, Any]]) -> None:

@@ -10,4 +10,6 @@ from tests.edit.edited import FILE
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    return Path(shutil.copy(FILE, tmp_path / "machine.yaml"))
+    (tmp_path / "dbc").symlink_to(FILE.parents[1] / "dbc")
+    (tmp_path / "config").mkdir()
+    return Path(shutil.copy(FILE, tmp_path / "config" / "machine.yaml"))

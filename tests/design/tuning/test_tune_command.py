@@ -23,7 +23,8 @@ ROOT = Path(__file__).resolve().parents[3]
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 DESIGNED = (
     "designed_for: { period_s: 2.356, damping_ratio: 0.038, duration_s: 2.8,"
-    " valve_rate_per_s: 5.0 }"
+    " valve_rate_per_s: 5.0, objective: { q: [1.0, 1.0], r: 1.0, s: 3.0, p: 1.0, states: sway,"
+    " pole_distance: text, horizon_s: 3.0, third_pole: false, within_command: true } }"
 )
 UNSTATED = (", stop_distance_m: 1 }", " }")
 
@@ -91,7 +92,7 @@ def test_write_and_write_back(file: Path) -> None:
         a for a, b in zip(file.read_text().splitlines(), before.splitlines(), strict=True) if a != b
     ]
     assert len(changed) == 1
-    result = run(file, "--axis", "slew", "--write", "--json", "--starts", "1")
+    result = run(file, "--axis", "slew", "--two-poles", "--write", "--json", "--starts", "1")
     assert result.exit_code == 0, result.output
     printed = json.loads(result.stdout)
     after = load_config(file)[0].axes["slew"].filter.parameters()
@@ -175,7 +176,7 @@ def test_another_filter_is_replaced_on_write(file: Path) -> None:
     file.write_text(
         file.read_text().replace("{ kind: gff, a1: 0.708, a2: 0.12 }\n", "{ kind: zv }\n")
     )
-    result = run(file, "--axis", "slew", "--method", "manual", "--write")
+    result = run(file, "--axis", "slew", "--method", "manual", "--write", "--force")
     assert result.exit_code == 0, result.output
     assert "in the file" not in result.output
     assert load_config(file)[0].axes["slew"].filter.kind == "gff"

@@ -26,8 +26,11 @@ def run(context: Context) -> Outcome:
             "residual_pct": round(100.0 * one.shaper.residual, 2),
             "duration_s": round(one.shaper.duration_s, 3),
             "mean_delay_s": round(one.shaper.mean_delay_s, 3),
+            "verdict": one.verdict.word,
         }
         outcome.figures[name] = partial(figure, one)
+        if one.verdict.useless:
+            outcome.poor.append(f"{name}: {one.verdict}")
     outcome.edit = partial(_write, designs=designs)
     return outcome
 

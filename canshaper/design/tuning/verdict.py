@@ -1,0 +1,129 @@
+"""Whether a filter damps on its machine: what is left of the swing, and what would leave less.
+
+Left is the larger of a full press and a full release, through the limits of the axis (tail, rates,
+smallest output) and a lagging valve, as a part of what the same movement leaves without filter.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
+
+from canshaper.config.source import Place
+from canshaper.design.tuning.evaluate import Machine, ShaperFor, evaluate, shaper_of
+from canshaper.design.tuning.formulation import MOST_DAMPED
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import every_filter
+from canshaper.shaping.sway import SwayMode
+
+# Of the swing: up to GOOD is left by a good filter, more than USELESS by one that is not written.
+GOOD, USELESS = 0.10, 0.50
+_LONGEST_TENTHS = 50  # of a second: the longest tail of a file
+_FASTER = (1.5, 2.0, 3.0, 5.0)  # times the rate of the valve
+# A change is worth naming that leaves less than this part.
+_HELPS = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a filter leaves.
+
+    Attributes:
+        left: largest part of the swing that is left at the lengths looked at.
+        length_pct: how much longer the pendulum is there than the sway data says.
+        cures: what would leave less, each with how much, in words; none for a good filter.
+    """
+
+    left: float
+    length_pct: float
+    cures: tuple[str, ...] = ()
+
+    @property
+    def useless(self) -> bool:
+        """Whether it is not to be written."""
+        return self.left > USELESS
+
+    @property
+    def word(self) -> str:
+        """Good, poor or useless."""
+        return "useless" if self.useless else "poor" if self.left > GOOD else "good"
+
+    def with_cure(self, left: float, change: str) -> Self:
+        """Itself with a change in front, where it is not good and that leaves less."""
+        if self.left <= GOOD or left >= _HELPS * self.left:
+            return self
+        text = f"{change} would leave {100.0 * left:.1f} %"
+        return replace(self, cures=(text, *self.cures))
+
+    def as_dict(self) -> dict[str, Any]:
+        """For ``--json``."""
+        return {"word": self.word, **asdict(self)}
+
+    def __str__(self) -> str:
+        at = f"a length {self.length_pct:+g} % wrong" if self.length_pct else "the right length"
+        text = f"{self.word}: {100.0 * self.left:.1f} % of the swing is left at {at}"
+        if self.word == "good":
+            return text
+        cures = "; ".join(self.cures) or "neither tail nor valve help: design it again"
+        return f"{text}, expected {100.0 * GOOD:g} % or less; {cures}"
+
+
+def judge(
+    mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, range_pct: float = 0.0
+) -> Verdict:
+    """Judge a filter at the right length and at both ends of the range that it covers.
+
+    Args:
+        mode: sway mode as the file says.
+        tick_s: period of the axis.
+        shaper_for: makes the filter on a sway model.
+        machine: what stands behind it.
+        range_pct: length error that it covers, +- %.
+    """
+    lengths = (-range_pct, 0.0, range_pct) if range_pct else (0.0,)
+    residuals = evaluate(mode, tick_s, shaper_for, machine, lengths).residuals
+    worst = max(residuals, key=lambda one: one.machine)
+    verdict = Verdict(worst.machine, worst.length_pct)
+    if verdict.word == "good":
+        return verdict
+    if mode.damping_ratio > MOST_DAMPED:
+        return replace(verdict, cures=("filter: { kind: off }: the tool comes to rest by itself",))
+    if worst.length_pct:
+        right = next(one.machine for one in residuals if not one.length_pct)
+        verdict = verdict.with_cure(right, "the right length")
+    for changes in (_faster(machine), _longer(machine)):
+        best, what = math.inf, ""
+        for words, changed in changes:
+            other = replace(machine, limits=replace(machine.limits, **changed))
+            left = evaluate(mode, tick_s, shaper_for, other, (worst.length_pct,)).worst(100.0)
+            best, what = min((best, what), (left, words))
+            if best <= GOOD:
+                break
+        verdict = verdict.with_cure(best, what)
+    return verdict
+
+
+def _longer(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
+    for tenths in range(int(10.0 * machine.limits.tail_s) + 1, _LONGEST_TENTHS + 1):
+        yield f"tail_s: {tenths / 10.0:g}", {"tail_s": tenths / 10.0}
+
+
+def _faster(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
+    limits = machine.limits
+    for times in _FASTER:
+        rate = times * min(limits.rise_per_s, limits.fall_per_s)
+        rates = {name: max(rate, getattr(limits, name)) for name in ("rise_per_s", "fall_per_s")}
+        slow = " and ".join(name for name, one in rates.items() if one > getattr(limits, name))
+        yield f"a valve with {slow} of {rate:.3g}", rates
+
+
+def verdicts(deployment: Deployment) -> Iterator[tuple[Place, Verdict]]:
+    """What each filter of a swinging axis leaves, profiles and breakpoints too, by its place."""
+    for name, bound in deployment.axes.items():
+        tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
+        rate, machine = bound.config.limits.slowest_per_s, Machine.of(bound)
+        for place, chosen, sway in every_filter(("axes", name), bound.config):
+            if sway is not None and chosen.kind != "off":
+                design, shaper = chosen.design(), shaper_of(chosen, tick_s, rate)
+                range_pct = (design.length_range_pct if design else None) or 0.0
+                yield place, judge(sway.mode(), tick_s, shaper, machine, range_pct)
