@@ -81,9 +81,9 @@ class TestAdded:
         one.rests()
         left = [one.sends(31, slew=1.0) for _ in range(200)]
         first = [bool(why) for why in left].index(True)
-        assert "limit=path" in left[first]
-        way_m = first * 0.02 * 0.248 * one.axis.of.full_m_s
-        assert way_m == pytest.approx(1.1 * one.axis.of.path_m, abs=0.02)
+        assert "near_far limit=path of added velocity speed=" in left[first]
+        # a tenth more than 0.3 m, and 0.01 s, in steps of 0.248 * 0.02
+        assert (first, one.axis.of.full_m_s) == (68, 1.0)
         assert one.axis.of.path_m == 0.3
         one = self.robust()
         one.rests()
@@ -94,7 +94,7 @@ class TestAdded:
         one.rests()
         left = [one.sends(10, near_far=1.0) for _ in range(400)]
         first = [bool(why) for why in left].index(True)
-        assert "limit=time" in left[first]
+        assert "slew limit=time of added velocity speed=" in left[first]
         assert first == round(6.0 / 0.02) + 2
 
     def test_it_ends_at_once_where_the_other_one_stops(self) -> None:
