@@ -144,9 +144,9 @@ def _asked(bound: BoundAxis, given: Mapping[str, Any]) -> dict[str, Any]:
     asked = Objective().model_dump() | {"length_range_pct": None}
     asked["max_rate_per_s"] = limits.slowest_per_s
     if design and design.objective:
-        asked |= design.objective.model_dump()
-        asked["length_range_pct"] = design.length_range_pct
-        asked["max_rate_per_s"] = min(design.valve_rate_per_s or math.inf, limits.slowest_per_s)
+        asked |= design.objective.model_dump() | {"length_range_pct": design.length_range_pct}
+        rate = design.valve_rate_per_s
+        asked["max_rate_per_s"] = rate and min(rate, limits.slowest_per_s)
     if named:
         asked |= {"preference": None, "length_range_pct": None}
     asked |= given

@@ -1,5 +1,6 @@
 """What each weight of Eq. 15 moves, as its page says; weights that stand in a file."""
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -88,8 +89,9 @@ def test_what_is_no_weight_says_what_is(name: str) -> None:
         {"third_pole": True, "max_rate_per_s": 4.0, "pole_distance": "off", "max_run_on_s": 2.1},
         {"length_range_pct": 12.0, "within_command": False, "max_jump": 0.9},
         {"preference": 0.4},
+        {"max_rate_per_s": math.inf, "within_command": False, "s": 50.0},
     ],
-    ids=["weights", "requirements", "lengths", "preference"],
+    ids=["weights", "requirements", "lengths", "preference", "any valve"],
 )
 def test_a_setting_is_made_again_from_its_file(file: Path, given: dict[str, Any]) -> None:
     one = tuned(file, "near_far", **given)
