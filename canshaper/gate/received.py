@@ -94,7 +94,6 @@ class Received:
             if now_ns - self.source_ns <= self.of.timeout_ns:
                 return True
             if self.source >= 0:  # another joystick: neutral comes first
-                self.forget()
                 for axis in self.axes:
                     axis.lost = True
             self.source = source
@@ -136,9 +135,7 @@ class SwitchState:
         was_off: it was seen released since it was pressed last.
     """
 
-    def __init__(
-        self, switch: Switch, received: Received, why: str, *, latches: bool = False
-    ) -> None:
+    def __init__(self, switch: Switch, received: Received, why: str, *, latches: bool) -> None:
         self.of, self.received, self.why, self.latches = switch, received, why, latches
         self.axes: Sequence[Pending] = ()
         self.released = self.was_off = False

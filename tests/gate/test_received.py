@@ -50,7 +50,8 @@ def test_a_sequence_is_judged_as_the_controller_judges_it() -> None:
     for number, (count, counts) in enumerate(steps):
         assert one.take(counted(count), 20 * number) is counts, count
     assert not one.take(counted(30), 140)
-    assert one.take(counted(77), 140 + 101)  # after silence any counter but the last
+    assert not one.take(counted(60), 240)
+    assert one.take(counted(77), 240 + 101)  # after silence any counter but the last
     assert not one.take(counted(77), 500)
     assert not one.take(counted(78)[:7], 510)
 
@@ -109,6 +110,31 @@ def test_the_counter_of_e2e_is_in_its_header() -> None:
         assert one.take(data, word, count * MS) == (True, counts)
 
 
+@pytest.mark.parametrize("change", [0, 1])
+def test_a_frame_that_is_not_whole_says_nothing(change: int) -> None:
+    """Wrong checksum, or length: that enable is off in it stops nothing; one that is right does."""
+    one = Bench(variants.machine("protected")[1], "near_far")
+    one.rests(10)
+    name, bound = next(iter(one.deployment.joysticks.items()))
+    for frame in one.joysticks(enable=False, near_far=1.0):
+        if frame[:3] == bound.key:
+            data = frame.data[:-1] if change else bytes([frame.data[0] ^ 1]) + frame.data[1:]
+            one.gate.receive(frame[:3], data, one.now_ns)
+    assert not one.gate.joysticks[name].pressed.released
+    assert one.axis.demand == 0.0
+    one.receive(one.joysticks(enable=False))
+    assert one.gate.joysticks[name].pressed.released
+
+
+@pytest.mark.parametrize(("age_ns", "armed"), [(100 * MS, True), (100 * MS + 1, False)])
+def test_it_counts_until_its_timeout(age_ns: int, armed: bool) -> None:
+    one = bench()
+    one.rests()
+    at_ns = one.now_ns - 20 * MS
+    one.gate.tick(at_ns + age_ns, 0)
+    assert one.axis.armed is armed
+
+
 class TestSources:
     """J1939: the first joystick that comes counts, until it is silent."""
 
@@ -126,11 +152,12 @@ class TestSources:
         gate.receive(first[:3], first[3], timeout_ns + 2)
         assert axis.demand == -0.7
 
-    def test_another_one_moves_nothing_before_neutral(self) -> None:
+    @pytest.mark.parametrize("first", [0x33, 0])
+    def test_another_one_moves_nothing_before_neutral(self, first: int) -> None:
         """It comes between two ticks, neither of which sees a joystick that is silent."""
         gate = Gate(record_of(load("j1939-forwarder")))
         axis = gate.axes["slew"]
-        for now_ms, frame in ((0, bjm()), (101, bjm("BJM1", 0x34, X=50.0))):
+        for now_ms, frame in ((0, bjm("BJM1", first)), (101, bjm("BJM1", 0x34, X=50.0))):
             gate.receive(frame[:3], frame[3], now_ms * MS)
             gate.tick(-(-now_ms // 20) * 20 * MS, 0)
             assert axis.armed is (now_ms == 0)

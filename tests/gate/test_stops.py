@@ -44,6 +44,9 @@ class TestStopsAtOnce:
             one = self.moving()
             stop(one.gate)
             assert f"limit=stopped why={why} speed=" in one.sends(60, near_far=1.0)
+        one = self.moving()
+        one.sends(60, near_far=1.0, enable=False)
+        assert "why=enable speed=" in one.sends(60, near_far=1.0, enable=False)
         one = self.moving(stop_s=0.1)
         one.change = lambda frame: None
         left = [one.sends(60) for _ in range(20)]
@@ -54,7 +57,7 @@ class TestStopsAtOnce:
         one.receive(one.joysticks(near_far=1.0))
         one.gate.tick(one.now_ns, 0)
         one.receive(one.joysticks(near_far=1.0, enable=False))
-        assert "why=enable" in one.gate.leaving(one.key, one.frame(60))
+        assert "why=enable speed=" in one.gate.leaving(one.key, one.frame(60))
 
     def test_a_press_before_it_is_no_reset(self) -> None:
         one = bench()
