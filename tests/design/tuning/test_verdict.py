@@ -77,6 +77,7 @@ def test_what_a_quicker_valve_is_said_to_leave_it_leaves() -> None:
     assert f"{100 * then.left:.1f}" == left
 
 
+@pytest.mark.slow
 def test_a_filter_that_never_moves_is_not_called_calm() -> None:
     """Its first steps are less than half a step of the valve frame; nothing helps."""
     text = str(judge(MODE, 0.02, gff((-0.1, -0.1)), machine()))
@@ -164,6 +165,7 @@ def test_every_shipped_filter_is_good(path: Path) -> None:
     assert {place: str(one) for place, one in found.items() if one.left > GOOD} == {}
 
 
+@pytest.mark.slow
 def test_check_warns_of_a_filter_that_does_not_damp(file: Path) -> None:
     changed(file, "a1: 0.708, a2: 0.12 } # near-far", "a1: 6, a2: 9 } # near-far")
     result = run("check", str(file))
