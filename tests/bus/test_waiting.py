@@ -9,7 +9,7 @@ FRAME = can.Message(arbitration_id=0x110, data=b"\1")
 
 
 class Interface:
-    """An interface that hands out or raises what it is given; slcan keeps lines as this one does."""
+    """An interface that hands out or raises what it is given; it keeps a line, as slcan does."""
 
     def __init__(self, *given: can.Message | Exception | None) -> None:
         self.given = [*given]
