@@ -81,12 +81,12 @@ def shipped(name: str) -> Shipped:
 def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
     """Numbers of every axis, and ranges in which it never moves quicker than by its file.
 
-    Profiles choose the numbers of an axis that has some.
+    Profiles and gain schedules choose the numbers of an axis that has some.
     """
     ranges: dict[str, tuple[float, float]] = {}
     for name, axis in machine.axes.items():
         config = load_config(CONFIG / f"{machine.name}.yaml")[0].axes[name]
-        if config.profiles:
+        if config.profiles or config.gain_schedule:
             continue
         ranges[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
         if axis.filter == "gff":
