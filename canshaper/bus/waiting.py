@@ -1,4 +1,4 @@
-"""What waits on a bus of python-can: an error of its interface costs one frame, no more."""
+"""Reading a bus of python-can: an error of its interface costs one frame, no more."""
 
 from collections.abc import Iterator
 from typing import Any

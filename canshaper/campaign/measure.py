@@ -14,7 +14,6 @@ from canshaper.report.strokes import find_strokes
 from canshaper_sim.axes import LIFT, SLEW
 from canshaper_sim.crane import CraneParameters, CraneState
 from canshaper_sim.plant import PlantNode
-from canshaper_sim.recorder import meant
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 Row = dict[str, Any]
@@ -130,7 +129,7 @@ class _Tracks:
         axes = {
             name: AxisTrace(
                 [self._script.command(name, time_s) for time_s in self._t_s],
-                [meant(command, limits) for command in self._commands[name]],
+                [limits.velocity(command) for command in self._commands[name]],
                 [speed / self._full[name] for speed in self._speeds[name]],
                 across if name == SLEW else None if name == LIFT else along,
             )

@@ -37,7 +37,7 @@ def practised(
     within: tuple[float, float],
     do: Callable[[Sequence[Work]], Done],
 ) -> list[Work]:
-    """What each operator does, anti-sway off and on, with each load as was the fastest in practice.
+    """Let each operator practise, anti-sway off and on; return works by the fastest technique.
 
     Raises:
         CampaignError: see ``learn``.
@@ -68,11 +68,11 @@ def practised(
 
 def do_all(engine: Engine, source: Source, progress: OnProgress, works: Sequence[Work]) -> Done:
     """Do all works."""
-    found: Done = {}
+    done: Done = {}
     for work, moves in engine.run(partial(do_work, source), works):
-        found[work] = moves
-        progress(len(found) / len(works))
-    return {work: found[work] for work in works}
+        done[work] = moves
+        progress(len(done) / len(works))
+    return {work: done[work] for work in works}
 
 
 def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, float]:
@@ -83,8 +83,8 @@ def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, f
 
     pairs, source = (raw, shaped), np.random.default_rng(0)
     options: dict[str, Any] = {"method": "percentile", "random_state": source}
-    found = stats.bootstrap(pairs, change, paired=True, confidence_level=CONFIDENCE, **options)
-    bounds = found.confidence_interval
+    result = stats.bootstrap(pairs, change, paired=True, confidence_level=CONFIDENCE, **options)
+    bounds = result.confidence_interval
     return float(change(raw, shaped)), float(bounds.low), float(bounds.high)
 
 

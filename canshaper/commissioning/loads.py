@@ -18,7 +18,7 @@ from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 
-# So long the responses are alike: a load that is told so late in a movement changes no output. It
+# So long the responses are alike: a load that is known so late in a movement changes no output. It
 # costs the longer ones next to nothing.
 ALIKE_S = 0.5
 
@@ -72,11 +72,11 @@ def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console
     loads = {f"{one.breakpoint:g}": one.sway.mode() for one in bound.config.gain_schedule}
     names = [*(f"for {name}" for name in loads), "own"]
     table = new_table("swing left, %", *(f"with {name}" for name in loads))
+    rate, machine = bound.config.limits.slowest_per_s, Machine.of(bound)
     for one in designs:
         name = names[-1 if one.at is None else one.at]
         console.print(f"{name}: {summary_line(one)}")
-        shaper = shaper_of(one.chosen, one.tick_s, bound.config.limits.slowest_per_s)
-        machine = Machine.of(bound)
+        shaper = shaper_of(one.chosen, one.tick_s, rate)
         left = swing_left(one.mode, one.tick_s, shaper, machine, [*loads.values()])
         table.add_row(name, *(f"{100.0 * part:.1f}" for part in left))
     console.print(table)

@@ -150,10 +150,12 @@ def design_robust(
         limits = replace(machine.limits, tail_s=max(machine.limits.tail_s, tail_s))
         return replace(machine, limits=limits)
 
+    def written(one: RobustShaper) -> Machine:
+        """With the tail that is written with a shaper for lengths."""
+        return with_tail(one.duration_s) if lengths_m else machine
+
     def evaluated(one: RobustShaper) -> Evaluation:
-        # Of a range with the tail that is written with it.
-        of = with_tail(one.duration_s) if lengths_m else machine
-        return evaluate(mode, tick_s, in_file(one)[1], of, lengths_pct)
+        return evaluate(mode, tick_s, in_file(one)[1], written(one), lengths_pct)
 
     try:
         check_swing(mode)
@@ -162,8 +164,7 @@ def design_robust(
         measures = [(evaluated(one), one) for one in shapers]
         measured, shaper = min(measures, key=lambda one: one[0].worst(range_pct))
         section, shaper_for = in_file(shaper)
-        of = with_tail(shaper.duration_s) if lengths_m else machine
-        verdict = judge(mode, tick_s, shaper_for, of, range_pct)
+        verdict = judge(mode, tick_s, shaper_for, written(shaper), range_pct)
         for times in _LONGER if verdict.word != "good" and residual_pct is None else ():
             seconds = round(times * shaper.duration_s / tick_s) * tick_s
             shaper_for = in_file(design(two, LEAST_TAP, seconds))[1]

@@ -135,7 +135,7 @@ def design_tuned(
 
 
 def _asked(bound: BoundAxis, given: Mapping[str, Any]) -> dict[str, Any]:
-    """What is given, else what the filter in the file was tuned with, else the defaults."""
+    """Complete the options: by those that tuned the filter in the file, else by the defaults."""
     named = [aim for aim in _AIMS if aim & given.keys()]
     if len(named) > 1:
         raise UsageError("expected one of --preference, --length-range and weights, got several")
@@ -177,13 +177,13 @@ def print_tuned(deployment: Deployment, one: TunedDesign, console: Console) -> N
 def write_tuned(deployment: Deployment, one: TunedDesign) -> list[str]:
     """Write it into the file; see ``write_filters``."""
     tail_s = one.tail[0] if one.tail else None
-    found = {
+    details = {
         "length_range_pct": one.task.length_range_pct,
         "duration_s": tail_s,
         "valve_rate_per_s": one.task.require.max_rate_per_s,
         "objective": one.objective,
     }
-    designed_for = designed(one.task.mode) | {k: v for k, v in found.items() if v is not None}
+    designed_for = designed(one.task.mode) | {k: v for k, v in details.items() if v is not None}
     values = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True))
     values |= {"kind": "gff", **one.setting.values(), "designed_for": designed_for}
     return write_filters(deployment, one.bound.name, [((), values)], tail_s, "tune")

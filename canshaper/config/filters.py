@@ -39,7 +39,7 @@ _Weight = Annotated[float, number(0, 1e6, "", "weight, as of the option of tune"
 
 
 class Objective(Section):
-    """What the poles of a G_FF were chosen by (Eq. 14-15), with which ``tune`` makes them again."""
+    """Objective by which the poles of a G_FF were chosen (Eq. 14-15); ``tune`` reads it again."""
 
     q: list[Annotated[float, number(-1e6, 1e6, "", "weight")]] = Field(
         [1.0, 1.0], max_length=4, description="Q: one number, its diagonal, or the matrix by rows"

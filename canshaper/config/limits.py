@@ -214,7 +214,7 @@ class Hydraulics(Section):
     others: Annotated[
         float, number(0, 100, "full axis flows", "what functions take that are not ours")
     ] = 0.0
-    """What functions take that are not ours. With others_measured it counts while that is lost: 0
+    """Flow of functions that are not ours. With others_measured it counts while that is lost: 0
     for as if they took nothing, as much as flow for no motion."""
     others_measured: OtherFlow | None = None
     """Where that is measured: by signal, in the unit of which full is one full axis flow."""

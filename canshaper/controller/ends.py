@@ -3,14 +3,14 @@
 import math
 from collections.abc import Mapping
 
-from canshaper.controller.events import EndsEvent
+from canshaper.controller.events import ValueEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.value import Value
 from canshaper.machine.motion import BoundMotion
-from canshaper.shaping.end_stops import UNBOUNDED, EndStops, bounds
+from canshaper.shaping.end_stops import UNBOUNDED, EndStops, RunOn, bounds
 from canshaper.shaping.states import State
 
-# Lag of a usual proportional valve: a tip of 1 m/s that is off by it by a fifth stops 2 cm beside.
+# Lag of a usual proportional valve; an error of a fifth moves the aim of a tip of 1 m/s by 2 cm.
 VALVE_LAG_S = 0.1
 # States in which the filter lets an axis run on.
 SHAPED = (State.ACTIVE, State.STOPPING)
@@ -37,7 +37,7 @@ class AxisEnds:
         self._run_on = runner.follow_run_on()
         self._known = True
 
-    def step(self, now_ns: int) -> EndsEvent | None:
+    def step(self, now_ns: int) -> ValueEvent | None:
         """Bound the demand of this tick.
 
         Without a position nothing is bounded: the axis is as if it had no ends.
@@ -59,7 +59,7 @@ class AxisEnds:
         if known is self._known:
             return None
         self._known = known
-        return EndsEvent(runner.bound.name, known)
+        return ValueEvent(f"axis={runner.bound.name} ends", "known" if known else "lost")
 
 
 class AimPoint:
@@ -67,7 +67,8 @@ class AimPoint:
 
     That is what the filters still ask for, what the valves lag behind, and the way back from where
     the motion of both axes has moved the tip. It is not known while a filter still holds demands of
-    both directions: after a reversal, for as long as its response.
+    both directions, after a reversal for as long as its response, nor while another set is in force
+    than the axis' own.
 
     Args:
         bound: the motion of both axes; it has a message for this.
@@ -84,14 +85,13 @@ class AimPoint:
         assert bound.aim and bound.config.near_far  # checked with the deployment
         self.codec, self.ticks = bound.aim, bound.aim_ticks
         self._slew, self._near_far = axes[bound.config.slew], axes[bound.config.near_far]
-        for runner in (self._slew, self._near_far):
-            runner.follow_run_on()
+        self._run_on = self._slew.follow_run_on(), self._near_far.follow_run_on()
         self.slew_deg = self.radius_m = 0.0
         self.known = True
 
     def update(self) -> None:
         """Find it by the state of both axes now."""
-        slew, near_far = _travel(self._slew), _travel(self._near_far)
+        slew, near_far = map(_travel, (self._slew, self._near_far), self._run_on)
         slewing, sway = self._slew.bound.config.slewing, self._near_far.bound.config.sway
         assert slewing and sway  # checked with the deployment
         self.slew_deg = math.degrees((slew or 0.0) * slewing.full_speed_rad_s)
@@ -99,11 +99,11 @@ class AimPoint:
         self.known = slew is not None and near_far is not None
 
 
-def _travel(runner: AxisControl) -> float | None:
+def _travel(runner: AxisControl, run_on: RunOn) -> float | None:
     """Travel of an axis after a release, full speed times seconds; None where it is not known."""
     back, ahead = 0.0, 0.0
     if runner.axis.state in SHAPED:
-        back, ahead = runner.follow_run_on().travel()
-    if back and ahead:
+        back, ahead = run_on.travel()
+    if (back and ahead) or runner.active_set:
         return None
     return back + ahead + VALVE_LAG_S * runner.axis.sent - runner.displaced

@@ -93,40 +93,21 @@ class FlowEvent:
 
 
 @dataclass(frozen=True, slots=True)
-class OtherFlowEvent:
-    """The measured flow of functions that are not ours is lost, or known again."""
+class ValueEvent:
+    """A measured value is known again, lost, or restless: it jumps to and fro.
 
-    known: bool
+    Attributes:
+        name: ends of an axis, load_state, flow of other functions.
+        state: known, lost or restless.
+    """
 
-    @property
-    def text(self) -> str:
-        """Line for the log."""
-        return f"hydraulics_others={'known' if self.known else 'lost'}"
-
-
-@dataclass(frozen=True, slots=True)
-class LoadEvent:
-    """The signal of the load is known again, lost, or restless: it jumps to and fro."""
-
+    name: str
     state: str
 
     @property
     def text(self) -> str:
         """Line for the log."""
-        return f"load_state={self.state}"
-
-
-@dataclass(frozen=True, slots=True)
-class EndsEvent:
-    """The position by which an axis is stopped ahead of its end stops is lost, or known again."""
-
-    axis: str
-    known: bool
-
-    @property
-    def text(self) -> str:
-        """Line for the log."""
-        return f"axis={self.axis} ends={'known' if self.known else 'lost'}"
+        return f"{self.name}={self.state}"
 
 
 @dataclass(frozen=True, slots=True)

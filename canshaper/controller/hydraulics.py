@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from canshaper.config.limits import Hydraulics
-from canshaper.controller.events import FlowEvent, OtherFlowEvent
+from canshaper.controller.events import FlowEvent, ValueEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import Value
@@ -46,7 +46,7 @@ class SharedFlow:
         self._enough = round(ENOUGH_S / tick_s)
         self._ticks = self._enough  # since it was scaled last
 
-    def step(self, now_ns: int, ticks: int) -> Iterator[FlowEvent | OtherFlowEvent]:
+    def step(self, now_ns: int, ticks: int) -> Iterator[FlowEvent | ValueEvent]:
         """Scale the demands of this tick, and yield what is to be reported.
 
         Args:
@@ -59,7 +59,7 @@ class SharedFlow:
             value = self._others.fresh(now_ns)
             if (known := value is not None) is not self._known:
                 self._known = known
-                yield OtherFlowEvent(known)
+                yield ValueEvent("hydraulics_others", "known" if known else "lost")
             if value is not None:
                 flow = config.flow - max(value / measured.full, 0.0)
         demands, outputs = [], []

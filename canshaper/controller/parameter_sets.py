@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from canshaper.config.filters import Profile
 from canshaper.config.schema import AxisSection
-from canshaper.controller.events import LoadEvent
+from canshaper.controller.events import ValueEvent
 from canshaper.inputs.value import ProfileChoice, ValueInput
 from canshaper.machine.filters import parameter_sets
 from canshaper.machine.valves import BoundAxis
@@ -53,7 +53,7 @@ class Load:
         self._said: float | None = None  # before it jumped last
         self._state = "known"
 
-    def step(self, now_ns: int) -> LoadEvent | None:
+    def step(self, now_ns: int) -> ValueEvent | None:
         """Take what the signal says now; whether it is known, where that has changed."""
         value, jumps_ns = self._signal.fresh(now_ns), self._jumps_ns
         if value is not None and (self._said is None or abs(value - self._said) >= self._jump > 0):
@@ -66,7 +66,7 @@ class Load:
         if state == self._state:
             return None
         self._state = state
-        return LoadEvent(state)
+        return ValueEvent("load_state", state)
 
 
 class SetChooser:

@@ -338,10 +338,11 @@ class AxisControl:
     def reason(self) -> Reason:
         """Why the axis is in its state; in ACTIVE also what holds it back from its demand."""
         axis = self.axis
-        if axis.state is State.ACTIVE and abs(axis.command) < 1.0 and axis.command in axis.bounds:
-            return Reason.END_STOP
-        if axis.state is State.ACTIVE and axis.command and axis.scale < 1.0:
-            return Reason.FLOW_LIMITED
+        if axis.state is State.ACTIVE:
+            if abs(axis.command) < 1.0 and axis.command in axis.bounds:
+                return Reason.END_STOP
+            if axis.command and axis.scale < 1.0:
+                return Reason.FLOW_LIMITED
         return axis.reason
 
     @property

@@ -56,7 +56,7 @@ def bounds(axis: AxisState) -> tuple[float, float]:
     of, low, high, now = axis.of, -axis.back.most, axis.forth.most, axis.now
     least, most = low, high
     if of.faster:
-        least, most = low and -1.0, high and 1.0
+        least, most = (-1.0 if low else 0.0), (1.0 if high else 0.0)
     if of.reverse:
         least, most = min(least, -most), max(most, -least)
     elif axis.held >= of.reversal:

@@ -43,8 +43,8 @@ def parsed_messages(path: Path, text: str, *, bounded: bool) -> list[Message] | 
         why = " ".join(str(cause).split()) or type(cause).__name__
         if "more than 11 bits" in why:
             why += f" ({WIDE_ID})"
-        if found := _explained(text, cause, why):
-            line, why = found
+        if explanation := _explained(text, cause, why):
+            line, why = explanation
         elif at := re.search(r"at line (\d+)", why):
             line = int(at.group(1))
         elif at := re.search(r"in message (\w+)|unused \w+ entries in DBC: (\w+ \d+ \w+)", why):

@@ -80,8 +80,8 @@ def candump(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 def _are_differences(head: bytes) -> bool:
     """Whether the times of a log do not grow: each is that since the frame before."""
-    found = (_PADDED.match(line) for line in head.split(b"\n", MOST_STAMPS)[:-1])
-    stamps = [int(f"{one[2].decode()}{one[3].decode()}") for one in found if one]
+    matches = (_PADDED.match(line) for line in head.split(b"\n", MOST_STAMPS)[:-1])
+    stamps = [int(f"{one[2].decode()}{one[3].decode()}") for one in matches if one]
     if len(stamps) < LEAST_STAMPS:
         return False
     half = len(stamps) // 2

@@ -37,8 +37,8 @@ def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").rstrip()
         if not below:
-            if found := FORMAT.search(line):
-                bases[found[1]] = 16 if found[2] == "HEX" else 10
+            if match := FORMAT.search(line):
+                bases[match[1]] = 16 if match[2] == "HEX" else 10
             below = line.startswith("=" * 40)  # under the names of the columns
         elif "ErrorFrame" in line:
             place.left_out["error"] += 1

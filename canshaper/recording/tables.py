@@ -62,8 +62,8 @@ def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     rows, bases = lines(file, place), {}
     first = header = next(rows, b"").decode("utf-8", "replace").strip()
     while (table := Table.of(header)) is None:
-        if found := FORMAT.search(header):
-            bases[found[1].lower()] = 16 if found[2].lower() == "hex" else 10
+        if match := FORMAT.search(header):
+            bases[match[1].lower()] = 16 if match[2].lower() == "hex" else 10
         if place.number >= MOST_ABOVE or not (row := next(rows, b"")):
             place.number = 1
             raise place.error(shown(first.encode()), HEADER)

@@ -104,7 +104,7 @@ class AxisComparison:
 
 
 def axis_metrics(recording: Recording, axis: str, still_deg: float = STILL_DEG) -> AxisMetrics:
-    """Measure one axis of a drive; swing below ``still_deg`` counts as none.
+    """Measure one axis of a drive; below a swing of ``still_deg`` it counts as still.
 
     Raises:
         KeyError: the drive has no such axis.

@@ -66,7 +66,7 @@ def still_after(
 
     Returns:
         The time in s, and whether it is a lower bound: that rest ended with more swing, or too soon
-        behind it to tell. None without a rest.
+        after it to know. None without a rest.
     """
     times = []
     for rest in rests:
@@ -148,7 +148,7 @@ class CraneMetrics:
 def crane_metrics(
     recording: Recording, crane: CraneTrace, still_deg: float = STILL_DEG
 ) -> CraneMetrics:
-    """Measure a drive whose crane is ``crane``; swing below ``still_deg`` counts as none.
+    """Measure a drive whose crane is ``crane``; below a swing of ``still_deg`` it counts as still.
 
     Raises:
         ValueError: the recording is malformed (see ``find_strokes``).

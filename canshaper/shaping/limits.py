@@ -47,6 +47,11 @@ class OutputLimits:
     reversal_s: float = 0.0
     run_on: float = math.inf
 
+    def velocity(self, command: float) -> float:
+        """Velocity that a command to the valve gives, both as parts of full."""
+        curve, deadband = self.curve, self.deadband
+        return curve.velocity(command) if curve else without_deadband(command, deadband)
+
 
 class RecentCommand:
     """Largest and smallest command of the last ``ticks`` ticks, zero included (sliding window).

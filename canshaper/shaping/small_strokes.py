@@ -10,7 +10,7 @@ commanded since the axis was at rest has to be small altogether.
 
 import math
 
-from canshaper.shaping.limits import OutputLimits, without_deadband
+from canshaper.shaping.limits import OutputLimits
 
 # Strokes are small if the least step makes all of them within this time, s. With steps of 1/125
 # that is 0.6 s of full speed. Larger strokes are not made of single steps.
@@ -92,11 +92,9 @@ def least_velocity(limits: OutputLimits, grid_steps: int) -> float:
 
     A first step that gives less than half of the others does not count: to the valve it is neutral.
     """
-    curve, deadband = limits.curve, limits.deadband
     least = max(limits.minimum, 0.5 / grid_steps)
     for raw in range(1, grid_steps):
-        command = raw / grid_steps
-        velocity = curve.velocity(command) if curve else without_deadband(command, deadband)
+        velocity = limits.velocity(raw / grid_steps)
         if velocity >= least:
             return velocity
     return 1.0

@@ -14,7 +14,6 @@ from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
-from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
 from canshaper.studio.axis_view import AxisView, rounded
 from canshaper.studio.sources import Sources
@@ -229,12 +228,8 @@ class CraneView:
         axis = self._deployment.axes[name]
         raw = _raw(axis.valve_message, data)
         command = (axis.valve.read(raw) or 0) / axis.valve.steps
-        limits = axis.config.limits.output_limits()
-        curve = limits.curve
         self.axes[name].opening = command
-        self.axes[name].valve = (
-            curve.velocity(command) if curve else without_deadband(command, limits.deadband)
-        )
+        self.axes[name].valve = axis.config.limits.output_limits().velocity(command)
         self._daemon_s = now_s
 
     def _axis_status(self, what: tuple[str, StatusCodec[Any]], data: bytes, now_s: float) -> None:

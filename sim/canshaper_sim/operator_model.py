@@ -32,7 +32,7 @@ _TAP_S, _LEAST_LEVEL, _WORTH_A_TAP, _WORTH_A_CATCH = 0.3, 0.15, 0.33, 0.7
 
 @dataclass(frozen=True, slots=True)
 class Skill:
-    """What a person can; by default a skilled one who catches the swing. Noise: one sigma."""
+    """Skill of a person; by default one who catches the swing. Noise: one sigma."""
 
     # Simple visual reaction .19 s, .15 s more for each bit of a choice (Hick 1952; Luce 1986);
     # corrections by sight .19 to .26 s (Keele and Posner 1968); a pilot .15 to .25 s (McRuer 1967).
@@ -59,7 +59,7 @@ class Operators:
 
 
 class Known(NamedTuple):
-    """What practice has taught of an axis."""
+    """Knowledge of an axis that practice has taught."""
 
     full_m_s: float  # speed of the tip at full deflection
     # Of that speed, tick by tick, after the joystick is let go at once: so much of what the hand

@@ -105,7 +105,7 @@ class _ValveFeedback:
 
 
 class _LoadMessage:
-    """What the machine says of its load, each cycle: kg, or in any other unit whether there is one.
+    """Send the load, each cycle: kg, or in any other unit whether there is one.
 
     Args:
         bound: the signal that the deployment reads.

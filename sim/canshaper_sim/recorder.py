@@ -14,7 +14,6 @@ from canshaper.codec.signals import FieldSet
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.limits import OutputLimits, without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.crane import CraneParameters
@@ -127,7 +126,7 @@ class Recorder:
         def receive(data: bytes, _time_s: float) -> None:
             raw = layout.decode(data)
             for now, valve, limits in driven:
-                now[1] = meant((valve.read(raw) or 0) / valve.steps, limits)
+                now[1] = limits.velocity((valve.read(raw) or 0) / valve.steps)
 
         return receive
 
@@ -184,13 +183,6 @@ class Recorder:
             self.missed_deadlines = int(fields.layout.decode(data)["MissedDeadlines"])
 
         return receive
-
-
-def meant(command: float, limits: OutputLimits) -> float:
-    """Velocity that a deployment means by a command of a valve frame."""
-    if limits.curve:
-        return limits.curve.velocity(command)
-    return without_deadband(command, limits.deadband)
 
 
 def _from_above(heading: float, out_m: float, across_m: float) -> Point:

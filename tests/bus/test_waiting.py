@@ -1,4 +1,4 @@
-"""What waits on a bus of python-can, and what its interface raises in the place of a frame."""
+"""Reading a bus of python-can whose interface raises errors in the place of frames."""
 
 import can
 import pytest

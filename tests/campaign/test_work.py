@@ -160,14 +160,14 @@ def test_work_ends_where_the_grapple_swings_over() -> None:
 def test_practice_chooses_the_fastest_technique_of_each_load() -> None:
     def do(trials: Sequence[Work]) -> dict[Work, list[Move]]:
         """Empty it is best to be fast, with a log to be slow, and to catch by half."""
-        found = {}
+        results = {}
         for one in trials:
             speed, catch = one.techniques[0]
             assert catch <= one.skill.catch
             slower = abs(catch - 0.5 * one.skill.catch)
             seconds = dict(zip(LOADS, (9.0 - speed, 8.0 + speed), strict=True))
-            found[one] = [Move(load, True, seconds[load] + slower) for load in LOADS]
-        return found
+            results[one] = [Move(load, True, seconds[load] + slower) for load in LOADS]
+        return results
 
     chosen = practised(source(), Operators(), WITHIN, do)
     assert [(one.bypass, one.operator) for one in chosen] == [

@@ -61,11 +61,11 @@ def _aimed(aim: AimPoint, slewed_deg: float, radius_m: float) -> tuple[float, fl
     return (slewed_deg + aim.slew_deg, radius_m + aim.radius_m) if aim.known else None
 
 
-def share_within(found: Sequence[tuple[float, float]]) -> float:
+def share_within(results: Sequence[tuple[float, float]]) -> float:
     """Share of releases that stop within 1 degree and 5 cm of the aim."""
-    worst = [max(abs(one[k]) for one in found) for k in (0, 1)]
-    print(f"{len(found)} releases, worst {worst[0]:.2f} deg, {worst[1]:.1f} cm")
-    return sum(abs(deg) <= 1.0 and abs(cm) <= 5.0 for deg, cm in found) / len(found)
+    worst = [max(abs(one[k]) for one in results) for k in (0, 1)]
+    print(f"{len(results)} releases, worst {worst[0]:.2f} deg, {worst[1]:.1f} cm")
+    return sum(abs(deg) <= 1.0 and abs(cm) <= 5.0 for deg, cm in results) / len(results)
 
 
 @pytest.mark.slow
@@ -73,18 +73,18 @@ def share_within(found: Sequence[tuple[float, float]]) -> float:
     ("name", "changes"), [("robust", ()), ("pump", ("pump_flow=1.2",))], ids=["free", "pump"]
 )
 def test_19_of_20_releases_stop_where_it_says(name: str, changes: tuple[str, ...]) -> None:
-    deployment, found = read(ROOT / "config" / f"forwarder-{name}.yaml"), []
+    deployment, results = read(ROOT / "config" / f"forwarder-{name}.yaml"), []
     for seed in range(60):
         script, rng = random_script(seed, 20.0, AXES), random.Random(seed)
         script = Script(script.name, script.strokes, 20.0 + REST_S)
-        found.append(errors(deployment, script, 0.02 * rng.randint(100, 900), *changes))
-    known = [one for one in found if one is not None]
-    print(f"{percent(known, found)} of the releases are known")
+        results.append(errors(deployment, script, 0.02 * rng.randint(100, 900), *changes))
+    known = [one for one in results if one is not None]
+    print(f"{percent(known, results)} of the releases are known")
     assert share_within(known) >= 0.95
 
 
-def percent(known: Sequence[object], found: Sequence[object]) -> str:
-    return f"{100 * len(known) / len(found):.0f} %"
+def percent(known: Sequence[object], results: Sequence[object]) -> str:
+    return f"{100 * len(known) / len(results):.0f} %"
 
 
 @pytest.mark.slow
@@ -93,8 +93,8 @@ def test_in_a_loading_cycle_too() -> None:
     script = SCRIPTS["loading"]
     script = Script(script.name, script.strokes, script.duration_s + REST_S)
     times = {stroke.end_s - before_s for stroke in script.strokes for before_s in (0.1, 0.4, 0.7)}
-    found = [errors(deployment, script, 0.02 * round(time / 0.02)) for time in sorted(times)]
-    known = [one for one in found if one is not None]
-    print(f"{percent(known, found)} of the releases are known")
-    assert len(known) > 0.5 * len(found)
+    results = [errors(deployment, script, 0.02 * round(time / 0.02)) for time in sorted(times)]
+    known = [one for one in results if one is not None]
+    print(f"{percent(known, results)} of the releases are known")
+    assert len(known) > 0.5 * len(results)
     assert share_within(known) >= 0.95

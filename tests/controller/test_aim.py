@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import State
 from tests.rigs.forwarder import ROOT, Rig
@@ -31,7 +33,7 @@ def test_at_rest_it_is_the_tip(rig: Rig) -> None:
 
 
 def test_it_is_the_way_that_the_axes_then_go(rig: Rig) -> None:
-    """Of the commands, as long as the filters last, and of the valves' lag."""
+    """It counts the commands that the filters still give, and the lag of the valves."""
     rig.run(3)
     rig.run(60, Slew=600, NearFar=-800)
     said = aim(rig)
@@ -79,6 +81,24 @@ def test_a_trip_and_a_bypass_let_nothing_run_on(rig: Rig) -> None:
     rig.run(3, AntiSwayOff=1)
     rig.run(60, Slew=1000, AntiSwayOff=1)
     assert aim(rig)["slew"] == pytest.approx(2.86, abs=0.05)  # the valve's lag
+
+
+def test_it_is_not_known_while_another_set_is_in_force(tmp_path: Path) -> None:
+    """The run-on is that of the axis' own filter."""
+    text = (ROOT / "config" / "forwarder-load.yaml").read_text(encoding="utf-8")
+    aim_point = "    aim: { bus: crane, message: AimPoint }\n"
+    text = text.replace("../dbc", str(ROOT / "dbc")).replace(
+        "    radius:", f"{aim_point}    radius:"
+    )
+    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
+    rig = Rig(tmp_path / "machine.yaml")
+    rig.run(10)
+    assert aim(rig)["known"] is True
+    load = rig.message("GrappleLoad")
+    data = load.encode({"Weight": 600, "Gripped": 1})
+    rig.receive(Frame("crane", load.frame_id, False, data))
+    rig.run(10)
+    assert aim(rig)["known"] is False
 
 
 def test_a_motion_of_one_axis_has_none(changed_rig: Make) -> None:

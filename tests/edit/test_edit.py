@@ -59,7 +59,7 @@ def test_block_style_poles_become_coefficients(file: Path, newline: str) -> None
 
 
 def test_an_item_of_a_list(file: Path) -> None:
-    """Of a gain schedule one breakpoint's filter is written, and the others stay."""
+    """One breakpoint of a gain schedule gets its filter, and the others stay."""
     text = (ROOT / "config" / "forwarder-load.yaml").read_text(encoding="utf-8")
     place = ("axes", "slew", "gain_schedule", 1, "filter")
     after = edited(text, place, {"taps": ["2 x 0.5"]}, note="By hand.").splitlines()

@@ -1,4 +1,4 @@
-"""What all axes share and where they end, by docs/deployment.md: oil of one pump, end stops.
+"""Rules of the oil that axes share and of their end stops, by docs/deployment.md.
 
 It knows the file and the frames, and nothing of how the demands are bounded.
 """
@@ -37,7 +37,7 @@ class EndRules:
         self._last_ns = arrived_ns
 
     def wrong(self, now_ns: int) -> str:
-        """What is wrong with what its axis sends now."""
+        """Return the fault of the velocity that its axis sends now; empty for none."""
         axis, ends = self._axis, self._ends
         fresh = now_ns - self._last_ns <= ends.timeout_ns - 2 * SLACK_NS
         if not self._side or not fresh or now_ns - axis.bypassed_ns < self._creeps_ns:

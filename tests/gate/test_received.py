@@ -183,7 +183,7 @@ class TestSources:
 
     @pytest.mark.parametrize(("to", "ours"), [(0x20, True), (0xFF, True), (0x30, False)])
     def test_a_command_to_us_or_to_all(self, to: int, ours: bool) -> None:
-        """Of a message with a destination."""
+        """The message has a destination."""
         gate = Gate(record_of(load("j1939-forwarder")))
         valve, axes = gate.valves.pop(gate.axes["slew"].of.valve)
         gate.valves["crane", 0x0CEF2080, True] = replace(valve, group=0x03FF0000), axes

@@ -25,7 +25,7 @@ EMERGENCY, SWITCHES = ("remote-forwarder",), ("j1939-rollers", "ecu-forwarder")
 
 
 class Planted(Worst):
-    """A gate that is handed what it is told, and neutral in the place of what it refuses.
+    """A gate that is handed what is planted, and neutral in the place of what it refuses.
 
     Attributes:
         send: velocity of each axis; ``exact`` steps instead of it.

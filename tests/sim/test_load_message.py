@@ -1,4 +1,4 @@
-"""What the plant says of its load: its weight, or whether there is one."""
+"""The plant sends its load: the weight, or whether there is one."""
 
 from pathlib import Path
 

@@ -175,7 +175,7 @@ def _print(deployment: "Deployment") -> None:
 
 
 def _of_axis(deployment: "Deployment", name: str) -> "Iterator[str]":
-    """What else is known of an axis, in words."""
+    """Describe sensor, end stops and oil of an axis, in words."""
     from canshaper.shaping.registry import KINDS
 
     config, bound = deployment.config, deployment.axes[name]

@@ -24,7 +24,7 @@ def robust(
         None,
         "--lengths",
         metavar="LOW:HIGH",
-        help="Instead: shortest and longest pendulum in m, for a load that no signal tells.",
+        help="Instead: shortest and longest pendulum in m, for a load without a signal.",
     ),
     loads: bool = typer.Option(
         False, "--loads", help="Design every breakpoint of the gain schedule."

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.calibration.fit import Calibration, Sample, fit, speed_of
+from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import EndStopDetector, Ramp, SpeedFeedback
 from canshaper.commissioning.calibration.together import Moment
 from canshaper.controller.controller import Controller
@@ -209,7 +209,7 @@ class CalibrationDrive:
             if name == self.axis:
                 self._samples.setdefault(self.ramp.part(time_s), []).append(sample)
             limits = one.bound.config.limits.output_limits()
-            moment += (speed_of(limits, sample.command), sample.speed)
+            moment += (limits.velocity(sample.command), sample.speed)
         self.moments.append(moment)
 
     def neutral_frames(self) -> list[Frame]:

@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from canshaper.errors import CalibrationError
-from canshaper.shaping.limits import OutputLimits, without_deadband
 
 
 class Sample(NamedTuple):
@@ -61,12 +60,6 @@ class Calibration:
                 commands.append(round(command, 2) + 0.0)
                 speeds.append(round(speed, 2) + 0.0)
         return commands, speeds
-
-
-def speed_of(limits: OutputLimits, command: float) -> float:
-    """Speed that the file expects at a command to the valve, both as parts of full."""
-    curve = limits.curve
-    return curve.velocity(command) if curve else without_deadband(command, limits.deadband)
 
 
 # A ramp that goes this far has measured full speed.

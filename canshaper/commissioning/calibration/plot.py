@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from canshaper.commissioning.calibration.fit import FULL, Calibration, speed_of
+from canshaper.commissioning.calibration.fit import FULL, Calibration
 from canshaper.report.style import (
     DASHED,
     HEAD_PT,
@@ -27,7 +27,7 @@ _HEIGHT_PX = 1250
 
 def in_file(limits: OutputLimits, commands_pct: Sequence[float]) -> list[float]:
     """Speed in % of full that the file expects at commands in %."""
-    return [100.0 * speed_of(limits, c / 100.0) for c in commands_pct]
+    return [100.0 * limits.velocity(c / 100.0) for c in commands_pct]
 
 
 def figure(axis: str, limits: OutputLimits, measured: Calibration, top_pct: float) -> Figure:

@@ -56,7 +56,7 @@ def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -
         shares: what each takes at full speed, full axis flows.
 
     Raises:
-        CalibrationError: a drive is missing, or nothing can be told of them.
+        CalibrationError: a drive is missing, or they show nothing.
     """
     seen = _seen(drives)
     directions = []

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
-from canshaper.commissioning.calibration.fit import speed_of
 from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.series import (
     Array,
@@ -94,7 +93,7 @@ class Commands:
         """Take a frame that was received."""
         for axis, layout in self._by_valve.get(key, ()):
             if (part := valve_part(axis, layout, data)) is not None:
-                self._valves[axis.name].add(time_s, speed_of(self._limits[axis.name], part))
+                self._valves[axis.name].add(time_s, self._limits[axis.name].velocity(part))
         for bus in self._joystick_buses:  # no one has said which channel of the log it is
             if joystick := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
                 for name, value in joystick_commands(joystick, self._axes, data)[1].items():

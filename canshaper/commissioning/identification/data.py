@@ -160,7 +160,7 @@ def logged(
 def pump_in(
     deployment: Deployment, logs: Sequence[str], signals: Sequence[str], *, write: bool, **of: Any
 ) -> str:
-    """What the pump delivers, by logs with the speeds of two axes; see ``pump_lines``."""
+    """Measure what the pump delivers by logs with the speeds of two axes; see ``pump_lines``."""
     speeds, drives = signals_named(signals, deployment), []
     axes = pair_of(deployment, [*speeds])
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}

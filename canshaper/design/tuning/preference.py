@@ -57,7 +57,7 @@ def front(
         InfeasibleError: no setting keeps the requirements.
     """
     in_range("preference (0 quickest, 1 calmest)", preference, 0.0, 1.0)
-    require, grid, found = task.require, [*_grid(task)], []
+    require, grid, allowed = task.require, [*_grid(task)], []
     for k, poles in enumerate(grid):
         on_progress(k / len(grid), "measuring settings")
         shaper = gff((poles[0], poles[1]), poles[2] if len(poles) == 3 else None)
@@ -68,10 +68,10 @@ def front(
             (m.run_on_s, require.max_run_on_s),
         )
         if all(most is None or value <= most for value, most in limits):
-            found.append(Choice(poles, m))
-    if not found:
+            allowed.append(Choice(poles, m))
+    if not allowed:
         raise InfeasibleError("no poles keep all requirements; without --preference it says which")
-    best = [one for one in found if not any(_beats(other.felt, one.felt) for other in found)]
+    best = [one for one in allowed if not any(_beats(other.felt, one.felt) for other in allowed)]
     return sorted(best, key=lambda one: one.felt)
 
 

@@ -26,7 +26,7 @@ _HELPS = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a filter leaves.
+    """Swing that a filter leaves, and changes that would leave less.
 
     Attributes:
         left: largest part of the swing that is left at the lengths looked at.
@@ -118,7 +118,7 @@ def _faster(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def verdicts(deployment: Deployment) -> Iterator[tuple[Place, Verdict]]:
-    """What each filter of a swinging axis leaves, profiles and breakpoints too, by its place."""
+    """Judge each filter of a swinging axis, profiles and breakpoints too; yield them by place."""
     for name, bound in deployment.axes.items():
         tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
         rate, machine = bound.config.limits.slowest_per_s, Machine.of(bound)

@@ -1,4 +1,4 @@
-"""What studies/README.md says of Eq. 7 - 11, A3 and A4 as printed, against the derived equations.
+"""Claims of studies/README.md on Eq. 7 - 11, A3 and A4 as printed, against the derived equations.
 
 Eq. 12 is in test_linear.py.
 

@@ -82,7 +82,7 @@ def drive(
     return moments
 
 
-def found(moments: list[Moment]) -> list[Direction]:
+def directions_of(moments: list[Moment]) -> list[Direction]:
     return measured([moments], AXES, ONE)
 
 
@@ -92,7 +92,7 @@ def found(moments: list[Moment]) -> list[Direction]:
 def test_flow_and_sharing_are_found_in_both_directions(
     shares: Sharing, kept: tuple[float, float]
 ) -> None:
-    directions = found(drive(ramped(), 1.2, shares))
+    directions = directions_of(drive(ramped(), 1.2, shares))
     assert {one.ways for one in directions} == {(1, 1), (-1, -1)}
     for one in directions:
         assert [part for part, _ in one.kept] == pytest.approx(kept, abs=0.01)
@@ -103,7 +103,7 @@ def test_flow_and_sharing_are_found_in_both_directions(
 def test_the_truth_lies_in_the_interval() -> None:
     hits = widths = 0.0
     for seed in range(12):
-        for one in found(drive(ramped(), 1.2, noise=0.1, seed=seed)):
+        for one in directions_of(drive(ramped(), 1.2, noise=0.1, seed=seed)):
             flow, half = one.flow
             hits += abs(flow - 1.2) <= half
             widths += half / 24
@@ -122,7 +122,7 @@ def test_the_least_direction_comes_first() -> None:
     def weaker(asked: Sequence[float], flow: float) -> list[float]:
         return alike(asked, flow if sum(asked) > 0.0 else 0.8 * flow)
 
-    assert [one.ways for one in found(drive(ramped(), 1.4, weaker))] == [(-1, -1), (1, 1)]
+    assert [one.ways for one in directions_of(drive(ramped(), 1.4, weaker))] == [(-1, -1), (1, 1)]
 
 
 def test_drives_of_a_driver_may_be_opposite_and_in_several_logs() -> None:
@@ -136,24 +136,24 @@ def test_drives_of_a_driver_may_be_opposite_and_in_several_logs() -> None:
 def test_an_axis_that_gets_no_faster_alone_is_refused(what: dict[str, float]) -> None:
     says = r"slew alone hardly gets faster up to 100 % .* up to 70 % of that only \(--top\)"
     with pytest.raises(CalibrationError, match=says):
-        found(drive(ramped(), **({"flow": 1.2} | what)))
-    within = found(drive(ramped(0.7), **({"flow": 0.8} | what)))
+        directions_of(drive(ramped(), **({"flow": 1.2} | what)))
+    within = directions_of(drive(ramped(0.7), **({"flow": 0.8} | what)))
     assert within[0].flow[0] == pytest.approx(0.8, abs=0.02)
 
 
 def test_a_pump_that_one_axis_may_empty_is_not_believed_unseen() -> None:
     strokes = (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)
     with pytest.raises(CalibrationError, match=r"flow at most 1\.00, what one axis takes"):
-        found(drive(driven(*strokes), 0.8))
+        directions_of(drive(driven(*strokes), 0.8))
     quick = [0.1 * k for k in range(11)]
     rows = [
         [(v * a, v * b) for v in [*quick, *[1.0] * 100, *quick[::-1], *[0.0] * 50]]
         for a, b in strokes
     ]
     with pytest.raises(CalibrationError, match=r"flow at most 1\.00"):
-        found(drive([*rows[0], *rows[1], *rows[2]], 0.8))
-    assert found(drive(ramped(), 1.0))[0].flow[0] == pytest.approx(1.0, abs=0.01)
-    assert found(drive(driven(*strokes), 1.1))[0].flow[0] == pytest.approx(1.1, abs=0.01)
+        directions_of(drive([*rows[0], *rows[1], *rows[2]], 0.8))
+    assert directions_of(drive(ramped(), 1.0))[0].flow[0] == pytest.approx(1.0, abs=0.01)
+    assert directions_of(drive(driven(*strokes), 1.1))[0].flow[0] == pytest.approx(1.1, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -167,13 +167,13 @@ def test_a_pump_that_one_axis_may_empty_is_not_believed_unseen() -> None:
 )
 def test_a_drive_that_is_missing_is_named(strokes: list[tuple[float, float]]) -> None:
     with pytest.raises(CalibrationError, match="expected slew alone, near_far alone and both"):
-        found(drive(driven(*strokes), 1.2))
+        directions_of(drive(driven(*strokes), 1.2))
 
 
 def test_a_feedback_of_nothing_is_refused() -> None:
     still = [[*moment[:4], RESTS[1]] for moment in drive(ramped(), 1.2)]
     with pytest.raises(CalibrationError, match="near_far alone: expected a steady speed, got 0 "):
-        found(still)
+        directions_of(still)
 
 
 def lines(

@@ -1,4 +1,4 @@
-"""``canshaper robust --loads`` and ``--lengths``: several loads, and a load that no one tells."""
+"""``canshaper robust --loads`` and ``--lengths``: several loads, and a load that is not known."""
 
 import json
 import math

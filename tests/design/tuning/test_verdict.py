@@ -160,9 +160,9 @@ def test_an_undamped_tool_gets_a_good_filter(file: Path) -> None:
 def test_every_shipped_filter_is_good(path: Path) -> None:
     if "axes:" not in path.read_text():
         pytest.skip("no deployment")
-    found = dict(verdicts(load_deployment(path)))
-    assert found
-    assert {place: str(one) for place, one in found.items() if one.left > GOOD} == {}
+    judged = dict(verdicts(load_deployment(path)))
+    assert judged
+    assert {place: str(one) for place, one in judged.items() if one.left > GOOD} == {}
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What each weight of Eq. 15 moves, as its page says; weights that stand in a file."""
+"""Each weight of Eq. 15 moves what its page says; weights that stand in a file."""
 
 import math
 import re
