@@ -110,7 +110,7 @@ def distance(axis: AxisState, velocity: float) -> str:
     Where nothing was asked within the tail a partner moves it: limits are its path and its time.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
-    if axis.ran > of.run_on:
+    if axis.ran > of.run_on and axis.beyond(velocity) > EPSILON:
         return f"limit=stop_distance_m allowed={of.run_on:.3f}"
     if asked.most:
         ahead = asked.remaining + of.slack + of.path

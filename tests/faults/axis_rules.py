@@ -141,6 +141,10 @@ class AxisRules:
         while len(self._oil) > 1 and self._oil[1][0] < now_ns - self.tail_ns:
             self._oil.popleft()
 
+    def reloaded(self) -> None:
+        """What was commanded before is forgotten: its partner may move it all the same."""
+        self._commands = deque((at_ns, command, False) for at_ns, command, _ in self._commands)
+
     def silenced(self) -> None:
         """Nothing is sent any more, and the valve closes by itself; from neutral after that."""
         self.velocity, self.armed, self.latched, self._moved = 0.0, False, False, False
