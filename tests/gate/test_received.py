@@ -11,6 +11,7 @@ from canshaper.gate.build import record_of
 from canshaper.gate.checks import E2e
 from canshaper.gate.gate import Gate
 from canshaper.gate.received import Received
+from canshaper.gate.record import Protection
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.machine.deployment import Deployment
 from tests.faults import variants
@@ -64,7 +65,7 @@ def test_with_checksum_and_qualification_too(seed: int) -> None:
     config = bound.config.model_copy(update={"qualify": 1 + seed % 3})
     joysticks = {**deployment.joysticks, "left": replace(bound, config=config)}
     one = Alike(replace(deployment, joysticks=joysticks), "left")
-    field = record_of(deployment).messages["left"].counter
+    field = record_of(deployment).messages["left"].protection.counter
     assert field is not None
     assert bound.protection.check is not None
     count = now_ms = 0
@@ -83,7 +84,7 @@ def test_with_checksum_and_qualification_too(seed: int) -> None:
 
 def test_frames_with_another_multiplexor_say_nothing() -> None:
     message = record_of(load("forwarder")).messages["left"]
-    field = replace(message.counter, shift=40, mask=0xF)  # type: ignore[type-var]
+    field = replace(message.protection.counter, shift=40, mask=0xF)  # type: ignore[type-var]
     for alone in (False, True):
         one = Received(replace(message, page=(field, 3), alone=alone))
 
@@ -100,7 +101,7 @@ def test_frames_with_another_multiplexor_say_nothing() -> None:
 
 def test_the_counter_of_e2e_is_in_its_header() -> None:
     message = record_of(load("forwarder")).messages["left"]
-    header = replace(message, check=E2e("p05", 256, 7), counter=None, counts=256)
+    header = replace(message, protection=Protection(E2e("p05", 256, 7), counts=256))
     one = Received(header)
     for count, counts in ((1, True), (1, False), (2, True), (9, False)):
         data = Profile5(7).protect(bytes(8), count)

@@ -84,9 +84,10 @@ def test_another_protection_begins_anew() -> None:
     one = bench()
     one.rests(5)
     message = one.gate.messages["left"]
-    message.of = replace(message.of, counts=16)
+    message.of = replace(message.of, protection=replace(message.of.protection, counts=16))
     valve, axes = one.gate.valves[one.key]
-    one.gate.valves[one.key] = replace(valve, counts=16), axes
+    other = replace(valve.protection, counts=16)
+    one.gate.valves[one.key] = replace(valve, protection=other), axes
     after = reloaded(one)
     assert after.gate.messages["left"].count is None
     assert one.key not in after.gate.counts
