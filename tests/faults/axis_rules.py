@@ -110,8 +110,10 @@ class AxisRules:
             self._side, self._turned_ns = -self._side, now_ns
         turns_ns = (axis.reversal + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
         self._turns = bool(axis.reversal) and now_ns - self._turned_ns <= turns_ns
-        # The daemon may not have been ready in the tick in which it was armed here.
-        self._moved = self.armed and (self._moved or self.raw != 0)
+        # The daemon may not have been ready in the tick in which it was armed here; what moves in a
+        # stop, at rest in between or not, shows nothing of that.
+        ready = self.armed and self._stop_until_ns is None
+        self._moved = ready and (self._moved or self.raw != 0)
         recent.append((now_ns, command, self._moved))
         tail_ns = self.tail_ns
         # What was commanded until the next entry counts up to there.

@@ -44,6 +44,8 @@ def test_no_sequence_makes_a_wrong_move(name: str) -> None:
         ("canopen-sensor", 2700602),
         # a tap of 2 %, a trip and a reload: the rules asked of the axis to know of the tap
         ("j1939-sensor", 2700324),
+        # a stop with a rest in it: the rules took what moved then for the joystick's
+        ("forwarder-robust", 3101022),
     ],
 )
 def test_what_was_wrong_once_is_right(name: str, seed: int) -> None:
