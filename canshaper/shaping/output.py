@@ -40,6 +40,8 @@ from canshaper.shaping.small_strokes import SmallStrokes
 
 # Largest quantisation error of an added velocity that is carried, full speed times ticks.
 MOST_CARRY = 0.1
+# A velocity that is none: more than the rounding of floats.
+NOTHING = 1e-6
 
 
 @dataclass(slots=True)
@@ -168,7 +170,7 @@ class OutputStage:
         if no_run_on:
             self._no_run_on -= 1
             recent.clear()
-        self._end_run_on(held)
+        no_run_on = self._end_run_on(held) or no_run_on
         recent.add(demand)
         low, high = allowed_range(recent.low, recent.high, limits)
         own = within(reference, low, high, limits.minimum)
@@ -214,28 +216,35 @@ class OutputStage:
         if added:
             carry = self._carry + total - output.setpoint
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
+        beyond = self._beyond(held)
+        self._ran = self._ran + beyond * self._tick_s if beyond or not held else 0.0
 
-    def _end_run_on(self, held: float) -> None:
+    def _end_run_on(self, held: float) -> bool:
         """End what runs on beyond the joystick, by the fall, where it reaches a limit.
 
         After a reversal that is a time, and always a way: what will be left of it once the axis has
         fallen from its velocity. A joystick that asks for so much velocity begins the way again.
+        Returns whether the way is at its end.
         """
-        recent, own = self._recent, self._own_ramp
+        recent = self._recent
         if held * self._side < 0.0:
             self._reverse()
         if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
             recent.clear_against(self._side)
         self._crossed += 1
-        asked = held if own > 0.0 else -held
-        beyond = abs(own) - asked if asked > 0.0 else abs(own)
-        if beyond > 0.0:
-            self._ran += beyond * self._tick_s
-            falling = 0.5 * beyond * beyond / self.limits.fall_per_s
-            if self._ran + falling > self.limits.run_on:
-                recent.clear()
-        elif held:
-            self._ran = 0.0
+        beyond, limits = self._beyond(held), self.limits
+        over = self._ran + 0.5 * beyond * beyond / limits.fall_per_s > limits.run_on
+        if over:
+            recent.clear()
+        return over
+
+    def _beyond(self, held: float) -> float:
+        """How much faster than asked: the own part; or all (see gate), less what may be added."""
+        own, sent = self._own_ramp, self.output.setpoint
+        own_asked, asked = held if own > 0.0 else -held, held if sent > 0.0 else -held
+        own_beyond = abs(own) - max(own_asked, 0.0)
+        beyond = max(own_beyond, abs(sent) - max(asked, 0.0) - self.largest_added)
+        return beyond if beyond > NOTHING else 0.0
 
     def _range_with_added(
         self, held: float, own: float, largest: float, no_run_on: bool
@@ -313,7 +322,7 @@ class OutputStage:
         self._demanded.age(ticks)
         self._no_run_on -= ticks
         self._crossed += ticks
-        self._ran += abs(self._own_ramp) * ticks * self._tick_s
+        self._ran += self._beyond(0.0) * ticks * self._tick_s
         self._small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:

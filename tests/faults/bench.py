@@ -191,6 +191,8 @@ class Bench:
         self.applied += 1
         for address in self.rules.addresses.values():
             address.reloaded = True
+        for axis in self.rules.axes.values():
+            axis.reloaded()
         self._hold("in a reload")
 
     def _hold(self, where: str) -> None:

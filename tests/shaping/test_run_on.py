@@ -79,6 +79,23 @@ def test_it_reaches_the_limit_and_falls(sign: float) -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("turns", [20, 999])
+def test_what_is_added_beyond_its_bound_counts_too(sign: float, turns: int) -> None:
+    """As fast as was asked within the tail, to one side or to both; then as what may be added."""
+    axis = axis_of(Anything(), replace(LIMITS, tail_s=4.0))
+    axis.allow_added(0.25, 9.0)
+    for tick in range(60):
+        axis.tick(CommandInput(sign if tick // 20 % 2 else -sign))
+    sent = []
+    for tick in range(140):
+        axis.tick(CommandInput(), sign if tick // turns % 2 else -sign)
+        sent.append(abs(axis.sent))
+    beyond = sum(max(size - 0.25, 0.0) for size in sent) * TICK_S
+    assert beyond == pytest.approx(0.5, abs=TICK_S)
+    assert max(sent[-40:]) == pytest.approx(0.25, abs=STEP)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_lower_demand_bounds_what_runs_on_beyond_it(sign: float) -> None:
     """The axis ends at the demand, which goes on for as long as it is held."""
     axis = axis_of(Anything(sign))
