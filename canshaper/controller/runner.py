@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.sent import Sender
+from canshaper.codec.message import Sender
 from canshaper.config.schema import AxisSection
 from canshaper.controller.parameter_sets import Load, SetChooser
 from canshaper.inputs.feedback import Feedback

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.sent import Sender
+from canshaper.codec.message import Sender
 from canshaper.codec.status import StatusCodec
 from canshaper.controller.ends import AimPoint
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent

@@ -11,8 +11,8 @@ from cantools.database.can import Message
 from pydantic import PydanticSchemaGenerationError, TypeAdapter, ValidationError
 
 from canshaper.codec.layout import is_fd
+from canshaper.codec.message import SentMessage
 from canshaper.codec.rewrite import RewrittenMessage, neutral_fault
-from canshaper.codec.sent import SentMessage
 from canshaper.config.bus import LAST_SPN, Bus, Gateway, J1939Name
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Place

@@ -6,11 +6,11 @@ from typing import Any, Generic, TypeVar
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.flags import Velocity
 from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import Chosen, Layout, is_j1939
-from canshaper.codec.protection import Protection, SequenceChecker
+from canshaper.codec.message import Protection, SequenceChecker
 from canshaper.codec.signals import ends_fault, find_signal, radius_range
+from canshaper.codec.velocity import Velocity
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
-from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.sense import flag_fault
 from canshaper.codec.signals import (
-    VelocitySignal,
     few_steps,
     find_signal,
     full_scale,
@@ -16,6 +14,7 @@ from canshaper.codec.signals import (
     neutral_fault,
     symmetrical_range,
 )
+from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, VelocitySignal
 from canshaper.config.enable import conditions, named_by
 from canshaper.config.inputs import InputSection, SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling

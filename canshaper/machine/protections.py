@@ -7,7 +7,7 @@ from cantools.database.can import Signal
 
 from canshaper.checksums.kinds import CHECKSUMS, CRC_WIDTHS, Checksum, crc_kind
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
-from canshaper.codec.protection import UNPROTECTED, Protection
+from canshaper.codec.message import UNPROTECTED, Protection
 from canshaper.config.protection import Checksum as ChecksumConfig
 from canshaper.config.protection import Protected
 from canshaper.config.source import Place

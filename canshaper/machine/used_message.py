@@ -8,13 +8,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.identifier import STATE_BITS
 from canshaper.codec.layout import Chosen, is_j1939
-from canshaper.codec.signals import (
-    code_fault,
-    find_signal,
-    names_broken,
-    raw_fault,
-    raw_limits,
-)
+from canshaper.codec.signals import code_fault, find_signal, names_broken, raw_fault, raw_limits
 from canshaper.config.source import Place
 from canshaper.errors import there_are
 from canshaper.machine.contraries import Contrary, contrary_fault

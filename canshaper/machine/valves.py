@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.protection import Protection
+from canshaper.codec.message import Protection, SentMessage
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.sense import direction_fault
-from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import (
     command_fault,
     find_signal,
@@ -20,7 +19,7 @@ from canshaper.codec.signals import (
     symmetrical_range,
 )
 from canshaper.codec.status import ReportedAxis, StatusCodec
-from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec
+from canshaper.codec.velocity import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
 from canshaper.config.limits import Ends
 from canshaper.config.schema import (

@@ -4,8 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.protection import UNPROTECTED, SequenceChecker
-from canshaper.codec.sent import Sender, SentMessage
+from canshaper.codec.message import UNPROTECTED, Sender, SentMessage, SequenceChecker
 from canshaper.codec.signals import find_signal
 from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.codec.valve import ValveCodec
+from canshaper.codec.velocity import ValveCodec
 from canshaper.controller.controller import Controller
 from canshaper.controller.runner import AxisControl
 from canshaper.daemon.daemon import Daemon
