@@ -50,7 +50,7 @@ class _Member:
         full, (back, ahead) = moving.full_speed, runner.room
         moving.room_m = full * back, full * ahead
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
-        moving.commanded, moving.able = axis.commanded, axis.state in ABLE
+        moving.commanded, moving.able = axis.output.commanded, axis.state in ABLE
         moving.unattended = axis.unattended
 
 
@@ -126,7 +126,7 @@ class MotionRunner:
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
             moving, runner = member.moving, member.runner
-            runner.add_velocity(moving.added, damps=moving.damps)
+            runner.added, runner.damps = moving.added, moving.damps
             runner.displaced = moving.reached / moving.full_speed
             if self._motion.unattended:
                 runner.axis.renew_added_time()

@@ -53,6 +53,7 @@ class AxisControl:
             seconds.
         displaced: how far the motion has moved it from where its own commands lead, in the same
             unit.
+        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.
@@ -92,7 +93,7 @@ class AxisControl:
         self._trip: Reason | None = None  # noted since the last tick
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
-        self.add_velocity(0.0, damps=False)
+        self.added, self.damps = 0.0, False
         self.room = -math.inf, math.inf
         self.displaced = 0.0
         self.run_on: RunOn | None = None
@@ -130,18 +131,9 @@ class AxisControl:
         self._trip = self._trip or Reason.SECOND_SENDER
         self._foreign_ns = now_ns
 
-    @property
-    def added(self) -> float:
-        """Velocity that a two-axis motion adds to this axis, fraction of full speed."""
-        return self._added
-
-    def add_velocity(self, added: float, *, damps: bool) -> None:
-        """Take the velocity that a two-axis motion adds from now on, see ``ShapedAxis.act``."""
-        self._added, self._damps = added, damps
-
     def drop_added(self) -> None:
         """Add nothing from now on; the next output is not faster for what was added."""
-        self.add_velocity(0.0, damps=False)
+        self.added, self.damps = 0.0, False
         self.axis.drop_added()
 
     def new_filter(self) -> tuple[Shaper, SwayModel | None]:
@@ -195,7 +187,7 @@ class AxisControl:
         """
         self._joystick = joystick
         self.alone = True
-        self.add_velocity(0.0, damps=False)
+        self.added, self.damps = 0.0, False
         if axis is not None:
             self.axis, self.chooser = axis, None
 
@@ -253,8 +245,9 @@ class AxisControl:
             fault = self._objections(now_ns, emergency)
         axis, joystick = self.axis, self._joystick
         trip, self._trip = self._trip, None
-        command = joystick.command(self._signal, now_ns, self._releases, trip, self._neutral_band)
-        self._releases = joystick.releases
+        command, self._releases = joystick.command(
+            self._signal, now_ns, self._releases, trip, self._neutral_band
+        )
         # A release is more than a fault.
         if fault is not None and (command.enabled or axis.neutral):
             # Another switch that does not agree must not hide a release of the one to press. Where
@@ -272,13 +265,13 @@ class AxisControl:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
-            axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
-        state = axis.state
-        transition = axis.act(command, self._added, damps=self._damps)
+            axis.sensed.measure(value, scale, commanded=axis.output.commanded, damps=self.damps)
+        transition = axis.act(command, self.added, damps=self.damps)
         try:
             self._put(self.valve.raw, axis.output.steps)
         except Exception as error:  # nothing of it is left in the message
-            transition = axis.invalidate(state, error)
+            old = axis.state if transition is None else transition.old
+            transition = axis.invalidate(old, error)
             self.put(0)
         return transition
 

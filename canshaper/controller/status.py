@@ -37,7 +37,8 @@ class StatusMessages:
         axes: Iterable[AxisControl],
         senders: Mapping[MessageKey, Sender],
     ) -> None:
-        self._deployment, self._axes, self._senders = deployment, list(axes), senders
+        self._deployment, self._senders = deployment, senders
+        self._axes = [one for one in axes if one.bound.status]
         self.aims: list[AimPoint] = []
 
     def frames(
@@ -52,27 +53,23 @@ class StatusMessages:
             now: number of this one.
         """
         for runner in self._axes:
-            if (runner in changed or _due(last, now, runner.bound.status_ticks)) and (
+            ticks = runner.bound.status_ticks
+            if (runner in changed or now // ticks > last // ticks) and (
                 frame := runner.status_frame()
             ):
                 yield frame
         for aim in self.aims:
-            if _due(last, now, aim.ticks):
+            if now // aim.ticks > last // aim.ticks:
                 aim.update()
                 yield self._senders[aim.codec.message.key].frame(aim.codec.values(aim))
-        status = self._deployment.status
-        if status and _due(last, now, self._deployment.status_ticks):
+        status, ticks = self._deployment.status, self._deployment.status_ticks
+        if status and now // ticks > last // ticks:
             yield self._senders[status.message.key].frame(status.values(counters.status()))
 
     def identity(self, status: StatusCodec[int]) -> Frame:
         """Return the digest of what runs, in the message that carries it."""
         values = status.values(self._deployment.identity.digest)
         return self._senders[status.message.key].frame(values)
-
-
-def _due(last: int, now: int, period: int) -> bool:
-    """Whether a multiple of the period lies after the first deadline, up to the second."""
-    return period > 0 and now // period > last // period
 
 
 # A length that differs by this factor from the one that was reported last is reported.

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, on_grid, with_deadband, without_deadband
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
+from canshaper.shaping.transfer import Off
 from canshaper.shaping.valve_curve import ValveCurve
 
 # Opens at 7 % one way and at 4 % the other, where it is slower.
