@@ -6,14 +6,13 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.controller.ends import AimPoint, AxisEnds
+from canshaper.controller.demands import AxisEnds, SharedFlow
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.hydraulics import SharedFlow
 from canshaper.controller.motion import motion_runners
 from canshaper.controller.parameter_sets import Load
 from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
-from canshaper.controller.status import SensorReport, StatusMessages
+from canshaper.controller.status import AimPoint, SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
 from canshaper.inputs.input import EnableGate, Key, Part, carry_over
 from canshaper.machine.deployment import Deployment

@@ -9,10 +9,9 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.message import Sender
 from canshaper.config.schema import AxisSection
 from canshaper.controller.parameter_sets import Load, SetChooser
-from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
-from canshaper.inputs.value import ProfileChoice, Value
+from canshaper.inputs.value import Feedback, ProfileChoice, Value
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey

@@ -4,8 +4,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.runner import AxisControl
-from canshaper.inputs.feedback import Following
 from canshaper.inputs.input import Key
+from canshaper.inputs.value import Following
 from canshaper.shaping.states import State
 from tests.controller.reloaded import Make, reload
 from tests.rigs.canopen import OPERATIONAL, PRE_OPERATIONAL, CanopenRig
