@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Self
 from canshaper.codec.frame import Frame
 from canshaper.codec.message import Sender
 from canshaper.config.schema import AxisSection
-from canshaper.controller.parameter_sets import Load, SetChooser
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
 from canshaper.inputs.value import Feedback, ProfileChoice, Value
@@ -32,6 +31,7 @@ from canshaper.shaping.states import (
 from canshaper.shaping.sway import SwayModel
 
 if TYPE_CHECKING:
+    from canshaper.controller.parameter_sets import Load, SetChooser
     from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
@@ -152,8 +152,10 @@ class AxisControl:
         """Add an interlock: it has to agree before the axis may move."""
         self._interlocks.append(interlock)
 
-    def add_chooser(self, load: Load | None, profile: ProfileChoice | None) -> None:
+    def add_chooser(self, load: "Load | None", profile: ProfileChoice | None) -> None:
         """Let load and operator choose sway data and filter."""
+        from canshaper.controller.parameter_sets import SetChooser
+
         self.chooser = SetChooser(self.bound, self.axis, load, profile)
 
     def add_sway_sensor(self, message: "SwaySensorInput") -> None:
