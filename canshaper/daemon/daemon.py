@@ -3,7 +3,6 @@
 import logging
 import os
 import signal
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import FrameType
@@ -21,6 +20,7 @@ from canshaper.daemon.ports import (
     close_ports,
     new_ports,
     open_ports,
+    opened_ports,
     received_at_first,
     seen_sent,
     send_neutral,
@@ -45,8 +45,6 @@ log = logging.getLogger("canshaper")
 _AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE, BusState.UNFIT)
 INTERNAL_ERROR = "INTERNAL_ERROR"
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))
-# How often buses are tried that cannot be opened at the start.
-WAIT_S = 0.5
 
 
 class Daemon:
@@ -72,7 +70,7 @@ class Daemon:
         self._black_box = BlackBox(folder)
         deployment = load()
         program_sha256()  # kept from now on: to read the program takes longer than a tick
-        self._ports = self._opened(deployment)
+        self._ports = opened_ports(deployment, self._on_fault, self._manager)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)
         self._use(deployment)
@@ -182,25 +180,6 @@ class Daemon:
         """Entries that the status line of the service begins with."""
         trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
         return trouble + ["tick plain"] * bool(self._follower and not self._follower.follows)
-
-    def _opened(self, deployment: Deployment) -> dict[str, Port]:
-        """Open the buses; under a service manager, wait for them.
-
-        A restart for each try would load the program each time, and take the processor from the
-        instance of another machine.
-        """
-        said = ""
-        while True:
-            try:
-                return open_ports(deployment, {}, self._on_fault)
-            except BusError as error:
-                if not self._manager.present:
-                    raise
-                if str(error) != said:
-                    said = str(error)
-                    log.error("waiting for a bus: %s", said)
-                self._manager.waiting(f"waiting: {said.splitlines()[0]}")
-                time.sleep(WAIT_S)
 
     # -- deployments ---------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ from canshaper.machine.used_message import NamedCode, StartValue
 from canshaper.machine.valves import BoundAxis
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Deployment:
     """Everything the controller needs, checked."""
 

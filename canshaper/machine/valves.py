@@ -268,7 +268,7 @@ def _alike(one: Signal, other: Signal) -> bool:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BoundAxis:
     """An axis with its valve message and, where it has one, its status message.
 
@@ -279,7 +279,6 @@ class BoundAxis:
 
     name: str
     config: AxisSection
-    valve_message: Message
     valve: ValveCodec
     period_ticks: int
     timeout_ms: int
@@ -289,6 +288,11 @@ class BoundAxis:
     status_word: Bound[StatusWord] | None = None
     ends: BoundValue[Ends] | None = None
     sway_sensor: "BoundSwaySensor | None" = None
+
+    @property
+    def valve_message(self) -> Message:
+        """The message of its valve."""
+        return self.valve.message.fields.message
 
     @property
     def rewrites(self) -> bool:
