@@ -7,16 +7,18 @@ news, a larger one is a wrong sequence.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from cantools.database.can import Message, Signal
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.e2e import E2e
 from canshaper.codec.frame import Frame, FrameFault, new_frame
 from canshaper.codec.identifier import with_source
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import raw_limits
+
+if TYPE_CHECKING:
+    from canshaper.codec.e2e import E2e
 
 GOOD = FrameFault.NONE  # by way of the class it takes ten times as long
 
@@ -33,7 +35,7 @@ class Protection:
 
     counter: str | None = None
     counts: int = 0
-    check: Checksum | E2e | None = None
+    check: "Checksum | E2e | None" = None
 
 
 UNPROTECTED = Protection()
@@ -97,8 +99,11 @@ class SentMessage:
         key: bus, id and whether that is extended.
         fields: its signals.
         protection: that of its frames.
+        rewrites: whether they are a joystick's on their way through a gateway.
         start: raw value of every signal at first; valve codecs put neutral in while they are bound.
     """
+
+    rewrites = False
 
     def __init__(
         self,
@@ -190,7 +195,8 @@ class SequenceChecker:
         self._range = protection.counts
         self._max_step = max_step
         self._check = protection.check
-        self._header = protection.check if isinstance(protection.check, E2e) else None
+        # Without a signal for it, the counter is that of E2E, in its header.
+        self._header: Any = None if protection.counter else protection.check
         self._qualify = qualify
         self._last: int | None = None
         self._resynced = True

@@ -33,6 +33,8 @@ class RewrittenMessage(SentMessage):
         mask_of_all: ``ours_mask`` with the bits of the alive counter.
     """
 
+    rewrites = True
+
     def __init__(
         self,
         bus: str,

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.enable import slowest_ms
 from canshaper.config.schema import AxisSection
@@ -24,7 +23,7 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
     if not lookup.diagnostics.problems:  # else a signal may be unused because it was not bound
         for shared in shared_valves.values():
-            if not isinstance(shared.codec, RewrittenMessage):  # its signals are the joystick's
+            if not shared.codec.rewrites:  # its signals are the joystick's
                 shared.used.check_start_values(shared.codec.start)
     bound = {n: axis for n, axis in axes.items() if axis}
     if not any(axis.sway_sensor for axis in lookup.config.axes.values()):

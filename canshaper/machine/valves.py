@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.message import Protection, SentMessage
-from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.sense import direction_fault
 from canshaper.codec.signals import (
     command_fault,
@@ -213,6 +212,8 @@ def _rewritten_message(
     at = valve.bus, used.message, used.can_id & 0xFF, protection
     if enable is None or find_signal(used.message, enable) is None:  # noted with the joystick
         return SentMessage(*at)
+    from canshaper.codec.rewrite import RewrittenMessage
+
     return RewrittenMessage(*at, enable=enable, ours=frozenset(ours))
 
 
@@ -297,4 +298,4 @@ class BoundAxis:
     @property
     def rewrites(self) -> bool:
         """Whether its command leaves in the frames of its own joystick, through a gateway."""
-        return isinstance(self.valve.message, RewrittenMessage)
+        return self.valve.message.rewrites
