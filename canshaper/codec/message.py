@@ -20,6 +20,8 @@ from canshaper.codec.signals import raw_limits
 if TYPE_CHECKING:
     from canshaper.codec.e2e import E2e
 
+# Two frames may be lost in a row; more is no longer the noise of a bus.
+USUAL_MAX_STEP = 3
 GOOD = FrameFault.NONE  # by way of the class it takes ten times as long
 
 
@@ -183,17 +185,17 @@ class SequenceChecker:
 
     Args:
         protection: that of the message.
-        max_step: largest step of the counter that is still the next one.
+        max_step: largest step of the counter that is still the next one; None for the usual one.
         qualify: good frames in a row that are needed at the start and after a wrong one.
 
     Attributes:
         qualified: whether the last frame, found good, may be used: enough have come in a row.
     """
 
-    def __init__(self, protection: Protection, max_step: int, qualify: int) -> None:
+    def __init__(self, protection: Protection, max_step: int | None, qualify: int) -> None:
         self._protection = protection
         self._range = protection.counts
-        self._max_step = max_step
+        self._max_step = max_step or min(USUAL_MAX_STEP, protection.counts // 2)
         self._check = protection.check
         # Without a signal for it, the counter is that of E2E, in its header.
         self._header: Any = None if protection.counter else protection.check

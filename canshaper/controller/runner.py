@@ -53,6 +53,7 @@ class AxisControl:
         displaced: how far the motion has moved it from where its own commands lead, in the same
             unit.
         added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
+        radius: measured radius of the tip of an axis that slews, where that is known.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.
@@ -99,7 +100,7 @@ class AxisControl:
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
-        self._radius: Value | None = None
+        self.radius: Value | None = None
         self._sway_signal: SwaySignal | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
@@ -169,10 +170,6 @@ class AxisControl:
         self._sway_signal = SwaySignal(message, bound)
         damps = bound.config.use == "damp"
         self.axis.sensed = SensedSway(sway, bound.timing, bound.limits, bound.gains, damps=damps)
-
-    def add_radius(self, radius: Value | None) -> None:
-        """Take the measured radius of a slewing axis, by which the speed of its tip is computed."""
-        self._radius = radius
 
     def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of the sway sensor only while this node works."""
@@ -310,7 +307,7 @@ class AxisControl:
 
     def _scale(self, now_ns: int) -> float:
         """Swing in rad of a model angle of 1, see ``SwayModel``, at the tip's full speed now."""
-        if self._radius is not None and (radius_m := self._radius.fresh(now_ns)):
+        if self.radius is not None and (radius_m := self.radius.fresh(now_ns)):
             slewing = self.bound.config.slewing
             assert slewing is not None  # checked with the deployment
             self._full_speed_m_s = max(radius_m, LEAST_RADIUS_M) * slewing.full_speed_rad_s

@@ -61,6 +61,7 @@ class ShapedAxis:
             is added to damp a swing.
         unattended: whether the joystick rested longer than the tail, where a motion may move the
             axis.
+        added_time: how long a motion may still move the axis.
         error: how the filter has failed, see ``Transition``; empty unless it has while the axis
             entered TRIPPED or was in it.
     """
@@ -88,7 +89,7 @@ class ShapedAxis:
         self._transfer = BumplessTransfer(shaper, tick_s)
         self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
         self.output = self._stage.output
-        self._added_time = AddedTime(0)
+        self.added_time = AddedTime(0)
         self._asked = False  # the motion asked this axis for something in the last tick
         self._rested = 0  # ticks since its joystick was deflected, in whatever state
         self.unattended = False
@@ -157,7 +158,7 @@ class ShapedAxis:
             if not joystick.bypass:
                 damps_now = damps and sensor_damps and not commanded
                 asked = added != 0.0 or damps_now
-            may_add = self._added_time.allows(asked, commanded, moved)
+            may_add = self.added_time.allows(asked, commanded, moved)
         self._asked = asked
 
         at_rest = self.output.steps == 0 and not self.output.commanded
@@ -217,7 +218,7 @@ class ShapedAxis:
         self._stage.hold(demand, ticks)
         self._rested += ticks
         self.unattended = self._rested > self._stage.tail + UNATTENDED_TICKS
-        self._added_time.allows(self._asked, self.output.commanded, self.output.steps != 0, ticks)
+        self.added_time.allows(self._asked, self.output.commanded, self.output.steps != 0, ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
                 self._transfer.hold(demand)
@@ -254,11 +255,7 @@ class ShapedAxis:
             time_s: longest time in motion.
         """
         self._stage.largest_added = largest
-        self._added_time = AddedTime(round(time_s / self._tick_s))
-
-    def renew_added_time(self) -> None:
-        """Restore the full time for which a motion may move the axis."""
-        self._added_time.renew()
+        self.added_time = AddedTime(round(time_s / self._tick_s))
 
     def drop_added(self) -> None:
         """End what was added at once: the motion has lost the right to move this axis."""
