@@ -41,6 +41,7 @@ def test_before_the_first_tick_an_axis_carries_neutral() -> None:
     assert isinstance(axis.raw, int)
     assert axis.output.commanded is False
     assert axis.neutral is True
+    assert axis.unattended is False
 
 
 def test_ticks_missed_before_the_first_one_swing_nothing() -> None:
