@@ -7,8 +7,7 @@ from canshaper.controller.events import ValueEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import Value
-from canshaper.shaping.end_stops import UNBOUNDED, EndStops, bounds
-from canshaper.shaping.flow_budget import FlowBudget
+from canshaper.shaping.demands import UNBOUNDED, EndStops, FlowBudget, bounds
 from canshaper.shaping.limits import within
 from canshaper.shaping.states import Reason, State
 

@@ -13,7 +13,7 @@ from canshaper.controller.valve_messages import Counters
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.motion import BoundMotion
 from canshaper.protocols.interface import MessageKey
-from canshaper.shaping.end_stops import RunOn
+from canshaper.shaping.demands import RunOn
 from canshaper.shaping.states import State, Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 

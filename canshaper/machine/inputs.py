@@ -17,10 +17,9 @@ from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Ends, OtherFlow, Position, Radius
 from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
-from canshaper.machine.contraries import ENABLE, STOP
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
-from canshaper.machine.used_message import UsedMessage, key_path
+from canshaper.machine.used_message import ENABLE, STOP, UsedMessage, key_path
 from canshaper.shaping.states import Reason
 
 Choosing = LoadState | ProfileSwitch

@@ -19,11 +19,10 @@ from canshaper.config.enable import conditions, named_by
 from canshaper.config.inputs import SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
 from canshaper.config.source import Place
-from canshaper.machine.contraries import SWITCH, SWITCHES, flag_of
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.inputs import OF_MESSAGE, Bound, BoundJoystick, bind_input, check_source
 from canshaper.machine.lookup import Lookup
-from canshaper.machine.used_message import UsedMessage
+from canshaper.machine.used_message import SWITCH, SWITCHES, UsedMessage, flag_of
 
 
 @dataclass(frozen=True)
