@@ -57,17 +57,16 @@ class Output:
             no swing, so the sway model is not driven by it.
         damping: velocity that is added to damp the swing which the other axis has caused. It is
             meant to move the grapple, so the sway model is driven by it.
+        applied: the part of the setpoint that drives the sway model: all but ``path``.
+        commanded: whether the operator demanded motion within the tail, so that it may run on.
     """
 
     steps: int = 0
     setpoint: float = 0.0
     path: float = 0.0
     damping: float = 0.0
-
-    @property
-    def applied(self) -> float:
-        """The part of the setpoint that drives the sway model."""
-        return self.setpoint - self.path
+    applied: float = 0.0
+    commanded: bool = False
 
 
 class OutputStage:
@@ -133,11 +132,6 @@ class OutputStage:
         self._carry = 0.0  # what rounding has left out of an added velocity, summed up
         self._dropped_at = 0.0  # ``ramp`` when the right to add was lost, until the next tick
 
-    @property
-    def commanded(self) -> bool:
-        """Whether the operator demanded motion within the tail."""
-        return self._recent.low != 0.0 or self._recent.high != 0.0
-
     def drive(
         self,
         held: float,
@@ -172,13 +166,13 @@ class OutputStage:
             recent.clear()
         no_run_on = self._end_run_on(held) or no_run_on
         recent.add(demand)
+        output.commanded = recent.low != 0.0 or recent.high != 0.0
         low, high = allowed_range(recent.low, recent.high, limits)
         own = within(reference, low, high, limits.minimum)
 
         # 2. Small strokes
         if self._spreads:
-            applied = output.setpoint - output.path
-            movement = self._small.output(demand, applied, own, low, high)
+            movement = self._small.output(demand, output.applied, own, low, high)
             if not sensor_damps:
                 own = movement
 
@@ -192,7 +186,15 @@ class OutputStage:
             if not abs(path) <= 1.0:
                 raise ValueError(f"added velocity is {path}")
             largest = self.largest_added if added else 0.0
-            low, high = self._range_with_added(held, own, largest, no_run_on)
+            low, high = range_with_added(
+                held,
+                self._demanded.low,
+                self._demanded.high,
+                own,
+                largest,
+                maximum=limits.maximum,
+                no_run_on=no_run_on,
+            )
             target = own
             if added:
                 total = within(own + added, low, high, 0.0)
@@ -213,6 +215,7 @@ class OutputStage:
         output.steps, output.setpoint = on_grid(
             ramp, low, high, limits.deadband, self._grid_steps, curve=limits.curve
         )
+        output.applied = output.setpoint - path
         if added:
             carry = self._carry + total - output.setpoint
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
@@ -245,20 +248,6 @@ class OutputStage:
         own_beyond = abs(own) - max(own_asked, 0.0)
         beyond = max(own_beyond, abs(sent) - max(asked, 0.0) - self.largest_added)
         return beyond if beyond > NOTHING else 0.0
-
-    def _range_with_added(
-        self, held: float, own: float, largest: float, no_run_on: bool
-    ) -> tuple[float, float]:
-        """Range of the own and the added velocity together, see ``range_with_added``.
-
-        Without run-on they are neither faster than the joystick nor, in neutral, than ``largest``.
-        """
-        low, high, maximum = self._demanded.low, self._demanded.high, self.limits.maximum
-        if no_run_on:
-            low = held if held < 0.0 else max(low, -largest)
-            high = held if held > 0.0 else min(high, largest)
-        low, high = range_with_added(held, low, high, own, largest)
-        return max(low, -maximum), min(high, maximum)
 
     def _with_carry(self, total: float, low: float, high: float) -> float:
         """Correct a velocity for what rounding has left out in the ticks before.
@@ -297,6 +286,7 @@ class OutputStage:
             self._reverse()
         if not self._reversal and held * self.ramp < 0.0:
             self._recent.clear()
+            self.output.commanded = False
 
     def hold_run_on(self) -> None:
         """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.
@@ -307,12 +297,15 @@ class OutputStage:
 
     def rest(self) -> None:
         """Go to neutral at once, and forget all that may run on."""
-        self._recent.clear()
+        output = self.output
+        if output.commanded:
+            self._recent.clear()
+            output.commanded = False
         if self.largest_added:
             self._demanded.add(0.0)
         self._small.clear()
-        output = self.output
-        output.steps, output.setpoint, output.path, output.damping = 0, 0.0, 0.0, 0.0
+        output.steps = 0
+        output.setpoint = output.path = output.damping = output.applied = 0.0
         self.ramp = self._own_ramp = self._carry = self._dropped_at = 0.0
         self._no_run_on -= 1
 

@@ -1,6 +1,5 @@
 """What the control socket of a daemon is asked, and what of that its log has."""
 
-import logging
 import os
 import stat
 from collections.abc import Callable, Mapping
@@ -14,14 +13,6 @@ from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench
 from tests.daemon.control_client import answered, control
-
-
-@pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> Callable[[str], list[str]]:
-    caplog.set_level(logging.INFO, "canshaper")
-    return lambda what: [
-        f"{r.levelname} {r.getMessage()}" for r in caplog.records if what in r.getMessage()
-    ]
 
 
 @pytest.fixture

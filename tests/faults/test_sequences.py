@@ -13,7 +13,7 @@ import pytest
 
 from canshaper.controller import ends
 from canshaper.controller.controller import Controller
-from canshaper.shaping.flow_budget import FlowBudget
+from canshaper.shaping.demands import FlowBudget
 from tests.faults.judge import Violation
 from tests.faults.lies import LIES
 from tests.faults.sequence import ACTS, SENDING, Sequence, kinds_for

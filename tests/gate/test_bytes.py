@@ -143,6 +143,6 @@ def test_a_frame_of_our_own_asks_for_nothing() -> None:
     assert refused
     one.receives(enable=False)
     one.ticks()
-    one.message.protector.take_back()
+    one.message.take_back()
     data = one.message.own(enabled=True).data
     assert one.gate.leaving(one.key, data) == "limit=bits of an own frame"

@@ -9,10 +9,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.stopping import allowed_s, needed_s, travel
-from canshaper.shaping.valve_curve import ValveCurve
 from tests.shaping.test_stopping import axis_with
 
 DriveWith = Callable[..., Any]
