@@ -19,7 +19,18 @@ from canshaper.report.shift import FIGURES
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator_model import Skill
 from canshaper_sim.recorder import Recorder
-from tests.recording.shift_logs import MONDAY_S, Part, swing_deg, tip_m_s, waited_s, written
+from tests.blackbox.driven import SECOND, TRIP, drive
+from tests.daemon.bench import Bench
+from tests.recording.shift_logs import (
+    MONDAY_S,
+    Part,
+    dbc,
+    lines,
+    swing_deg,
+    tip_m_s,
+    waited_s,
+    written,
+)
 
 HOUR_S = 3600.0
 # Out, a tap on the way, a tap back against one, and the way back: one cycle. Then with anti-sway
@@ -120,15 +131,9 @@ def test_a_valve_without_frames_closes(tmp_path: Path) -> None:
     first = [Part(1.0), Part(2.0, (50, 0), (80, 0))]
     path = written(tmp_path / "a.log", first)
     with path.open("a") as log:
-        log.write("".join(lines_of([Part(3.0, (50, 0))], MONDAY_S + 3.0)))
+        log.write("".join(lines([Part(3.0, (50, 0))], MONDAY_S + 3.0, valves=False)))
     (row,), _ = counted(path)
     assert row["way_m"] == pytest.approx(2.2 * tip_m_s(80, "slew"), abs=0.06)
-
-
-def lines_of(parts: list[Part], begin_s: float) -> list[str]:
-    from tests.recording.shift_logs import lines
-
-    return [*lines(parts, begin_s, valves=False)]
 
 
 def test_an_axis_that_was_never_ready_is_said(tmp_path: Path) -> None:
@@ -219,6 +224,27 @@ def test_the_simulators_operator_is_counted_as_it_counted(
     assert row["measured_pct"] == pytest.approx(100.0 if sensor else 0.0, abs=1.0)
     assert row["waiting_s"] == pytest.approx(waits_s, rel=0.05 if sensor else 0.45)
     assert row["peak_deg"] == pytest.approx(max(crane.sway_deg), rel=0.03 if sensor else 0.15)
+
+
+@pytest.mark.slow
+def test_a_black_box_is_counted_by_what_its_daemon_sent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, folder = Bench(tmp_path, monkeypatch), tmp_path / "boxes"
+    folder.mkdir()
+    drive(bench, folder, TRIP + 6 * SECOND)
+    out = tmp_path / "t.csv"
+    result = run(folder / "machine-0001.zip", "--out", out)
+    assert result.exit_code == 0, result.output
+    with out.open() as file:
+        (row,) = csv.DictReader(file)
+    valve = dbc.get_message_by_name("SlewCommand")
+    sent = [f for f in bench.sent if f.can_id == valve.frame_id]
+    sent = sent[: len(sent) - SECOND]  # it is written 5 s after the trip
+    way_m = sum(abs(tip_m_s(valve.decode(f.data)["Velocity"], "slew")) * 0.02 for f in sent)
+    assert float(row["way_m"]) == pytest.approx(way_m, rel=0.02)
+    assert (row["anti_sway"], row["cycles"], row["taps"]) == ("on", "0", "0")
+    assert "note:" not in result.output
 
 
 def run(*arguments: object) -> Result:

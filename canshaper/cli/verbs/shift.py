@@ -17,17 +17,7 @@ GROUP = "measure"
 
 EXIT_NOT_READ = 1
 SUFFIXES = (".csv", ".parquet")
-_HEADS = {
-    "driven_s": ("driven\nmin", 1.0 / 60.0, 1),
-    "cycles": ("cycles\n", 1.0, 0),
-    "way_m": ("way\nm", 1.0, 0),
-    "waiting_s": ("waits\ns", 1.0, 0),
-    "taps": ("taps\n", 1.0, 0),
-    "reversals": ("rever-\nsals", 1.0, 0),
-    "peak_deg": ("peak\ndeg", 1.0, 1),
-    "cycle_peak_deg": ("cycle's\ndeg", 1.0, 1),
-    "measured_pct": ("measured\n%", 1.0, 0),
-}
+_WORDS, _UNSHOWN = ("machine", "shift", "crane", "profile", "anti_sway"), "logged_s"
 
 
 def shift(
@@ -83,8 +73,7 @@ def shift(
         for path in logs:
             for machine, log in logs_below(path, ".zip") if path.is_dir() else [("", path)]:
                 try:
-                    place = Path(folder, str(len(opened)))
-                    opened.append(_opened(machine, log, config, channel or [], place))
+                    opened.append(_opened(machine, log, config, channel or [], folder))
                 except CanshaperError as error:
                     faults.append(error)
         for number, one in enumerate(sorted(opened, key=lambda one: one.start_ns)):
@@ -101,14 +90,12 @@ def shift(
     if not rows:
         text = f"{', '.join(map(str, logs))}: expected a log, got none"
         raise faults[0] if faults else UsageError(text)
-    table = new_table("shift, anti-sway", *(head for head, _, _ in _HEADS.values()))
+    shown = [key for key in rows[0] if key not in (*_WORDS, _UNSHOWN)]
+    table = new_table("shift, anti_sway", *(key.replace("_", "_\n", 1) for key in shown))
     for row in rows:
-        words = (row[key] for key in ("machine", "shift", "crane", "profile", "anti_sway"))
-        cells = [
-            NOTHING if row[key] is None else f"{scale * row[key]:.{digits}f}"
-            for key, (_, scale, digits) in _HEADS.items()
-        ]
-        table.add_row(" ".join(word for word in words if word), *cells)
+        cells = (row[key] for key in shown)
+        numbers = (NOTHING if one is None else f"{one:.1f}".removesuffix(".0") for one in cells)
+        table.add_row(" ".join(row[key] for key in _WORDS if row[key]), *numbers)
     results.print(table)
     results.print("Swing that is not measured is that of the model, driven by the valve commands.")
     for note in notes:
@@ -124,7 +111,7 @@ def shift(
 
 
 def _opened(
-    machine: str, path: Path, config: str | None, channel: list[str], place: Path
+    machine: str, path: Path, config: str | None, channel: list[str], folder: str
 ) -> "LogOfWork":
     from canshaper.recording.bundle import unpack
     from canshaper.recording.replay import look
@@ -133,7 +120,7 @@ def _opened(
     with os_errors(path):
         log, file, inside = path, config, None
         if path.suffix.lower() == ".zip":
-            place.mkdir(exist_ok=True)
+            place = Path(tempfile.mkdtemp(dir=folder))
             log, own = unpack(path, place)
             if config is None:
                 file, inside = str(own), place
