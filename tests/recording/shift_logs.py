@@ -30,18 +30,20 @@ class Part(NamedTuple):
 
 
 def lines(
-    parts: Iterable[Part], begin_s: float = MONDAY_S, *, valves: bool = True, enable: int = 1
+    parts: Iterable[Part], begin_s: float = MONDAY_S, *, valves: bool = True, **switched: int
 ) -> Iterator[str]:
     """Yield the log of candump: joysticks, valves, a status ten times a second."""
     number = 0
     for part in parts:
         for _ in range(round(part.seconds / TICK_S)):
-            time_s, counter = begin_s + number * TICK_S, number % 256
-            switches = {"Enable": enable, "AntiSwayOff": 0, "Reset": 0, "AliveCounter": counter}
+            time_s = begin_s + number * TICK_S
+            counter = round((time_s - MONDAY_S) / TICK_S) % 256
+            switches = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0, "AliveCounter": counter}
+            switches |= switched
             slew, near_far = part.joystick
             sent = {
                 "JoystickLeft": {"Slew": slew, "NearFar": near_far, **switches},
-                "JoystickRight": {"Lift": 0, "Rotate": 0, **switches},
+                "JoystickRight": {"Lift": 0, "Rotate": 0, **switches, "AntiSwayOff": 0},
             }
             if valves:
                 for name, velocity in zip(("Slew", "NearFar"), part.valve, strict=True):

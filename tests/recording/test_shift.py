@@ -15,14 +15,16 @@ from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.recording.replay import look
 from canshaper.recording.shift import LogOfWork, Shifts, first_ns
-from canshaper.report.shift import FIGURES
+from canshaper.report.shift import FIGURES, Figures, WorkCounter
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator_model import Skill
 from canshaper_sim.recorder import Recorder
 from tests.blackbox.driven import SECOND, TRIP, drive
+from tests.controller.test_profiles import BUTTON, FAST, SLEW
 from tests.daemon.bench import Bench
 from tests.recording.shift_logs import (
     MONDAY_S,
+    ROOT,
     Part,
     dbc,
     lines,
@@ -33,11 +35,13 @@ from tests.recording.shift_logs import (
 )
 
 HOUR_S = 3600.0
+CONFIG, DBC = ROOT / "config", ROOT / "dbc"
 # Out, a tap on the way, a tap back against one, and the way back: one cycle. Then with anti-sway
 # off: near-far alone.
 OUT = [Part(1.0), Part(3.0, (100, 0), (80, 0)), Part(4.0)]
 TAPS = [Part(0.4, (-50, 0), (-48, 0)), Part(0.2), Part(0.4, (50, 0), (48, 0)), Part(5.0)]
 BACK = [Part(3.0, (-100, 0), (-80, 0)), Part(6.0)]
+SHORT = [Part(0.5), Part(0.5, (100, 0), (80, 0)), Part(0.2)]
 CYCLE = [*OUT, *TAPS, *BACK]
 OFF = [Part(2.0, (0, 100), (0, 60), "BYPASS_ON"), Part(6.0, state="READY")]
 
@@ -137,7 +141,7 @@ def test_a_valve_without_frames_closes(tmp_path: Path) -> None:
 
 
 def test_an_axis_that_was_never_ready_is_said(tmp_path: Path) -> None:
-    log = written(tmp_path / "a.log", OUT, valves=False, enable=0)
+    log = written(tmp_path / "a.log", OUT, valves=False, Enable=0)
     (row,), notes = counted(log)
     assert "slew was never ready: enable is off (ENABLE_OFF)" in notes
     assert (row["way_m"], row["taps"], row["anti_sway"]) == (0.0, 0, "")
@@ -145,7 +149,7 @@ def test_an_axis_that_was_never_ready_is_said(tmp_path: Path) -> None:
 
 def test_shifts_end_with_an_hour_without_a_frame_a_day_or_a_log(tmp_path: Path) -> None:
     begins = (MONDAY_S, MONDAY_S + 600.0, MONDAY_S + 2.5 * HOUR_S, MONDAY_S + 24 * HOUR_S)
-    logs = [written(tmp_path / f"{k}.log", OUT, at) for k, at in enumerate(begins)]
+    logs = [written(tmp_path / f"{k}.log", SHORT, at) for k, at in enumerate(begins)]
     rows, _ = counted(*logs)
     assert [row["shift"] for row in rows] == [
         "2026-09-21 14:13",
@@ -172,7 +176,7 @@ def test_a_pause_within_a_log_ends_a_shift_too(tmp_path: Path) -> None:
 
 
 def test_what_two_logs_have_counts_once(tmp_path: Path) -> None:
-    whole = written(tmp_path / "a.log", CYCLE)
+    whole = written(tmp_path / "a.log", OUT)
     again = tmp_path / "b.log"
     text = whole.read_text().splitlines(keepends=True)
     again.write_text("".join(text[len(text) // 2 :]))
@@ -180,6 +184,40 @@ def test_what_two_logs_have_counts_once(tmp_path: Path) -> None:
     (one,), _ = counted(whole)
     assert both == one
     assert any("s are in a log before it too" in note for note in notes)
+
+
+def test_each_crane_has_its_rows(tmp_path: Path) -> None:
+    rear = [line.replace(" vcan0 ", " vcan1 ") for line in lines([*OUT, *BACK])]
+    path = tmp_path / "a.log"
+    path.write_text("".join(sorted([*lines(SHORT), *rear])))
+    rows, _ = counted(path, file="two-cranes.yaml")
+    assert [(row["crane"], row["cycles"]) for row in rows] == [("front", 0), ("rear", 1)]
+    assert [row["way_m"] for row in rows] == pytest.approx(
+        [0.5 * tip_m_s(80, "slew"), 6.0 * tip_m_s(80, "slew")], abs=0.05
+    )
+
+
+def test_each_profile_has_its_row(tmp_path: Path) -> None:
+    text = (CONFIG / "forwarder.yaml").read_text(encoding="utf-8").replace("../dbc", f"{DBC}")
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace(*BUTTON).replace(SLEW, FAST), encoding="utf-8")
+    path = written(tmp_path / "a.log", OUT)
+    with path.open("a") as log:
+        log.writelines(lines([Part(0.3)], MONDAY_S + 8.0, AntiSwayOff=1))
+        log.writelines(lines(BACK, MONDAY_S + 8.3))
+    rows, _ = counted(path, file=str(file))
+    assert [(row["profile"], row["cycles"]) for row in rows] == [("", 0), ("fast", 1)]
+
+
+def test_a_break_is_no_waiting() -> None:
+    """Of a pause in which the grapple swings for long, a minute counts."""
+    counter, figures = WorkCounter("slew", 2.0), Figures()
+    for joystick, seconds in ((1.0, 1.0), (0.0, 300.0), (1.0, 1.0), (0.0, 10.0)):
+        for _ in range(round(10 * seconds)):
+            stick, speed = {"slew": joystick}, {"slew": 0.0}
+            counter.add(figures, 0.1, stick, speed, 5.0, moving=False, measured=False)
+    counter.end()
+    assert figures.waiting_s == pytest.approx(70.0)
 
 
 @pytest.mark.slow
@@ -255,8 +293,8 @@ def test_the_command_writes_one_table_three_times(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     folder = tmp_path / "logs" / "seven"
     folder.mkdir(parents=True)
-    written(folder / "b.log", CYCLE, MONDAY_S + 600.0)
-    written(folder / "a.log", [*CYCLE, *OFF])
+    written(folder / "b.log", SHORT, MONDAY_S + 600.0)
+    written(folder / "a.log", [*SHORT, *OFF[:1]])
     outs = tmp_path / "out" / "t.csv", tmp_path / "out" / "t.parquet"
     result = run(
         tmp_path / "logs", "--config", "forwarder.yaml", "--out", outs[0], "--out", outs[1]
@@ -266,7 +304,7 @@ def test_the_command_writes_one_table_three_times(tmp_path: Path) -> None:
     assert "Swing that is not measured is that of the model" in result.output
     with outs[0].open() as file:
         rows = [*csv.DictReader(file)]
-    assert [row["cycles"] for row in rows] == ["2", "0"]
+    assert [row["anti_sway"] for row in rows] == ["on", "off"]
     kept = parquet.read_table(outs[1]).to_pylist()
     assert [{k: "" if v is None else str(v) for k, v in row.items()} for row in kept] == rows
     assert list(rows[0]) == list(FIGURES)
