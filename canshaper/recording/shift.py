@@ -6,6 +6,7 @@ axis' model behind these commands, corrected by what a sway sensor shows.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
@@ -46,11 +47,7 @@ class LogOfWork(NamedTuple):
 
 
 def first_ns(drive: Drive) -> int:
-    """Time of the first frame of a log.
-
-    Raises:
-        LogError: it has none, or cannot be read.
-    """
+    """Time of the first frame of a log; LogError where it cannot be read."""
     frames = frames_of(drive.box) if drive.box else iter(LogFile(drive.path))
     return next((frame.time_ns for frame in frames), 0)
 
@@ -72,7 +69,7 @@ class Shifts:
 
     def __init__(self, by: str, gap_s: float) -> None:
         self._by, self._gap_ns = by, round(1e9 * gap_s)
-        self._figures: dict[tuple[str, ...], Figures] = {}
+        self._figures = defaultdict[tuple[str, ...], Figures](Figures)
         self._end_ns: dict[str, int] = {}  # of each machine, what is counted so far
         self._shift: dict[str, str] = {}
 
@@ -116,8 +113,7 @@ class Shifts:
                 readers.end()
             for crane in readers.cranes:
                 key = (machine, self._shift[machine], *crane.part(result.rows))
-                figures = self._figures.setdefault(key, Figures())
-                crane.count(figures, result.rows, elapsed_ns / 1e9)
+                crane.count(self._figures[key], result.rows, elapsed_ns / 1e9)
         readers.end()
         replay.check_joysticks()
         notes = [*replay.warnings(), *(() if replay.exact else readers.notes())]
@@ -202,7 +198,7 @@ class _Axis:
             model.step(own)
             if observer:
                 observer.step(own, added)
-        self.sway_rad, self.measured = model.angle * scale, False
+        self.sway_rad = model.angle * scale
         if observer:
             fresh = 0 <= self._measured_ns >= now_ns - self._lost_ns
             if (value := self._signal.new_value()) is not None:
@@ -211,9 +207,9 @@ class _Axis:
                 else:
                     observer.begin(value, scale)
                 self._measured_ns, fresh = now_ns, True
+            self.measured = fresh
             if fresh:
                 self.sway_rad = scale * observer.late.angle + observer.free.angle
-                self.measured = True
 
 
 class _Crane:
@@ -262,31 +258,27 @@ class _Readers:
     def __init__(self, deployment: Deployment) -> None:
         self.tick_ns = 1_000_000 * deployment.config.tick_ms
         axes = {n: _Axis(one, self.tick_ns / 1e9) for n, one in deployment.axes.items()}
-        self.axes, self.of = axes, dict[Key, list[Callable[[bytes, int], object]]]()
-        self.cranes = [
-            _Crane(
-                crane,
-                {n: one for n, one in axes.items() if not crane or n.startswith(f"{crane}_")},
-                deployment.config.still_deg,
-            )
-            for crane in cranes(deployment) or [""]
-        ]
+        self.axes, self.of = axes, defaultdict[Key, list[Callable[[bytes, int], object]]](list)
+        self.cranes = []
+        for crane in cranes(deployment) or [""]:
+            own = {n: one for n, one in axes.items() if not crane or n.startswith(f"{crane}_")}
+            self.cranes.append(_Crane(crane, own, deployment.config.still_deg))
         sensors: dict[Key, SwaySensorInput] = {}
         for axis in axes.values():
             bound = axis.bound
-            self.of.setdefault(bound.valve.message.key, []).append(axis.on_valve_frame)
+            self.of[bound.valve.message.key].append(axis.on_valve_frame)
             if bound.status:
-                self.of.setdefault(bound.status.message.key, []).append(axis.on_status)
+                self.of[bound.status.message.key].append(axis.on_status)
             if bound.sway_sensor:
                 message = bound.sway_sensor.message
                 if message.key not in sensors:
                     sensors[message.key] = SwaySensorInput(message)
-                    self.of.setdefault(message.key, []).append(sensors[message.key].receive)
+                    self.of[message.key].append(sensors[message.key].receive)
                 axis.use_sensor(sensors[message.key])
         for motion in deployment.motions.values():
             if radius := motion.radius:
                 position = PositionInput(radius)
-                self.of.setdefault(radius.key, []).append(position.receive)
+                self.of[radius.key].append(position.receive)
                 axes[motion.config.slew].radius = position.read(radius)
 
     def end(self) -> None:

@@ -43,16 +43,10 @@ class Tick:
 
 
 class Row(NamedTuple):
-    """One axis after a tick.
+    """One axis after a tick: command and applied velocity, [-1, 1]; predicted sway, degrees.
 
-    Attributes:
-        command: of the joystick, [-1, 1].
-        applied: velocity that is sent, [-1, 1].
-        sway_deg: predicted sway, degrees.
-        added: part of the velocity that a motion of two axes adds, which makes no swing.
-        state: of its state machine.
-        active_set: number of its parameter set.
-        mode: sway mode of that; None for an axis without.
+    Then what a motion of two axes adds to the velocity, which makes no swing; state, number of the
+    parameter set, and its sway mode.
     """
 
     command: float

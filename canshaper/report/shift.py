@@ -85,16 +85,10 @@ class WorkCounter:
         moving: bool,
         measured: bool,
     ) -> None:
-        """Add a tick.
+        """Add a tick of some seconds to the figures of its row.
 
-        Args:
-            figures: of the row that the tick is in.
-            seconds: its length.
-            joysticks: deflection of each axis, 0 within its neutral band.
-            speeds_m_s: of the tip, by each axis with sway.
-            sway_deg: swing of the grapple.
-            moving: whether any valve has a command.
-            measured: whether the swing is measured.
+        Joysticks are 0 within their neutral band; speeds are those of the tip by each axis with
+        sway. ``moving``: a valve has a command; ``measured``: a sensor shows the swing.
         """
         self._now_s += seconds
         deflected = any(joysticks.values())
