@@ -131,13 +131,13 @@ def test_without_valve_frames_it_is_what_the_file_would_send(tmp_path: Path) -> 
 
 
 def test_a_valve_without_frames_closes(tmp_path: Path) -> None:
-    """Its timeout is 200 ms; then the joysticks go on alone."""
-    first = [Part(1.0), Part(2.0, (50, 0), (80, 0))]
-    path = written(tmp_path / "a.log", first)
+    """Its timeout is 200 ms. Until then the crane is driven, though no joystick is held."""
+    path = written(tmp_path / "a.log", [Part(1.0), Part(2.0, (0, 0), (80, 0))])
     with path.open("a") as log:
-        log.write("".join(lines([Part(3.0, (50, 0))], MONDAY_S + 3.0, valves=False)))
+        log.writelines(lines([Part(3.0)], MONDAY_S + 3.0, valves=False))
     (row,), _ = counted(path)
     assert row["way_m"] == pytest.approx(2.2 * tip_m_s(80, "slew"), abs=0.06)
+    assert row["driven_s"] == pytest.approx(2.2, abs=0.05)
 
 
 def test_an_axis_that_was_never_ready_is_said(tmp_path: Path) -> None:
