@@ -175,6 +175,20 @@ def test_a_pause_within_a_log_ends_a_shift_too(tmp_path: Path) -> None:
     assert rows[0]["waiting_s"] == pytest.approx(16.0, abs=0.1)
 
 
+def test_a_grapple_calms_while_a_log_pauses(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.log", [Part(0.5), Part(1.0, (100, 0), (80, 0)), Part(1.0)])
+    with path.open("a") as log:
+        log.writelines(lines([Part(1.0, state="READY")], MONDAY_S + 600.0))
+    (row,), _ = counted(path)
+    assert 10.0 < row["waiting_s"] < 14.5  # the last second, and 12 s of which there are ticks
+
+
+def test_where_the_status_ends_canshaper_does_not_drive(tmp_path: Path) -> None:
+    silent = Part(2.1, state=None), Part(1.0, (50, 0), (80, 0), None)
+    rows, _ = counted(written(tmp_path / "a.log", [*SHORT, *silent]))
+    assert [row["anti_sway"] for row in rows] == ["on", "off"]
+
+
 def test_what_two_logs_have_counts_once(tmp_path: Path) -> None:
     whole = written(tmp_path / "a.log", OUT)
     again = tmp_path / "b.log"
