@@ -10,6 +10,7 @@ from canshaper.blackbox.recorder import Recorder
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.daemon.control_server import ControlServer
+from canshaper.daemon.reporter import Reporter
 from canshaper.machine.deployment import Deployment
 
 log = logging.getLogger("canshaper")
@@ -23,6 +24,7 @@ class Control:
         controller: the machine.
         recorder: takes the numbers that were changed.
         black_box: takes requests for a file.
+        reporter: knows state, counters and lateness.
     """
 
     def __init__(
@@ -31,8 +33,10 @@ class Control:
         controller: Controller,
         recorder: Recorder,
         black_box: BlackBox,
+        reporter: Reporter,
     ) -> None:
         self._server, self._recorder, self._black_box = server, recorder, black_box
+        self._reporter = reporter
         self._adjuster = Adjuster(controller)
 
     def serve(self, now_ns: int) -> None:
@@ -47,14 +51,16 @@ class Control:
         values = request.get("set", {})
         if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
             peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
-        if request.keys() - {"set", "black_box", "by"} or not isinstance(values, dict):
-            expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
+        if request.keys() - {"set", "black_box", "by", "status"} or not isinstance(values, dict):
+            expected = '{} or {"set": {KEY: VALUE}}, {"black_box": "write"}, {"status": true}'
             raise ValueError(f"expected {expected}, got another object")
         if "black_box" in request:
             if request["black_box"] == "write":
                 self._black_box.request()
                 log.info("black-box=requested %s", peer)
             return {"black_box": self._black_box.report()}
+        if "status" in request:
+            return {"status": self._reporter.numbers()}
         if "set" in request:
             try:
                 changes = self._adjuster.change(values)
@@ -72,6 +78,7 @@ def open_control(
     controller: Controller,
     recorder: Recorder,
     black_box: BlackBox,
+    reporter: Reporter,
 ) -> Control | None:
     """Open the control socket that a file has; None where it cannot: the machine works without."""
     control = deployment.config.control
@@ -82,4 +89,4 @@ def open_control(
     except OSError as error:
         log.warning("control=none socket=%s %s", path, error.strerror or error)
         return None
-    return Control(server, controller, recorder, black_box)
+    return Control(server, controller, recorder, black_box, reporter)

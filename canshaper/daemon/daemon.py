@@ -209,7 +209,8 @@ class Daemon:
             return None
         from canshaper.daemon.control import open_control
 
-        return open_control(deployment, self._controller, self._recorder, self._black_box)
+        parts = self._controller, self._recorder, self._black_box, self._reporter
+        return open_control(deployment, *parts)
 
     def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment, if its buses can be opened; else go on as before.
