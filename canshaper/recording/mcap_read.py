@@ -1,5 +1,6 @@
 """Raw CAN frames of an MCAP log, as ``canshaper`` writes it."""
 
+import struct
 from collections.abc import Iterator
 from typing import Any, BinaryIO
 
@@ -9,26 +10,37 @@ from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame, fits
 from canshaper.recording.form import install
 
 MOST_NAMED = 5
+# What mcap raises at a damaged file besides its own.
+DAMAGED = (
+    ArithmeticError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
 _new = tuple.__new__  # TimedFrame(...) in half the time
 
 
 def mcap(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     """Frames of topics with the schema of ``mcap_schemas``, in the order of the file."""
     try:
-        from mcap.exceptions import EndOfFile  # noqa: PLC0415  (an extra)
+        from mcap.exceptions import McapError  # noqa: PLC0415  (an extra)
         from mcap.stream_reader import CRCValidationError  # noqa: PLC0415
+        from zstandard import ZstdError  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise LogError(f"{place}: MCAP logs need {error.name}, {install('mcap')}") from None
     try:
         yield from _frames(file, place)
-    except EndOfFile:
-        raise place.cut_off("its end is missing (mcap recover makes an index anew)") from None
     except CRCValidationError as error:
         got = f"a damaged chunk ({error})"
         raise place.error(got, "an MCAP log that is whole (mcap recover keeps the rest)") from None
     except LogError:
         raise
-    except Exception as error:  # of many kinds, where the file is damaged
+    except (McapError, ZstdError, *DAMAGED) as error:
+        if not file.read(1):
+            raise place.cut_off("its end is missing (mcap recover makes its index)") from None
         got = f"{type(error).__name__} {error}".rstrip()
         raise place.error(got, "an MCAP log that is whole") from None
 

@@ -16,10 +16,10 @@ from asammdf.blocks.v4_blocks import SourceInformation
 
 from canshaper.bus.packet import BRS, FDF
 from canshaper.codec.layout import FD_LENGTHS
-from canshaper.recording.binary import GROUPS, PROJECT
 from canshaper.recording.channels import MOST_BYTES
 from canshaper.recording.form import Channel, Group, Point, Row
 from canshaper.recording.listen import ReceivedFrame
+from canshaper.recording.mf4_child import GROUPS, PROJECT
 
 _COLUMNS = (
     ("BusChannel", "u1"),
@@ -189,7 +189,7 @@ def _texts(channel: Channel) -> dict[str, object] | None:
     """The names of the values of a code, as asammdf takes them."""
     if channel.texts is None:
         return None
-    names: dict[str, object] = {"default": b"unknown"}
+    names: dict[str, object] = {"default_addr": b"unknown"}
     for index, (value, text) in enumerate(channel.texts.items()):
         names |= {f"val_{index}": value, f"text_{index}": text.encode()}
     return names
