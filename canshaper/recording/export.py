@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from cantools.database.can import Message
+from cantools.database.can import Message, Signal
 
 from canshaper.bus.packet import FDF
 from canshaper.codec.frame import Frame
@@ -36,7 +36,6 @@ def exporting(
     path: Path | None,
     deployment: Deployment,
     parameters: CraneParameters | None = None,
-    option: str = "--export",
 ) -> Iterator["Export | None"]:
     """Write a drive into a file of one of ``EXTRAS``; without a path there is none.
 
@@ -47,7 +46,7 @@ def exporting(
     if path is None:
         yield None
         return
-    writer = _writer(path, [*deployment.config.buses], option)
+    writer = _writer(path, [*deployment.config.buses])
     try:
         try:
             yield Export(writer, deployment, parameters or CraneParameters())
@@ -57,11 +56,11 @@ def exporting(
         raise OSError(error.errno, error.strerror, error.filename or str(path)) from None
 
 
-def _writer(path: Path, buses: Sequence[str], option: str) -> Writer:
+def _writer(path: Path, buses: Sequence[str]) -> Writer:
     """The writer of a suffix."""
     extra = EXTRAS.get(path.suffix.lower())
     if extra is None:
-        raise UsageError(f"{option}: expected a file with {' or '.join(EXTRAS)}, got {path}")
+        raise UsageError(f"--export: expected a file with {' or '.join(EXTRAS)}, got {path}")
     try:
         if extra == "mcap":
             from canshaper.recording.mcap_write import McapWriter  # noqa: PLC0415
@@ -146,6 +145,10 @@ class Export:
         return None if frame.kind else self._decoder.decode(frame)
 
 
+_Known = tuple[Message, dict[str, Signal], Callable[[bytes], dict[str, float]]]
+"""A message, its signals, and what gives their values in the units of the DBC."""
+
+
 class _Decoder:
     """Decodes every message of the DBC files, each when its first frame comes."""
 
@@ -153,8 +156,8 @@ class _Decoder:
         self._messages, self._writer = deployment.messages, writer
         entries = [entry for file in deployment.messages.files for entry in file.entries]
         self._names = {entry.key: entry.name for entry in entries}
-        self._known: dict[Key, tuple[str, Callable[[bytes], dict[str, float]]] | None] = {}
-        self._rows: dict[tuple[str, ...], Row] = {}
+        self._known: dict[Key, _Known | None] = {}
+        self._rows: dict[str, Row] = {}
 
     def decode(self, frame: ReceivedFrame) -> tuple[str, dict[str, float]] | None:
         """Write the signals of a frame; return the name of its message, and their values."""
@@ -163,38 +166,35 @@ class _Decoder:
             self._known[key] = self._found(frame)
         if (known := self._known[key]) is None:
             return None
-        name, decoder = known
+        message, signals, decoding = known
         try:
-            values = decoder(frame.data)
+            values = decoding(frame.data)
         except Exception:  # a frame shorter than its message: cantools has no base class
             return None
-        place = (frame.bus, name, *values)
+        pages = [f"{name}{values[name]:g}" for name in values if signals[name].is_multiplexer]
+        place = "/".join(("signals", frame.bus, message.name, *pages))
         if (row := self._rows.get(place)) is None:
-            row = self._rows[place] = self._row(frame.bus, name, values)
+            channels = (*(_channel(signals[name]) for name in values),)
+            row = self._rows[place] = self._writer.group(Group(place, channels))
         row(frame.time_ns, [*values.values()])
-        return name, values
+        return message.name, values
 
-    def _found(
-        self, frame: ReceivedFrame
-    ) -> tuple[str, Callable[[bytes], dict[str, float]]] | None:
+    def _found(self, frame: ReceivedFrame) -> _Known | None:
         name = self._names.get((frame.can_id, frame.extended))
         if name is None and frame.extended:  # of J1939, from any address
             name = self._names.get((with_source(frame.can_id, NULL), True))
         found = self._messages.find(name) if name else ""
-        return None if isinstance(found, str) else (found[1].name, _decoding(found[1]))
+        if isinstance(found, str):
+            return None
+        message = found[1]
+        return message, {one.name: one for one in message.signals}, _decoding(message)
 
-    def _row(self, bus: str, name: str, values: Mapping[str, float]) -> Row:
-        found = self._messages.find(name)
-        assert not isinstance(found, str)
-        signals = {s.name: s for s in found[1].signals}
-        chosen = [f"{n}{values[n]:g}" for n in values if signals[n].is_multiplexer]
-        channels = []
-        for one in (signals[name] for name in values):
-            codes = {int(number): str(text) for number, text in (one.choices or {}).items()}
-            # A measurement has names too, for an error: a code is what has its first two named.
-            coded = one.length <= MOST_CODE_BITS and {0, 1} <= codes.keys()
-            channels.append(Channel(one.name, one.unit or "", codes if coded else None))
-        return self._writer.group(Group("/".join(["signals", bus, name, *chosen]), (*channels,)))
+
+def _channel(signal: Signal) -> Channel:
+    codes = {int(number): str(text) for number, text in (signal.choices or {}).items()}
+    # A measurement has names too, for an error: a code is what has its first two named.
+    coded = signal.length <= MOST_CODE_BITS and {0, 1} <= codes.keys()
+    return Channel(signal.name, signal.unit or "", codes if coded else None)
 
 
 def _decoding(message: Message) -> Callable[[bytes], dict[str, float]]:

@@ -1,18 +1,21 @@
 """A drive as MCAP: frames and values as messages of protobuf, zstd in chunks of a megabyte."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from mcap.writer import Writer as Mcap
 
+from canshaper.bus.packet import FDF
 from canshaper.recording.form import Group, Point, Row
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.recording.mcap_schemas import FRAME, KINDS, Schema
 
 WORLD = "crane"
-BOOM_COLOUR = {"r": 0.9, "g": 0.6, "b": 0.1, "a": 1.0}
-ROPE_COLOUR = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
+FOOT = 0.0, 0.0, 0.0
+ORANGE = {"r": 0.9, "g": 0.6, "b": 0.1, "a": 1.0}
+GREY = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}
 UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 INFO = 2  # foxglove.Log.Level
 
@@ -31,33 +34,28 @@ class McapWriter:
         self._file = path.open("wb")
         self._mcap: Any = Mcap(self._file)
         self._mcap.start(profile="", library="canshaper")
-        self._schemas: dict[str, tuple[int, Schema]] = {}
         self._buses: dict[str, int] = {}
         self._heads: dict[tuple[int, bool, int | None, str, bool], bytes] = {}
         self._log = self._channel("/events", "foxglove.Log")
         self._scene = self._channel("/scene", "foxglove.SceneUpdate")
         self._moves = self._channel("/tf", "foxglove.FrameTransforms")
-        self._frame = self._schema(FRAME)[1].message
-
-    def _schema(self, name: str, group: Group | None = None) -> tuple[int, Schema]:
-        """A schema, and its number in the file."""
-        if name not in self._schemas:
-            schema = Schema(name, group.channels if group else None)
-            number = self._mcap.register_schema(name, "protobuf", schema.data)
-            self._schemas[name] = number, schema
-        return self._schemas[name]
+        self._frame_schema, frame = self._schema(Schema(FRAME))
+        self._frame = frame.message
 
     def _channel(self, topic: str, schema: str) -> tuple[int, Any]:
-        number, one = self._schema(schema)
+        """A new topic of a message of the table: its number, and the class of its messages."""
+        number, one = self._schema(Schema(schema))
         return self._mcap.register_channel(topic, "protobuf", number), one.message
+
+    def _schema(self, schema: Schema) -> tuple[int, Schema]:
+        return self._mcap.register_schema(schema.name, "protobuf", schema.data), schema
 
     def frame(self, frame: ReceivedFrame, *, sent: bool = False) -> None:
         """Write a frame as it was on its bus, on the topic /can/BUS."""
         channel = self._buses.get(frame.bus)
         if channel is None:
-            number = self._schema(FRAME)[0]
             channel = self._buses[frame.bus] = self._mcap.register_channel(
-                f"/can/{frame.bus}", "protobuf", number, {"bus": frame.bus}
+                f"/can/{frame.bus}", "protobuf", self._frame_schema, {"bus": frame.bus}
             )
         key = frame.can_id, frame.extended, frame.flags, frame.kind, sent
         head = self._heads.get(key)
@@ -66,7 +64,7 @@ class McapWriter:
                 id=frame.can_id,
                 extended=frame.extended,
                 sent=sent,
-                flags=frame.flags or 0,
+                flags=0 if frame.flags is None else frame.flags | FDF,  # old kernels have no FDF
                 kind=KINDS.index(frame.kind or "data"),
             )
             # Data, with the largest number, comes last: two messages one behind the other are one.
@@ -77,9 +75,11 @@ class McapWriter:
 
     def group(self, group: Group) -> Row:
         """Return what writes the values of a new group, on the topic of its name."""
-        word = group.name.replace("/", ".").replace("-", "_")
+        # Names of protobuf are words.
+        words = (re.sub(r"\W|^(?=\d)", "_", one, flags=re.ASCII) for one in group.name.split("/"))
         units = {channel.name: channel.unit for channel in group.channels if channel.unit}
-        number, schema = self._schema(f"canshaper.{word}", group)
+        name = ".".join(("canshaper", *words))
+        number, schema = self._schema(Schema(name, group.channels))
         channel = self._mcap.register_channel(f"/{group.name}", "protobuf", number, units)
         names = [one.name for one in group.channels]
         coded = [one.name for one in group.channels if one.texts is not None]
@@ -99,32 +99,25 @@ class McapWriter:
 
     def pose(self, time_ns: int, boom: Sequence[Point], grapple: Point) -> None:
         """Write the crane as lines and a ball, and the places of tip and grapple as frames."""
-        tip, stamp = boom[-1], _stamp(time_ns)
-        pose = {"position": _point((0.0, 0.0, 0.0)), "orientation": UPRIGHT}
+        tip, at = boom[-1], {"timestamp": _stamp(time_ns)}
         lines = [
-            {"pose": pose, "thickness": 0.15, "points": [*map(_point, boom)], "color": BOOM_COLOUR},
             {
-                "pose": pose,
-                "thickness": 0.05,
-                "points": [_point(tip), _point(grapple)],
-                "color": ROPE_COLOUR,
-            },
-        ]
-        hung = {"position": _point(grapple), "orientation": UPRIGHT}
-        ball = {"pose": hung, "size": _point((0.5, 0.5, 0.5)), "color": ROPE_COLOUR}
-        entity = {"timestamp": stamp, "frame_id": WORLD, "id": "crane", "lines": lines}
-        self._add(self._scene, time_ns, entities=[entity | {"spheres": [ball]}])
-        moved = [
-            {
-                "timestamp": stamp,
-                "parent_frame_id": WORLD,
-                "child_frame_id": child,
-                "translation": _point(place),
-                "rotation": UPRIGHT,
+                "pose": _pose(FOOT),
+                "thickness": wide,
+                "points": [*map(_point, line)],
+                "color": colour,
             }
+            for wide, line, colour in ((0.15, boom, ORANGE), (0.05, (tip, grapple), GREY))
+        ]
+        ball = {"pose": _pose(grapple), "size": _point((0.5, 0.5, 0.5)), "color": GREY}
+        entity = {"frame_id": WORLD, "id": "crane", "lines": lines, "spheres": [ball]}
+        self._add(self._scene, time_ns, entities=[at | entity])
+        moved = [
+            {"child_frame_id": child, "translation": _point(place), "rotation": UPRIGHT}
             for child, place in (("tip", tip), ("grapple", grapple))
         ]
-        self._add(self._moves, time_ns, transforms=moved)
+        frames = [at | {"parent_frame_id": WORLD} | one for one in moved]
+        self._add(self._moves, time_ns, transforms=frames)
 
     def _add(self, channel: tuple[int, Any], time_ns: int, **fields: Any) -> None:
         number, message = channel
@@ -145,3 +138,7 @@ def _stamp(time_ns: int) -> dict[str, int]:
 
 def _point(point: Point) -> dict[str, float]:
     return dict(zip("xyz", point, strict=True))
+
+
+def _pose(point: Point) -> dict[str, dict[str, float]]:
+    return {"position": _point(point), "orientation": UPRIGHT}

@@ -14,7 +14,7 @@ from asammdf import MDF, Signal
 from asammdf.blocks import v4_constants as v4
 from asammdf.blocks.v4_blocks import SourceInformation
 
-from canshaper.bus.packet import BRS, FDF
+from canshaper.bus.packet import BRS
 from canshaper.codec.layout import FD_LENGTHS
 from canshaper.recording.channels import MOST_BYTES
 from canshaper.recording.form import Channel, Group, Point, Row
@@ -60,8 +60,7 @@ class Mf4Writer:
         self._mdf.header.project = PROJECT
         self._channels = {bus: number for number, bus in enumerate(buses, start=1)}
         self._lengths = {length: code for code, length in enumerate(FD_LENGTHS)}
-        self._start_ns = 0
-        self._begun = False
+        self._start_ns: int | None = None
         self._frames = {kind: bytearray() for kind in GROUPS}
         self._tables: list[_Table] = []
         self._events: list[tuple[int, str]] = []
@@ -70,8 +69,7 @@ class Mf4Writer:
     def frame(self, frame: ReceivedFrame, *, sent: bool = False) -> None:
         """Write a frame as it was on its bus."""
         time_ns, bus, _, can_id, extended, data, kind, flags = frame
-        if not self._begun:
-            self._begin(time_ns)
+        self._begin(time_ns)
         length = len(data)
         bits = flags or 0
         held = self._frames[kind]
@@ -83,7 +81,7 @@ class Mf4Writer:
             self._lengths.get(length, length),
             length,
             sent,
-            bits & FDF > 0,
+            flags is not None,
             bits & BRS > 0,
             bits & _ESI > 0,
             data,
@@ -92,11 +90,12 @@ class Mf4Writer:
             self._write_frames(kind)
 
     def _begin(self, time_ns: int) -> None:
-        self._begun, self._start_ns = True, time_ns // 10**9 * 10**9
-        self._mdf.header.start_time = datetime.fromtimestamp(self._start_ns // 10**9, UTC)
+        if self._start_ns is None:
+            self._start_ns = time_ns // 10**9 * 10**9
+            self._mdf.header.start_time = datetime.fromtimestamp(self._start_ns // 10**9, UTC)
 
     def _seconds(self, times_ns: Any) -> Any:
-        return (np.asarray(times_ns, np.int64) - self._start_ns) * 1e-9
+        return (np.asarray(times_ns, np.int64) - (self._start_ns or 0)) * 1e-9
 
     def _write_frames(self, kind: str) -> None:
         held = self._frames[kind]
@@ -122,8 +121,7 @@ class Mf4Writer:
         self._tables.append(table)
 
         def row(time_ns: int, values: Sequence[float]) -> None:
-            if not self._begun:
-                self._begin(time_ns)
+            self._begin(time_ns)
             table.rows.append((time_ns, *values))
             if len(table.rows) >= HELD:
                 table.write(self._mdf, self._seconds)
@@ -132,6 +130,7 @@ class Mf4Writer:
 
     def event(self, time_ns: int, text: str) -> None:
         """Write a line for people."""
+        self._begin(time_ns)
         self._events.append((time_ns, text))
 
     def pose(self, time_ns: int, boom: Sequence[Point], grapple: Point) -> None:
@@ -146,7 +145,7 @@ class Mf4Writer:
             for table in self._tables:
                 if table.rows:
                     table.write(self._mdf, self._seconds)
-            if self._events and self._begun:
+            if self._events:
                 times, texts = zip(*self._events, strict=True)
                 lines = np.array([text.encode() for text in texts])
                 signal = Signal(lines, self._seconds(times), name="events", encoding="utf-8")

@@ -43,7 +43,7 @@ BUDGET = {
     "docs/machine-manual.md": 890,
     "docs/monitor.md": 230,
     "docs/realtime.md": 400,
-    "docs/replay.md": 700,
+    "docs/replay.md": 840,
     "docs/safety.md": 2300,
     "docs/sensor.md": 1170,
     "docs/service.md": 790,

@@ -27,7 +27,7 @@ def frames(count: int = 400) -> list[ReceivedFrame]:
         length = LENGTHS[number % len(LENGTHS)]
         extended = bool(number % 3)
         can_id = random.getrandbits(29 if extended else 11)
-        flags = FDF | BRS if length > 8 else None
+        flags = (FDF | BRS, 0)[number % 16 < 8] if length > 8 else None
         bus = ("crane", "body-2")[number % 5 == 0]
         data = random.randbytes(length)
         made.append(ReceivedFrame(time_ns, bus, "", can_id, extended, data, "", flags))

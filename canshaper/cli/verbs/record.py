@@ -83,7 +83,7 @@ def record(
         return
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
     if out.suffix not in (".zip", *LOGS):
-        expected = f"expected .zip or {', '.join(LOGS)}, got {out}"
+        expected = f"expected .zip, {', '.join(LOGS)}, got {out}"
         raise typer.BadParameter(expected, param_hint="--out")
     deployment = loader(file, interface, channel, network=network)()
     console = SafeConsole(stderr=True)
