@@ -67,6 +67,10 @@ def kept(file: str | Path = CONFIG / "forwarder-robust.yaml") -> tuple[Kept, Exp
     return file_in_memory, export
 
 
+def rounded(points: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    return tuple(round(one, 6) for point in points for one in point)
+
+
 def test_a_simulated_drive_tells_states_and_pose_by_its_frames() -> None:
     file, export = kept()
     deployment = load_deployment(CONFIG / "forwarder-robust.yaml")
@@ -77,9 +81,10 @@ def test_a_simulated_drive_tells_states_and_pose_by_its_frames() -> None:
     assert "axis=slew state=ACTIVE from=READY reason=JOYSTICK_MOVED" in file.events
     assert file.groups["signals/crane/GrappleSway"].channels[0].unit == "deg"
     assert recording.crane is not None
-    tips = {tuple(round(c, 2) for c in boom[-1][:2]) for _, boom, _ in file.poses}
-    measured = {tuple(round(c, 2) for c in tip) for tip in recording.crane.tip_m}
-    assert len(tips & measured) > len(tips) // 2
+    drawn = [(boom[-1][:2], grapple[:2]) for _, boom, grapple in file.poses]
+    measured = zip(recording.crane.tip_m, recording.crane.grapple_m, strict=True)
+    both = {rounded(pair) for pair in drawn} & {rounded(pair) for pair in measured}
+    assert len(both) > len({rounded(pair) for pair in drawn}) // 2
     gaps = [b[0] - a[0] for a, b in zip(file.poses, file.poses[1:], strict=False)]
     assert min(gaps) >= 40_000_000
 
