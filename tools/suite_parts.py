@@ -65,6 +65,22 @@ def no_chromium() -> str | None:
     return None
 
 
+FOREIGN = BIN.parent / "foreign"
+
+
+def no_foreign() -> str | None:
+    """Install other readers of exported files apart; return why they cannot be had, if so.
+
+    Wherever python-can finds asammdf, every start takes a third of a second more.
+    """
+    names = ["asammdf", "foxglove-sdk"]
+    if FOREIGN.is_dir():
+        return None
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(FOREIGN), *names]
+    done = subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, check=False)
+    return done.stderr.strip().split("\n")[-1] if done.returncode else None
+
+
 @dataclass
 class Part:
     """Commands that belong together, and what became of them.
@@ -139,12 +155,15 @@ def rows_of_more() -> list[list[Part]]:
     slow = pytest(*SPREAD, "-m", "slow and not study", "--ignore=tests/proof")
     study = pytest(*SPREAD, "-m", "study")
     proof = pytest(*SPREAD, "tests/proof")
+    apart = {"PYTHONPATH": str(FOREIGN)}
+    files = ("tests/recording/test_mcap.py", "tests/recording/test_mf4.py")
     return [
         [Part("types", "mypy, import contracts", types)],
         [Part("coverage", "every line and branch of what decides whether a valve moves", cover)],
         [Part("mutation-core", "a test notices every small change of the core", core)],
         [Part("proof", "rules of the gate, for all numbers", [proof])],
         [Part("slow", "tests of a second and more", [slow])],
+        [Part("exports", "MCAP, MF4 by others", [pytest(*files)], no_foreign, apart)],
         [
             Part(
                 "socketcan-all",

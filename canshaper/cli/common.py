@@ -77,6 +77,9 @@ NETWORK = typer.Option(
     False, "--network", help="Share a bus of udp_multicast over the network; else it stays local."
 )
 
+EXPORT = typer.Option(
+    None, "--export", metavar="FILE", help="The drive, anti-sway on, as .mcap or .mf4."
+)
 REPORT = typer.Option(
     None, "--report", metavar="FILE.html", help="Write it all into one file, to print and sign."
 )

@@ -267,6 +267,7 @@ def drive(
     deployment: Deployment,
     script: Script,
     on_progress: Callable[[float], None] | None = None,
+    on_frame: OnFrame | None = None,
     **options: Unpack[DriveOptions],
 ) -> Recording:
     """Drive a script through a deployment.
@@ -275,6 +276,7 @@ def drive(
         deployment: the machine; its buses are not opened.
         script: what the operator does.
         on_progress: called with the simulated seconds now and then.
+        on_frame: called with every frame and its time in s.
         options: see ``DriveOptions``.
 
     Returns:
@@ -286,7 +288,15 @@ def drive(
     """
     driven = driven_part(deployment, options.get("crane"))
     recorder = Recorder(driven, options.get("parameters"))
-    simulation = Simulation(deployment, script, recorder.receive, **options)
+
+    def receive(frame: Frame, time_s: float) -> None:
+        recorder.receive(frame, time_s)
+        if on_frame:
+            on_frame(frame, time_s)
+
+    simulation = Simulation(
+        deployment, script, receive if on_frame else recorder.receive, **options
+    )
     for time_ms in simulation.ticks():
         if on_progress and time_ms % 1000 == 0:
             on_progress(time_ms / 1000.0)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from canshaper.bus.port import Port
+from canshaper.codec.frame import Frame
 from canshaper.errors import BusError, DriveError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.cranes import cranes
@@ -130,6 +131,7 @@ def drive_on_bus(
     *,
     bypass: bool,
     on_progress: Callable[[float], None],
+    on_frame: Callable[[Frame, float], object] | None = None,
 ) -> BusDrive:
     """Drive a script with the three processes; the frames received on the bus are recorded.
 
@@ -140,6 +142,7 @@ def drive_on_bus(
         changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
         bypass: drive with anti-sway switched off.
         on_progress: called with the seconds driven.
+        on_frame: called with every frame and its time in s.
 
     Raises:
         DriveError: a process ended early or does not answer.
@@ -162,6 +165,7 @@ def drive_on_bus(
                 crew,
                 lambda: crew.ended("operator"),
                 lambda: on_progress(min(time.monotonic() - begin, script.duration_s)),
+                on_frame=on_frame,
             )
         finally:
             crew.stop()
@@ -176,6 +180,8 @@ def _listen(
     crew: "Crew",
     done: Callable[[], bool],
     report: Callable[[], None] | None = None,
+    *,
+    on_frame: Callable[[Frame, float], object] | None = None,
 ) -> None:
     """Record what is on the buses until ``done``; without ``report`` within the start limit."""
     limit = time.monotonic() + START_LIMIT_S
@@ -184,7 +190,10 @@ def _listen(
         select.select(files, [], [], LISTEN_STEP_S)
         for port in ports.values():
             for frame in port.frames():
-                recorder.receive(frame, time.monotonic())
+                now_s = time.monotonic()
+                recorder.receive(frame, now_s)
+                if on_frame:
+                    on_frame(frame, now_s)
         crew.check()
         if report:
             report()

@@ -1,14 +1,20 @@
-"""Logs that are not text: MF4, read by python-can, and the database of its logger."""
+"""Logs that are not text: MF4, read by asammdf, and the database of python-can's logger."""
 
+import marshal
+import shutil
 import sqlite3
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing
-from typing import BinaryIO
+from pathlib import Path
+from typing import IO, BinaryIO
 
-import can
-
-from canshaper.codec.layout import CLASSICAL_BYTES
+from canshaper.errors import LogError
 from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
+from canshaper.recording.form import install
+from canshaper.recording.mf4_child import WHOLE
 
 # A float of that many seconds still holds nanoseconds; a date holds microseconds.
 FINE_S = 4e6
@@ -16,14 +22,46 @@ _new = tuple.__new__  # TimedFrame(...) in half the time
 
 
 def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """ASAM MDF 4 of a bus logger; times to the microsecond."""
-    try:
-        yield from _frames(can.MF4Reader(file), place)
-    except NotImplementedError:
-        needs = "MF4 logs need asammdf, which is missing: pip install asammdf"
-        raise place.error("an MF4 log", f"another format, or: {needs}") from None
-    except Exception as error:  # of many kinds, where the file is damaged
-        raise place.error(_reason(error), "an MF4 log that is whole") from error
+    """Data frames of all bus events, by time to the ns; those of one group in their order."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = place.path
+        if path.suffix.lower() != ".mf4":  # packed
+            path = Path(folder) / "log.mf4"
+            with path.open("wb") as copy:
+                shutil.copyfileobj(file, copy)
+        command = [sys.executable, "-m", "canshaper.recording.mf4_child", str(path)]
+        with subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        ) as process:
+            try:
+                assert process.stdout is not None
+                yield from _handed_over(process.stdout, place)
+            finally:
+                process.kill()
+
+
+def _handed_over(pipe: IO[bytes], place: Place) -> Iterator[TimedFrame]:
+    """What the other process has read."""
+    while True:
+        try:
+            part = marshal.load(pipe)
+        except (EOFError, ValueError, TypeError):
+            raise place.error("one at which asammdf crashed", WHOLE) from None
+        if isinstance(part, list):
+            for row in part:
+                place.number += 1
+                yield _new(TimedFrame, row)
+            continue
+        place.left_out.update(part["left out"])
+        if part["fault"]:
+            got, expected = part["fault"]
+            if not expected:
+                raise LogError(f"{place.path}: MF4 logs need {got}, {install('mf4')}")
+            raise place.error(got, expected)
+        return
 
 
 def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
@@ -45,31 +83,6 @@ def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
                 yield _new(TimedFrame, frame)
     except (sqlite3.Error, OverflowError, TypeError, ValueError) as error:
         raise place.error(_reason(error), "a database of python-can's logger") from error
-
-
-def _frames(reader: can.io.generic.MessageReader, place: Place) -> Iterator[TimedFrame]:
-    """Its data frames.
-
-    A frame that none can be, which python-can takes as it stands, is left out too.
-    """
-    names: dict[object, str] = {}
-    left_out = place.left_out
-    for number, message in enumerate(reader, start=1):
-        place.number = number
-        if message.is_error_frame or message.is_remote_frame:
-            left_out["error" if message.is_error_frame else "remote"] += 1
-            continue
-        can_id, extended, data = message.arbitration_id, message.is_extended_id, message.data
-        most = MOST_BYTES if message.is_fd else CLASSICAL_BYTES
-        if can_id >> (29 if extended else 11) or len(data) > most:
-            left_out["impossible"] += 1
-            continue
-        channel = message.channel
-        if (name := names.get(channel)) is None:
-            name = names[channel] = str("" if channel is None else channel)
-        yield _new(
-            TimedFrame, (_nanoseconds(message.timestamp), name, can_id, extended, bytes(data))
-        )
 
 
 def _nanoseconds(time_s: float) -> int:

@@ -14,7 +14,7 @@ from typing import Any
 
 from canshaper.config.source import encoding_of
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording import asc, binary, blf, loggers, pcap, tables, trc
+from canshaper.recording import asc, binary, blf, loggers, mcap_read, pcap, tables, trc
 from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
@@ -25,13 +25,14 @@ READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
     ".blf": blf.blf,
     ".csv": tables.csv,
     ".db": binary.database,
+    ".mcap": mcap_read.mcap,
     ".mf4": binary.mf4,
     ".trc": trc.trc,
     ".txt": loggers.kvaser,
     ".pcap": pcap.pcap,
     ".pcapng": pcap.pcap,
 }
-BINARY = frozenset((".blf", ".db", ".mf4", ".pcap", ".pcapng"))
+BINARY = frozenset((".blf", ".db", ".mcap", ".mf4", ".pcap", ".pcapng"))
 # Two sockets of one logger are not read in the order in which their frames came.
 OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from canshaper.recording.report import Replayed
+from canshaper.recording.ticks import STATE_CHANGE
 from canshaper.report.style import (
     DASHED,
     JOYSTICK_COLOUR,
@@ -66,7 +67,6 @@ _NUMBERS = (
     ("residual", "residual_deg", "°"),
     ("run-on", "run_on_s", " s"),
 )
-_EVENT = re.compile(r"axis=(\S+) state=(\S+) .*?reason=(\S+)")
 _MOVES = 1e-6
 _LATE = 0.8  # of the time axis: a reason from here on ends where its state does
 
@@ -201,7 +201,7 @@ def _draw_lanes(
                     spans, (low + 0.08, 0.84), facecolor=colour, hatch=hatch, edgecolor="white",
                     linewidth=0,
                 )  # fmt: skip
-        others = [_seconds(one, at) for at, text in one.events if not _EVENT.match(text)]
+        others = [_seconds(one, at) for at, text in one.events if not STATE_CHANGE.match(text)]
         panel.plot(others, [low + 0.5] * len(others), "v", color=TEXT_COLOUR, markersize=3.5)
         look = LOOKS[i % len(LOOKS)]
         panel.plot([0.0, 0.0], [low + 0.1, low + 0.9], color=look.colour, linewidth=4.0)
@@ -221,7 +221,7 @@ def _spans(one: Replayed, axis: str) -> Iterator[tuple[float, float, State, Reas
 
 def _matches(one: Replayed) -> Iterator[tuple[int, re.Match[str]]]:
     for at_ns, text in one.events:
-        if match := _EVENT.match(text):
+        if match := STATE_CHANGE.match(text):
             yield at_ns, match
 
 

@@ -2,12 +2,15 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.export import exporting
+from canshaper.recording.form import EXTRAS
 from canshaper.recording.history import History
-from canshaper.recording.listen import Listener
+from canshaper.recording.listen import Listener, ReceivedFrame
 
 # What a computer that is switched off may lose.
 FLUSH_S = 1.0
@@ -49,21 +52,23 @@ class Recording:
         """Record until the time is over, or ``on_progress`` says that it is enough.
 
         Args:
-            path: the log; one that is there is replaced.
+            path: the log, of candump or by its suffix one of ``EXTRAS``; one that is there is
+                replaced.
             seconds: how long; None without end.
             on_progress: called some times a second; False ends the recording.
 
         Raises:
             BusError: a bus cannot be opened, or not be read any more.
             OSError: the log cannot be written; what was written stays.
+            UsageError: what its format needs is not installed.
         """
         listener = Listener(self._deployment.config.buses.items())
         try:
-            with path.open("w", encoding="ascii", newline="\n") as log:
+            with _opened(path, self._deployment) as (write, flush):
                 begin = flushed = time.monotonic()
                 while on_progress(self) and (seconds is None or self.seconds < seconds):
                     for frame in listener.frames():
-                        log.write(frame.line())
+                        write(frame)
                         self.frames[frame.kind] += 1
                         if not frame.kind:
                             self.history.receive(frame)
@@ -72,6 +77,20 @@ class Recording:
                     self.errors, self._last_error = listener.errors.total(), listener.last_error
                     if now - flushed >= FLUSH_S:
                         flushed = now
-                        log.flush()
+                        flush()
         finally:
             listener.close()
+
+
+@contextmanager
+def _opened(
+    path: Path, deployment: Deployment
+) -> Iterator[tuple[Callable[[ReceivedFrame], object], Callable[[], object]]]:
+    """A log: what writes a frame, and what puts all that was written onto the disk."""
+    if path.suffix.lower() in EXTRAS:
+        with exporting(path, deployment) as export:
+            assert export is not None
+            yield export.frame, lambda: None
+        return
+    with path.open("w", encoding="ascii", newline="\n") as log:
+        yield lambda frame: log.write(frame.line()), log.flush

@@ -1,6 +1,7 @@
 """A tick of a replay, what it made, and the ticks of a clock for a log that has none."""
 
 import math
+import re
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -21,6 +22,8 @@ Sorted = tuple[int, Frame, Kind]
 PAUSE_NS = 12_000_000_000
 LEAD_NS = 1_000_000_000
 DEGREES = math.degrees(1.0)
+STATE_CHANGE = re.compile(r"axis=(\S+) state=(\S+) .*?reason=(\S+)")
+"""An event of an axis: its name, state and reason."""
 
 
 @dataclass(slots=True)

@@ -41,7 +41,11 @@ def test_no_error_stands_anywhere_else() -> None:
     for info in pkgutil.walk_packages(canshaper.__path__, "canshaper."):
         if info.name.endswith("__main__"):
             continue
-        module = importlib.import_module(info.name)
+        try:
+            module = importlib.import_module(info.name)
+        except ModuleNotFoundError as error:
+            assert error.name == "asammdf"  # in no environment of the quick tests
+            continue
         for name, error in in_tree(module).items():
             if error.__module__.startswith("canshaper") and not name.startswith("_"):
                 assert error.__module__ == "canshaper.errors", error

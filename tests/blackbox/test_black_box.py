@@ -27,6 +27,7 @@ from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.reporter import Reporter
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
+from canshaper.recording.log import read_log
 from canshaper.shaping.shapers.gff import Gff
 from tests.blackbox.driven import SECOND, TRIP, drive
 from tests.daemon.bench import Bench, FakePort
@@ -58,8 +59,10 @@ def box(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path) -> None:
     assert box.name == "machine-0001.zip"
-    out = tmp_path / "out"
-    text = replayed(box, "--verify", "--out", out)
+    out, export = tmp_path / "out", tmp_path / "drive.mcap"
+    text = replayed(box, "--verify", "--out", out, "--export", export)
+    exported, log = (list(read_log(path)) for path in (export, out / "machine.log"))
+    assert [frame[2:] for frame in exported] == [frame[2:] for frame in log]
     assert "the ticks are those of the daemon that the black box is of" in text
     assert "frames sent, every one the same to the last bit" in text
     assert "state=TRIPPED from=ACTIVE reason=ENABLE_LOST" in text

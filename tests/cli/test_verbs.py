@@ -28,7 +28,7 @@ def greet_crane(kind: str) -> None:
     print(f"hello {kind}")
 '''
 # What only the work of a verb needs. (typer takes pydantic itself, where it is there.)
-NOT_FOR_HELP = ("can", "cantools", "numpy", "rich", "yaml")
+NOT_FOR_HELP = ("asammdf", "can", "cantools", "google", "mcap", "numpy", "rich", "yaml")
 
 
 @pytest.fixture

@@ -43,7 +43,7 @@ BUDGET = {
     "docs/machine-manual.md": 890,
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
-    "docs/replay.md": 700,
+    "docs/replay.md": 840,
     "docs/safety.md": 2300,
     "docs/sensor.md": 1170,
     "docs/service.md": 790,
@@ -64,11 +64,11 @@ LINES = {
         4_818,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (59_443, "a new ability takes the room of an old one"),
-    "tests": (93_891, "one level for each behaviour"),
+    "canshaper": (60_533, "a new ability takes the room of an old one"),
+    "tests": (94_692, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (352, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (359, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -71,7 +71,8 @@ def test_a_daemon_reads_on_behind_what_is_no_text(line: SerialLine) -> None:
     assert faults == [FrameFault.BUS_ERROR] * len(GARBLED)
 
 
-def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path) -> None:
+@pytest.mark.parametrize("suffix", ["log", "mcap"])
+def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path, suffix: str) -> None:
     recording = Recording(deployment_on(line))
     written = iter((*GARBLED, *(GOOD % i for i in range(3))))
 
@@ -79,8 +80,9 @@ def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path) -> Non
         line.write(next(written, b""))
         return so_far.frames.total() < 3
 
-    recording.run(tmp_path / "drive.log", 30.0, going)
-    assert [frame.data[0] for frame in read_log(tmp_path / "drive.log")] == [0, 1, 2]
+    path = tmp_path / f"drive.{suffix}"
+    recording.run(path, 30.0, going)
+    assert [frame.data[0] for frame in read_log(path)] == [0, 1, 2]
     assert f"3 frames, {len(GARBLED)} ERRORS of the interface, the last bus crane: " in str(
         recording
     )

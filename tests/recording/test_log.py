@@ -40,18 +40,6 @@ def test_a_packed_log_gives_the_same(tmp_path: Path, suffix: str) -> None:
     assert list(read_log(packed)) == list(read_log(path))
 
 
-def test_mf4(tmp_path: Path) -> None:
-    frames = [f._replace(time_ns=f.time_ns + 1_763_000_000 * 10**9) for f in FRAMES]
-    path = tmp_path / "drive.mf4"
-    try:
-        written(path, messages(frames))
-    except NotImplementedError:
-        path.write_bytes(b"MDF     4.10")
-        assert "need asammdf, which is missing: pip install asammdf" in error_of(path)
-        return
-    assert list(read_log(path)) == frames
-
-
 def test_candump_as_it_stands(tmp_path: Path) -> None:
     assert list(read_log(log(tmp_path, *LINES))) == [
         f._replace(channel=f"can{int(f.channel) - 1}") for f in FRAMES

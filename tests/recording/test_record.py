@@ -155,10 +155,10 @@ def test_a_log_that_cannot_be_written_ends_with_1(tmp_path: Path) -> None:
     assert "No such file or directory" in result.output
 
 
-def test_only_zip_and_log(tmp_path: Path) -> None:
+def test_only_bundles_and_logs(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["record", "forwarder.yaml", "--out", "x.tar"])
     assert result.exit_code == 2
-    assert "expected .zip or .log, got " in result.output
+    assert "expected .zip, .log, .mcap, .mf4, got " in result.output
 
 
 def test_a_listener_receives_everything_and_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

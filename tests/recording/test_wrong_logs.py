@@ -134,8 +134,8 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         (
             "a.xyz",
             "",
-            "expected the suffix .log, .asc, .blf, .csv, .db, .mf4, .trc, .txt, .pcap, .pcapng,"
-            " each also with .gz behind, got '.xyz'",
+            "expected the suffix .log, .asc, .blf, .csv, .db, .mcap, .mf4, .trc, .txt, .pcap,"
+            " .pcapng, each also with .gz behind, got '.xyz'",
         ),
         (
             "drive",

@@ -11,6 +11,7 @@ import typer
 from canshaper.cli.common import (
     CRANE,
     EXIT_INTERRUPTED,
+    EXPORT,
     PICTURE,
     REPORT,
     SENSOR,
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from canshaper.campaign.draw import Setting
-    from canshaper.design.lockstep import DriveOptions
+    from canshaper.design.lockstep import DriveOptions, OnFrame
     from canshaper.design.processes import Transport
     from canshaper.machine.deployment import Deployment
     from canshaper_sim.crane import CraneParameters
@@ -73,6 +74,7 @@ def demo(
     ),
     crane: str | None = CRANE,
     changes: list[str] | None = SET,
+    export: Path | None = EXPORT,
     picture: Path | None = PICTURE,
     report: Path | None = REPORT,
 ) -> None:
@@ -99,7 +101,7 @@ def demo(
 
       canshaper demo --sensor --set grapple.l2_m=1.5
 
-      canshaper demo --seed 34
+      canshaper demo --seed 34 --export drive.mcap
 
       canshaper demo new.yaml --seed 34 --ranges old.yaml
     """
@@ -137,14 +139,7 @@ def demo(
         results.print(f"Crane: {crane} (of {', '.join(several)})")
     results.print(f"Transport: {way.description if way else LOCKSTEP}")
 
-    try:
-        (raw, shaped), missed = _drive_twice(deployment, way, played, options, changes or [])
-    except DriveError as error:
-        raise fail(error, EXIT_NOT_DRIVEN) from None
-    except KeyboardInterrupt:
-        echo("interrupted; every process was stopped, valves neutral", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-
+    raw, shaped, missed = _driven(deployment, way, played, options, changes or [], export)
     measures = report_dict(
         raw,
         shaped,
@@ -178,12 +173,36 @@ def _drawn(
     return draw_drive(deployment, seed, first.config.uncertainty, nominal)
 
 
+def _driven(
+    deployment: "Deployment",
+    way: "Transport | None",
+    played: "Script",
+    options: "DriveOptions",
+    changes: list[str],
+    export: Path | None,
+) -> tuple["Recording", "Recording", int]:
+    """As ``_drive_twice``, with an end for people whatever comes; the second drive is exported."""
+    from canshaper.recording.export import exporting
+
+    try:
+        with exporting(export, deployment, options.get("parameters")) as exported:
+            on_frame = exported.seen if exported else None
+            drives, missed = _drive_twice(deployment, way, played, options, changes, on_frame)
+    except DriveError as error:
+        raise fail(error, EXIT_NOT_DRIVEN) from None
+    except KeyboardInterrupt:
+        echo("interrupted; every process was stopped, valves neutral", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    return drives[0], drives[1], missed
+
+
 def _drive_twice(
     deployment: "Deployment",
     way: "Transport | None",
     played: "Script",
     options: "DriveOptions",
     changes: list[str],
+    on_frame: "OnFrame | None",
 ) -> tuple[list["Recording"], int]:
     """Drives with anti-sway off and on, and the deadlines that the daemon missed in both.
 
@@ -193,6 +212,7 @@ def _drive_twice(
         played: what the operator does.
         options: of a drive in lock-step.
         changes: parameters of the crane on a bus, NAME=VALUE.
+        on_frame: called with the frames of the drive with anti-sway on.
     """
     from canshaper.design.lockstep import drive
     from canshaper.design.processes import drive_on_bus
@@ -203,10 +223,17 @@ def _drive_twice(
         with progress_bar(name, played.duration_s) as on_progress:
             if way is None:
                 options["bypass"] = bypass
-                recordings.append(drive(deployment, played, on_progress, **options))
+                listener = None if bypass else on_frame
+                recordings.append(drive(deployment, played, on_progress, listener, **options))
             else:
                 run = drive_on_bus(
-                    deployment, way, played, changes, bypass=bypass, on_progress=on_progress
+                    deployment,
+                    way,
+                    played,
+                    changes,
+                    bypass=bypass,
+                    on_progress=on_progress,
+                    on_frame=None if bypass else on_frame,
                 )
                 recordings.append(run.recording)
                 missed += run.missed_deadlines

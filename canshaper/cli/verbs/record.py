@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 GROUP = "measure"
 
 EXIT_NOT_WRITTEN = 1
+LOGS = (".log", ".mcap", ".mf4")  # .mcap and .mf4 have signals and states besides the frames
 ASK_AGAIN_S = 0.2
 
 
@@ -38,7 +39,7 @@ def record(
         None, "--seconds", min=0.1, help="How long; by default until Ctrl-C."
     ),
     out: Path | None = typer.Option(
-        None, "--out", metavar="FILE", help="A bundle (.zip), or the log alone (.log)."
+        None, "--out", metavar="FILE", help="A bundle (.zip), or the log alone (.log, .mcap, .mf4)."
     ),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
@@ -68,7 +69,7 @@ def record(
 
       canshaper record machine.yaml --seconds 600 --out stop-at-the-tree.zip
 
-      canshaper record machine.yaml --out drive.log
+      canshaper record machine.yaml --out drive.mcap
 
       canshaper record machine.yaml --last
     """
@@ -81,8 +82,9 @@ def record(
         _last(file, control)
         return
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
-    if out.suffix not in (".zip", ".log"):
-        raise typer.BadParameter(f"expected .zip or .log, got {out}", param_hint="--out")
+    if out.suffix not in (".zip", *LOGS):
+        expected = f"expected .zip, {', '.join(LOGS)}, got {out}"
+        raise typer.BadParameter(expected, param_hint="--out")
     deployment = loader(file, interface, channel, network=network)()
     console = SafeConsole(stderr=True)
     recording = Recording(deployment)
@@ -91,7 +93,7 @@ def record(
     stop = Stop()
     log = out
     try:
-        log = out if out.suffix == ".log" else _log_of(out)
+        log = out if out.suffix in LOGS else _log_of(out)
         with Live(console=console, refresh_per_second=4) as live:
 
             def report(so_far: "Recording") -> bool:

@@ -13,6 +13,7 @@ import typer
 
 from canshaper.cli.common import (
     EXIT_INTERRUPTED,
+    EXPORT,
     PICTURE,
     PROCESSES,
     REPORT,
@@ -44,7 +45,7 @@ MOST_EVENTS = 12
 
 def replay(
     log: Path = typer.Argument(..., help="A black box or another bundle (.zip);"
-    " .log, .asc, .blf, .trc, .csv, .txt, .pcap, .db, .mf4, see docs/replay.md."),
+    " .log, .asc, .blf, .trc, .csv, .txt, .pcap, .db, .mcap, .mf4, see docs/replay.md."),
     configs: list[str] | None = typer.Option(
         None, "--config", metavar="FILE", help="Deployment; twice for two side by side. Of a bundle"
         " its own by default."
@@ -53,6 +54,7 @@ def replay(
         None, "--channel", metavar="BUS=CHANNEL", help="Channel of the log that is a bus."
     ),
     out: Path = typer.Option(Path("out/replay"), "--out", help="Folder for what is made."),
+    export: Path | None = EXPORT,
     verify: bool = typer.Option(
         False, "--verify", help="Of a black box: exit code 1 when a frame is not the same."
     ),
@@ -88,6 +90,8 @@ def replay(
 
       canshaper replay recording.zip --verify
 
+      canshaper replay recording.zip --export drive.mcap
+
       canshaper replay logs/ --config old.yaml --config new.yaml
     """
     from canshaper.cli.fleet import check_only_folders
@@ -97,6 +101,7 @@ def replay(
     results = Results(f"Replay of {log.name}", None, report, picture)
     if log.is_dir():
         of_one = {"--verify": verify, "--from": begin_s, "--to": end_s, "--picture": picture}
+        of_one |= {"--export": export}
         check_only_folders([log], of_one)
         _fleet(log, tuple(configs or ()), channel or [], out, (processes, scheduler), results)
         return
@@ -109,7 +114,10 @@ def replay(
                     configs, inside = [str(own)], Path(folder)
             if not configs:
                 raise typer.BadParameter("--config is missing: which deployment?")
-            replays = _run(log, configs, channels_of(channel or []), (begin_s, end_s), out, inside)
+            if export and len(configs) > 1:
+                raise UsageError(f"--export: expected one --config, got {len(configs)}")
+            window = begin_s, end_s
+            replays = _run(log, configs, channels_of(channel or []), window, out, inside, export)
             for one in replays:
                 one.measure()
         except KeyboardInterrupt:
@@ -163,6 +171,7 @@ def _run(
     window: tuple[float, float | None],
     out: Path,
     inside: Path | None,
+    export: Path | None = None,
 ) -> "list[Replayed]":
     """Replay every deployment, one after the other."""
     from canshaper.recording.replay import look
@@ -177,7 +186,7 @@ def _run(
     replays: list[Replayed] = []
     for name, deployment, drive in zip(names, deployments, drives, strict=True):
         with progress_bar(name) as on_progress, _without_collector():
-            replays.append(_one(name, deployment, drive, window, out, on_progress))
+            replays.append(_one(name, deployment, drive, window, out, export, on_progress))
     return replays
 
 
@@ -187,9 +196,11 @@ def _one(
     drive: "Drive",
     window: tuple[float, float | None],
     out: Path,
+    export: Path | None,
     on_progress: Callable[[float], None],
 ) -> "Replayed":
     """Replay one deployment, and write its log and its events."""
+    from canshaper.recording.export import exporting
     from canshaper.recording.replay import Replay
     from canshaper.recording.report import Replayed
     from canshaper.recording.tables import LogWriter
@@ -202,6 +213,7 @@ def _one(
     with (
         (out / f"{name}.log").open("w", encoding="ascii") as log,
         (out / f"{name}.events.txt").open("w", encoding="utf-8") as events,
+        exporting(export, deployment) as exported,
     ):
         writer = LogWriter(log, channel_of, deployment.fd)
         for tick, result in replay.run(on_progress):
@@ -210,6 +222,8 @@ def _one(
                 done.missed += tick.number - number - 1
             number = tick.number
             writer.write(tick, result)
+            if exported:
+                exported.tick(tick, result)
             done.trace.add(tick, result)
             for text in result.events:
                 done.events.append((tick.now_ns, text))

@@ -1,0 +1,104 @@
+"""What asammdf reads of an MF4 log, in a process of its own: a damaged file may end it.
+
+It prints what it does not understand, too. Frames go to the standard output, in parts of
+``marshal``; nothing else of canshaper is loaded here.
+
+    python -m canshaper.recording.mf4_child FILE
+"""
+
+import heapq
+import marshal
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from itertools import chain, islice
+from operator import itemgetter
+from typing import Any
+
+GROUPS = {"": "CAN_DataFrame", "error": "CAN_ErrorFrame", "remote": "CAN_RemoteFrame"}
+"""Names of ASAM's bus logging by the kind of a frame."""
+PROJECT = "canshaper"
+"""Project in the header of our files: the comment of a group names the buses of its channels."""
+WHOLE = "an MF4 log that is whole"
+AT_ONCE = 20_000
+"""Frames that are handed over at once."""
+BUS_EVENT = 0x2  # ASAM MDF 4.1, flags of a channel group
+ID_MASK = 0x1FFFFFFF
+CLASSICAL_BYTES, FD_BYTES = 8, 64
+
+
+def read(path: str) -> Iterator[list[Any] | dict[str, Any]]:
+    """Yield frames in lists, at last what is left out, and a fault with what was expected.
+
+    What was expected is empty where a package is missing.
+    """
+    left_out: Counter[str] = Counter()
+    fault: tuple[str, str] | None = None
+    try:
+        from asammdf import MDF  # noqa: PLC0415  (an extra)
+
+        with MDF(path) as mdf:
+            groups = list(_bus_events(mdf))
+            if not groups:
+                got = f"{len(mdf.groups)} groups of channels, none of them bus events of CAN"
+                fault = got, "an MF4 log with bus logging, or the log of another tool"
+            parts = []
+            for index, name, count in groups:
+                if name == GROUPS[""]:
+                    parts.append(_records(mdf, index, count, left_out))
+                else:
+                    left_out[next(k for k, v in GROUPS.items() if v == name)] += count
+            rows = heapq.merge(*parts, key=itemgetter(0)) if len(parts) > 1 else chain(*parts)
+            while part := list(islice(rows, AT_ONCE)):
+                yield part
+    except ModuleNotFoundError as error:
+        fault = error.name or str(error), ""
+    except Exception as error:  # of many kinds, where the file is damaged
+        fault = f"{type(error).__name__} {error}".rstrip(), WHOLE
+    yield {"left out": dict(left_out), "fault": fault}
+
+
+def _bus_events(mdf: Any) -> Iterator[tuple[int, str, int]]:
+    """Indices of the groups of frames, their names and how many records they have."""
+    for index, group in enumerate(mdf.groups):
+        name = next((one.name for one in group.channels if one.name in GROUPS.values()), None)
+        if name and group.channel_group.flags & BUS_EVENT:
+            yield index, name, group.channel_group.cycles_nr
+
+
+def _records(mdf: Any, index: int, count: int, left_out: Counter[str]) -> Iterator[tuple[Any, ...]]:
+    """Frames of a group, as ``TimedFrame`` has them; those that none can be are left out."""
+    start = mdf.header.start_time
+    start_ns = int(start.timestamp()) * 10**9 + start.microsecond * 1000
+    comment = mdf.groups[index].channel_group.comment if mdf.header.project == PROJECT else ""
+    names = {int(number): bus for number, bus in re.findall(r"(\d+)=(\S+)", comment)}
+    for offset in range(0, count, AT_ONCE):
+        signal = mdf.get(GROUPS[""], index, record_offset=offset, record_count=AT_ONCE)
+        columns = {name.rpartition(".")[2]: signal[name] for name in signal.samples.dtype.names}
+        same = [0] * len(signal)
+        times = ((signal.timestamps * 1e9).round().astype("i8") + start_ns).tolist()
+        data, ids = columns["DataBytes"], columns["ID"].astype("u4")
+        width, content = data.shape[1], data.astype("u1").tobytes()
+        lengths = columns["DataLength"].tolist()
+        channels = columns["BusChannel"].tolist() if "BusChannel" in columns else same
+        texts = {one: names.get(one, str(one)) for one in {*channels}}
+        wide = columns["IDE"].tolist() if "IDE" in columns else (ids >> 31).tolist()
+        fd = columns["EDL"].tolist() if "EDL" in columns else same
+        at = 0
+        rows = zip(times, channels, (ids & ID_MASK).tolist(), wide, lengths, fd, strict=True)
+        for time_ns, channel, can_id, extended, length, is_fd in rows:
+            if length > (FD_BYTES if is_fd else CLASSICAL_BYTES) or can_id >> (
+                29 if extended else 11
+            ):
+                left_out["impossible"] += 1
+            else:
+                frame = content[at : at + length]
+                yield time_ns, texts[channel], can_id, bool(extended), frame
+            at += width
+
+
+if __name__ == "__main__":
+    for one in read(sys.argv[1]):
+        marshal.dump(one, sys.stdout.buffer)
+    sys.stdout.buffer.flush()
