@@ -126,7 +126,7 @@ def test_a_frame_of_our_own_asks_for_nothing() -> None:
     one.ticks()  # no joystick was seen: nothing may move, and so nothing is enabled
     data = one.message.own(enabled=True).data
     assert one.gate.leaving(one.key, data) == "limit=bits of an own frame"
-    one.message.protector.take_back()
+    one.message.take_back()
     one.receives()
     one.ticks()
     for enabled in (True, False):
