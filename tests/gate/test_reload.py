@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from canshaper.gate.build import record_of
+from canshaper.gate.gate import Gate
 from tests.faults import variants
 from tests.gate.bench import Bench, bench
 
@@ -91,3 +93,14 @@ def test_another_protection_begins_anew() -> None:
     after = reloaded(one)
     assert after.gate.messages["left"].count is None
     assert one.key not in after.gate.counts
+
+
+def test_an_axis_of_another_name_is_known_by_its_valve() -> None:
+    one = bench()
+    one.ramp(60, near_far=1.0)
+    assert one.sends(-60, near_far=1.0)
+    near_far = replace(one.deployment.axes["near_far"], name="boom")
+    axes = {"boom" if n == "near_far" else n: axis for n, axis in one.deployment.axes.items()}
+    after = Gate(record_of(replace(one.deployment, axes=axes | {"boom": near_far})))
+    after.carry_over(one.gate, frozenset())
+    assert [name for name, axis in after.axes.items() if axis.latched] == ["boom"]
