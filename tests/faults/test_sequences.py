@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import pytest
 
-from canshaper.controller import ends
+from canshaper.controller import demands
 from canshaper.controller.controller import Controller
 from canshaper.shaping.demands import FlowBudget
 from tests.faults.judge import Violation
@@ -23,7 +23,7 @@ from tests.faults.shipped import CONFIG, NAMES, shipped
 QUICK, SAMPLE = 1, 18
 # So many sequences may a lie stay unseen.
 MOST = 200
-BUDGET, BOUNDS = FlowBudget.step, ends.bounds  # as they are
+BUDGET, BOUNDS = FlowBudget.step, demands.bounds  # as they are
 # Seen after many sequences.
 RARE = {"always active", "another sender unseen", "emergency unseen", "enable forced"}
 RARE |= {"error code unseen"}
@@ -118,8 +118,8 @@ def test_the_rules_catch_what_the_controller_does_not_do(method: str) -> None:
     [
         (FlowBudget, "step", lambda *_: 1.0),  # the pump delivers enough, always
         (FlowBudget, "step", lambda one, flow, *rest: BUDGET(one, 1.2 * flow, *rest)),
-        (ends, "bounds", lambda *_: (-1.0, 1.0)),  # no end stop
-        (ends, "bounds", lambda *arguments: tuple(-side for side in BOUNDS(*arguments)[::-1])),
+        (demands, "bounds", lambda *_: (-1.0, 1.0)),  # no end stop
+        (demands, "bounds", lambda *arguments: tuple(-side for side in BOUNDS(*arguments)[::-1])),
     ],
     ids=["no budget", "budget too large", "no end stop", "wrong end stop"],
 )
