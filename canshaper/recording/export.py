@@ -126,7 +126,7 @@ class Export:
             if match := STATE_CHANGE.match(text):
                 self._states[match[1]] = State[match[2]], Reason[match[3]]
         for name, row in result.rows.items():
-            self._axes[name](tick.now_ns, (*row, *self._states[name]))
+            self._axes[name](tick.now_ns, (*row[:3], *self._states[name]))
         self._crane.simulate(tick.now_ns, result.sent)
 
     def seen(self, frame: Frame, time_s: float) -> None:
