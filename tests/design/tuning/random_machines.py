@@ -7,12 +7,10 @@ frames through a valve with lag to a tip on a track without end, and the pendulu
 one, with a damped joint, solved by scipy. A press begins at rest, a release in full motion at rest.
 """
 
-import itertools
 import math
 import random
 import sys
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -50,36 +48,18 @@ buses:
 dbc: [machine.dbc]
 joysticks:
   left:
-    bus: crane
-    message: JoystickLeft
-    timeout_ms: 200
-    stuck_s: 3600 # a press is held until all is at rest
-    enable: Enable
-    reset: Reset
-    anti_sway_off: AntiSwayOff
-    alive_counter: AliveCounter
+    {{ bus: crane, message: JoystickLeft, timeout_ms: 200, stuck_s: 3600, enable: Enable,
+      reset: Reset, anti_sway_off: AntiSwayOff, alive_counter: AliveCounter }}
 axes:
   near_far:
     command: {{ joystick: left, signal: NearFar, neutral_pct: 2 }}
-    valve:
-      bus: crane
-      message: NearFarCommand
-      signal: Velocity
-      timeout_ms: 500
-      alive_counter: AliveCounter
-    sway:
-      length_m: {length_m}
-      damping_nms: {damping_nms}
-      mass_kg: 300
-      full_speed_m_s: {speed_m_s}
+    valve: {{ bus: crane, message: NearFarCommand, signal: Velocity, timeout_ms: 500,
+      alive_counter: AliveCounter }}
+    sway: {{ length_m: {length_m}, damping_nms: {damping_nms}, mass_kg: 300,
+      full_speed_m_s: {speed_m_s} }}
     filter: {filter}
-    limits:
-      deadband_pct: 5
-      rise_per_s: {rise}
-      fall_per_s: {fall}
-      tail_s: {tail_s}
-      stop_s: 5
-      stop_distance_m: 200
+    limits: {{ deadband_pct: 5, rise_per_s: {rise}, fall_per_s: {fall}, tail_s: {tail_s},
+      stop_s: 5, stop_distance_m: 200 }}
 """
 
 
@@ -216,23 +196,16 @@ def swing_left(
     length_m, tick_s = one.length_m * factor, one.tick_ms / 1e3
     damping = 2.0 * one.damping_ratio * one.omega / factor**2  # c / (m l^2)
     lag_s = max(one.lag_s, 1e-3)
-    state = np.array([0.0, 0.0, before])
-    changes = np.flatnonzero(np.diff(move)) + 1
-    changes = changes[changes < until]
-    bounds, peak = [0, *changes.tolist(), until], 0.0
 
-    def slope(held: float, _t: float, s: NDArray[np.float64]) -> list[float]:
+    def slope(t: float, s: NDArray[np.float64]) -> list[float]:
+        held = move[min(int(t / tick_s + 1e-9), len(move) - 1)]
         acceleration = one.speed_m_s * (held - s[2]) / lag_s
         pull = G_M_S2 * math.sin(s[0]) + acceleration * math.cos(s[0])
         return [s[1], -damping * s[1] - pull / length_m, (held - s[2]) / lag_s]
 
-    for first, last in itertools.pairwise(bounds):
-        span = (first * tick_s, last * tick_s)
-        solved = solve_ivp(
-            partial(slope, move[first]), span, state, method="LSODA", rtol=1e-9, atol=1e-13
-        )
-        state = solved.y[:, -1]
-        peak = max(peak, abs(solved.y[0]).max())
+    exact = {"method": "LSODA", "rtol": 1e-8, "atol": 1e-12, "max_step": tick_s}
+    solved = solve_ivp(slope, (0.0, until * tick_s), [0.0, 0.0, before], **exact)
+    state, peak = solved.y[:, -1], float(abs(solved.y[0]).max())
     omega = math.sqrt(G_M_S2 / length_m)
     real = 0.5 * damping
     damped = math.sqrt(omega**2 - real**2)
