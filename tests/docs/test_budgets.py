@@ -64,8 +64,8 @@ LINES = {
         4_830,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (59_132, "a new ability takes the room of an old one"),
-    "tests": (93_775, "one level for each behaviour"),
+    "canshaper": (59_136, "a new ability takes the room of an old one"),
+    "tests": (93_789, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (356, "one that only hands on is joined to its reader")}

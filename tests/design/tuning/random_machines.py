@@ -141,8 +141,7 @@ def drawn(seed: int) -> Drawn:
     }
     names = [*filters, "", ""]
     what = draw.choice(names)
-    longest_s = max(0.85 * 2.0 * math.pi / omega, 1.3 / rate)
-    if not what and (damping > 0.3 or longest_s / tick_ms * 1e3 > 950):
+    if not what and (damping > 0.3 or 0.85 * 2.0 * math.pi / omega / tick_ms * 1e3 > 950):
         what = "double pole"  # no robust one, or one of more taps than a file may have
     return Drawn(length_m, damping, rate, lag_s, tail_s, tick_ms, speed, filters[what], what)
 
