@@ -21,7 +21,7 @@
 	@touch $@
 
 .venv/test-ready: pyproject.toml tools/venv.sh
-	tools/venv.sh tools,studio,cluster,dev,docs,lint
+	tools/venv.sh tools,studio,cluster,metrics,dev,docs,lint
 	@touch $@
 
 .venv/fuzz-ready: pyproject.toml tools/venv.sh

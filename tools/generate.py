@@ -23,6 +23,7 @@ from canshaper.config.protection import PROFILES
 from canshaper.config.section import Section
 from canshaper.config.uncertainty import MEASURES
 from canshaper.controller.valve_messages import Counters
+from canshaper.report.shift import FIGURES
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions
@@ -190,12 +191,12 @@ def section_rows(name: str, links: Mapping[str, str]) -> Iterable[str]:
     return TABLES_OF_PAGES[name]()
 
 
-def measure_rows() -> Iterator[str]:
-    """Table of what a campaign measures of a drive."""
+def column_rows(columns: Mapping[str, str]) -> Iterator[str]:
+    """Table of columns, each with what it is."""
     yield "| column | what |"
     yield "|---|---|"
-    for measure, text in MEASURES.items():
-        yield f"| `{measure}` | {text} |"
+    for column, text in columns.items():
+        yield f"| `{column}` | {text} |"
 
 
 def profile_rows() -> Iterator[str]:
@@ -226,7 +227,8 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "filters": lambda: filter_table(KINDS.values()),
     "checksums": checksum_table,
     "e2e profiles": profile_rows,
-    "measures": measure_rows,
+    "measures": lambda: column_rows(MEASURES),
+    "figures": lambda: column_rows(FIGURES),
     "steps": step_rows,
     "rings": ring_rows,
 }

@@ -23,9 +23,9 @@ from typing import Any
 from cantools.database.can import Message
 from pydantic import BaseModel
 
-from canshaper.codec.flags import FlaggedVelocity
 from canshaper.codec.layout import Layout
-from canshaper.codec.signals import FieldSet
+from canshaper.codec.message import FieldSet
+from canshaper.codec.velocity import FlaggedVelocity
 from canshaper.config.filters import restored_filter
 from canshaper.config.source import Source
 from canshaper.controller.controller import Controller

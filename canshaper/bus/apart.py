@@ -18,7 +18,7 @@ from select import select
 
 import can
 
-from canshaper.bus.waiting import receive
+from canshaper.bus.python_can import receive
 from canshaper.gate.loop import boottime_ns
 
 # A frame may leave so late after it was given to an adapter, and an adapter may take so long for

@@ -12,11 +12,44 @@ import can
 from canshaper.bus.multicast import LocalMulticastBus, receive_one_group
 from canshaper.bus.packet import Arrivals
 from canshaper.bus.raw import MOST_FRAMES
-from canshaper.bus.waiting import waiting
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.machine.buses import ALWAYS_FD
 from canshaper.machine.routing import BusRoutes
+
+# Failures of an interface in one read: a garbled line of an adapter costs that line, and what waits
+# behind it must not grow old; a bus that is gone fails at every call.
+MOST_FAILURES = 20
+
+
+def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
+    """The next frame of a bus, or None where none comes in time; raises as the interface does."""
+    try:
+        message: can.Message | None = bus.recv(timeout_s)
+    except Exception as error:
+        # slcan keeps a line that is no text, and would fail at it for ever.
+        if isinstance(error.__cause__, UnicodeDecodeError):
+            getattr(bus, "_buffer", bytearray()).clear()
+        raise
+    return message
+
+
+def waiting(bus: Any, most: int) -> Iterator[can.Message | Exception | None]:
+    """Yield what waits, or what the interface raised in its place; None where nothing waits."""
+    failures = 0
+    for _ in range(most):
+        try:
+            message = receive(bus)
+        except Exception as error:  # each interface raises its own kinds
+            yield error
+            failures += 1
+            if failures == MOST_FAILURES:
+                return
+        else:
+            yield message
+            if message is None:
+                return
+
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256

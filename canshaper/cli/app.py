@@ -27,7 +27,7 @@ GROUPS = {
     "look": "Look, without a machine",
 }
 # They need a scheduler, sockets and signals that only Linux has.
-LINUX_ONLY = {"commission", "doctor", "gateway", "run", "set"}
+LINUX_ONLY = {"commission", "doctor", "gateway", "metrics", "run", "set"}
 
 
 class Verbs(TyperGroup):

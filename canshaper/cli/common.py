@@ -46,6 +46,7 @@ EXTRAS = {
     **dict.fromkeys(("canopen", "casadi", "matplotlib", "numpy", "scipy"), "tools"),
     **dict.fromkeys(("starlette", "uvicorn", "websockets"), "studio"),
     "pyarrow": "campaign",
+    "prometheus_client": "metrics",
     **dict.fromkeys(("dask_jobqueue", "distributed"), "cluster"),
 }
 

@@ -7,7 +7,6 @@ import json
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,10 @@ from canshaper.campaign.engine import Engine
 from canshaper.cli.common import loader
 from canshaper.errors import CanshaperError, UsageError
 from canshaper.recording.log import READERS, LogFile
+from canshaper.recording.shift import day_of
 from canshaper.report.console import SafeConsole, new_table
 from canshaper.report.table import NOTHING
 
-# The clock of a log that begins before this counts from its own start.
-_FIRST_DAY_NS = 1_000_000_000 * 1_000_000_000
 EXIT_NOT_READ = 1
 _HEADS = ("min", "raw deg", "left deg", "dip %", "stops", "trips")
 Row = dict[str, Any]
@@ -44,9 +42,9 @@ class Log:
     fault: str = ""
 
 
-def logs_below(folder: Path) -> list[tuple[str, Path]]:
-    """Machine and path of every log in a folder and those in it, by name."""
-    known = {*READERS, SUFFIX} - {".txt"}  # most of them are notes
+def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
+    """Machine and path of every log, and bundle, in a folder and those in it, by name."""
+    known = {*READERS, SUFFIX, *bundles} - {".txt"}  # most of them are notes
     logs = [
         path
         for path in sorted(folder.rglob("*"))
@@ -138,13 +136,6 @@ def replayed(configs: tuple[str, ...], channels: Mapping[str, str], path: Path) 
                 }
             )
     return rows
-
-
-def day_of(time_ns: int) -> str:
-    """Day of a time of a log, in UTC; empty where its clock has none."""
-    if time_ns < _FIRST_DAY_NS:
-        return ""
-    return datetime.fromtimestamp(time_ns / 1e9, UTC).date().isoformat()
 
 
 def identified(

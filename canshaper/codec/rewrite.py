@@ -9,8 +9,7 @@ from canshaper.checksums.algorithms import AUTOSAR, SAE_J1850, Crc8, Xor
 from canshaper.checksums.kinds import CHECKSUMS, Checksum
 from canshaper.codec.e2e import Profile1, Profile2, Profile4, Profile5
 from canshaper.codec.frame import Frame, new_frame
-from canshaper.codec.protection import Protection
-from canshaper.codec.sent import Sender, SentMessage
+from canshaper.codec.message import Protection, Sender, SentMessage
 from canshaper.codec.signals import named_fault, raw_limits
 
 
@@ -33,6 +32,8 @@ class RewrittenMessage(SentMessage):
         ours_mask: bits of the velocities, byte 0 the lowest.
         mask_of_all: ``ours_mask`` with the bits of the alive counter.
     """
+
+    rewrites = True
 
     def __init__(
         self,
@@ -83,14 +84,16 @@ class RewritingSender(Sender):
 
     def onto(self, data: bytes) -> Frame:
         """Return the next frame: the joystick's with our velocities, protected again."""
-        ours = int.from_bytes(self.protector.without_check(self.raw), "little") & self._mask
+        ours = int.from_bytes(self.frame().data, "little") & self._mask
         word = int.from_bytes(data, "little") & ~self._mask | ours
-        protected = self.protector.add_check(word.to_bytes(self._length, "little"))
-        return new_frame(Frame, (*self.key, protected))
+        changed = word.to_bytes(self._length, "little")
+        if self._check is not None:
+            changed = self._check.protect(changed, self._count)
+        return new_frame(Frame, (*self.key, changed))
 
     def instead(self, frame: Frame) -> Frame:
         """Return the frame again, with the axes' present velocities and the same count."""
-        self.protector.take_back()
+        self.take_back()
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:

@@ -7,12 +7,10 @@ everything here is decoded raw (``Layout``) and judged raw.
 import math
 import re
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.layout import Layout, is_j1939
 from canshaper.shaping.states import Reason
 
 # Part of a raw step: what the rounding of decimals may take.
@@ -263,87 +261,3 @@ def radius_range(signal: Signal) -> str | None:
         text = f"expected a radius in m, up to {FARTHEST_M:g}"
         return f"{signal.name}: {text}, got [{low:g}|{high:g}]"
     return None
-
-
-@dataclass(frozen=True, slots=True)
-class VelocitySignal:
-    """Signed velocity of a joystick: raw value to command or fault."""
-
-    name: str
-    scale: float
-    offset: float
-    full: float
-    special: dict[Any, Reason]
-    low: float = -1.0 - ROUNDING
-    high: float = 1.0 + ROUNDING
-
-    @classmethod
-    def of(cls, signal: Signal) -> "VelocitySignal":
-        """Return the reader of a DBC signal as a part of full scale.
-
-        Its range has to be one of ``symmetrical_range`` or ``magnitude_range``.
-        """
-        full = full_scale(signal)
-        low, high = (signal.minimum or 0.0) / full, (signal.maximum or 0.0) / full
-        ends = min(low, -1.0) - ROUNDING, high + ROUNDING
-        return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal), *ends)
-
-    def read(self, raw: dict[str, Any]) -> float | Reason:
-        """Part of full scale in [-1, 1] from the raw values of a frame, or why there is none."""
-        code: float = raw[self.name]
-        fault = self.special.get(code)
-        if fault is not None:
-            return fault
-        value: float = (code * self.scale + self.offset) / self.full
-        if -1.0 <= value <= 1.0:
-            return value
-        if not math.isfinite(value):
-            return Reason.JOYSTICK_NOT_A_NUMBER
-        if not self.low <= value <= self.high:
-            return Reason.JOYSTICK_OUT_OF_RANGE
-        return math.copysign(1.0, value)
-
-
-class FieldSet:
-    """Physical values to the raw fields of one message; what is not set keeps its start value.
-
-    That is GenSigStartValue; without one 0, in messages of J1939 all bits 1: not available.
-
-    Attributes:
-        message: the message.
-        layout: where its signals lie.
-        start: raw start value of every signal.
-    """
-
-    def __init__(self, message: Message) -> None:
-        self.message = message
-        self.layout = Layout(message)
-        self.start: dict[str, Any] = {
-            s.name: self._start(s, is_j1939(message)) for s in message.signals
-        }
-        self._fields = {
-            s.name: (s.scale, s.offset, *raw_limits(s)) for s in message.signals if not s.is_float
-        }
-
-    @staticmethod
-    def _start(signal: Signal, all_ones: bool) -> int | float:
-        """GenSigStartValue (a raw value), within the bits of the signal."""
-        if signal.is_float:
-            return float(signal.raw_initial or 0.0)
-        low, high = raw_limits(signal)
-        if all_ones and signal.raw_initial is None:
-            return -1 if signal.is_signed else high
-        return min(max(int(signal.raw_initial or 0), low), high)
-
-    def raw(self, name: str, value: float) -> int:
-        """Raw value nearest to a physical one, held within the bits of the signal.
-
-        Held, not refused: a status beyond its range shall still be seen.
-        """
-        scale, offset, low, high = self._fields[name]
-        return min(max(round((value - offset) / scale), low), high)
-
-    def value(self, name: str, raw: float) -> float:
-        """Physical value of a raw one."""
-        scale, offset, _, _ = self._fields[name]
-        return raw * scale + offset

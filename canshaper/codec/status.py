@@ -14,7 +14,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from cantools.database.can import Message
 
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import raw_limits
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.states import Reason, State, Trust

@@ -1,4 +1,4 @@
-"""The other end of the control socket: for ``canshaper set`` and the live page."""
+"""The other end of the control socket: for ``canshaper set``, ``metrics`` and the live page."""
 
 import getpass
 import json
@@ -24,6 +24,17 @@ def table(path: Path) -> dict[str, dict[str, float]]:
     answer = _ask(path, {})
     assert isinstance(answer["adjustable"], dict)
     return answer["adjustable"]
+
+
+def status(path: Path) -> dict[str, Any]:
+    """Return state, counters and lateness of a running daemon, see ``Reporter.numbers``.
+
+    Raises:
+        ControlError: no daemon answers, or one that does not know the question.
+    """
+    answer = _ask(path, {"status": True})["status"]
+    assert isinstance(answer, dict)
+    return answer
 
 
 def person() -> str:

@@ -10,10 +10,10 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.signals import LEAST_STEPS, command_fault, raw_limits, symmetrical_range
 from canshaper.codec.status import AIM, AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
-from canshaper.machine.contraries import ENABLE as CONTRARY_ENABLE
-from canshaper.machine.contraries import contrary_fault
 from canshaper.machine.corrections import bit_of
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, UNITS
+from canshaper.machine.used_message import ENABLE as CONTRARY_ENABLE
+from canshaper.machine.used_message import contrary_fault
 
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
 ENABLING = re.compile(r"(?<!in)(?<!not )(active|enable|operat|ready)|^on$", re.IGNORECASE)

@@ -8,9 +8,8 @@ from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.origin import Origin
 from canshaper.config.protection import Status
 from canshaper.config.section import Section, number
-from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.valve_curve import ValveCurve
 
 
 class Slewing(Section):

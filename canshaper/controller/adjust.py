@@ -97,7 +97,7 @@ class Adjuster:
         if runner.limits(config) != before and not runner.axis.neutral:
             state = runner.axis.state.name
             raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
-        if runner.axis.commanded and not runner.axis.command:
+        if runner.axis.output.commanded and not runner.axis.command:
             # Another filter may ask for a motion that no one asks for any more.
             raise ValueError(f"axes.{name}: it runs on with its joystick released; wait for rest")
         rate = config.limits.slowest_per_s

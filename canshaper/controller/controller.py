@@ -4,16 +4,14 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 """
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.controller.ends import AimPoint, AxisEnds
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.hydraulics import SharedFlow
 from canshaper.controller.motion import motion_runners
-from canshaper.controller.parameter_sets import Load
 from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
-from canshaper.controller.status import SensorReport, StatusMessages
+from canshaper.controller.status import AimPoint, SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
 from canshaper.inputs.input import EnableGate, Key, Part, carry_over
 from canshaper.machine.deployment import Deployment
@@ -21,6 +19,10 @@ from canshaper.machine.named_codes import values_of_schedules
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason, State, Transition
+
+if TYPE_CHECKING:
+    from canshaper.controller.demands import AxisEnds, SharedFlow
+    from canshaper.controller.parameter_sets import Load
 
 NOWHERE: frozenset[str] = frozenset()
 
@@ -252,7 +254,11 @@ class Controller:
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
         """Connect load state, profile, sway sensors, ends and two-axis motions to the axes."""
         values = values_of_schedules(self.deployment.config).values()
-        self._load = Load(inputs.load_state, [*values]) if inputs.load_state and values else None
+        self._load: Load | None = None
+        if inputs.load_state and values:
+            from canshaper.controller import parameter_sets
+
+            self._load = parameter_sets.Load(inputs.load_state, [*values])
         for runner in self.axes.values():
             if switches := inputs.gates.get(runner.bound.config.command.joystick):
                 runner.add_interlock(EnableGate(switches))
@@ -261,17 +267,22 @@ class Controller:
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
             self._sensors[name] = SensorReport(name, self.axes[name])
-        self._ends = [AxisEnds(self.axes[name], one) for name, one in inputs.positions.items()]
+        self._ends: list[AxisEnds] = []
+        self._flow: SharedFlow | None = None
+        oil = self.deployment.config.hydraulics
+        if oil or inputs.positions:
+            from canshaper.controller import demands
+
+            self._ends = [demands.AxisEnds(self.axes[n], p) for n, p in inputs.positions.items()]
+            others = inputs.other_flow
+            if oil:
+                self._flow = demands.SharedFlow(oil, self.axes, inputs.joysticks, others, tick_s)
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
         for motion in self.deployment.motions.values():
             if motion.aim:
                 self.status.aims.append(AimPoint(motion, self.axes))
         axes = self.axes.values()
         self._followed = [(runner, runner.run_on) for runner in axes if runner.run_on]
-        oil = self.deployment.config.hydraulics
-        self._flow = None
-        if oil:
-            self._flow = SharedFlow(oil, self.axes, inputs.joysticks, inputs.other_flow, tick_s)
 
     def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
         """Report changes of the valve's feedback and of the sway sensor."""

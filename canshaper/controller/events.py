@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.limits import Sway
-from canshaper.inputs.feedback import Following
+from canshaper.inputs.value import Following
 from canshaper.shaping.states import Transition, Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
@@ -75,30 +75,12 @@ class MotionEvent:
 
 
 @dataclass(frozen=True, slots=True)
-class FlowEvent:
-    """The pump no longer delivers what all axes ask for, or does again.
-
-    Attributes:
-        scale: factor of all demands.
-    """
-
-    scale: float
-
-    @property
-    def text(self) -> str:
-        """Line for the log."""
-        if self.scale == 1.0:
-            return "hydraulics=enough"
-        return f"hydraulics=scaled speed_pct={100.0 * self.scale:.0f}"
-
-
-@dataclass(frozen=True, slots=True)
 class ValueEvent:
     """A measured value is known again, lost, or restless: it jumps to and fro.
 
     Attributes:
-        name: ends of an axis, load_state, flow of other functions.
-        state: known, lost or restless.
+        name: ends of an axis, load_state, flow of other functions, hydraulics.
+        state: known, lost or restless; of the pump, whether it delivers enough for all axes.
     """
 
     name: str

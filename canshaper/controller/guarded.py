@@ -38,7 +38,7 @@ class Guarded:
         """Take a frame from a bus, see ``Controller``; it counts for the next frame out."""
         message = self._gate.receive(frame[:3], frame[3], now_ns)
         passed = self._controller.receive(frame, now_ns)
-        if message is not None and message.of.checked:
+        if message is not None and message.of.protection.known:
             self._compare(message, frame, now_ns)
         if passed is None:
             return None

@@ -50,7 +50,7 @@ class _Member:
         full, (back, ahead) = moving.full_speed, runner.room
         moving.room_m = full * back, full * ahead
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
-        moving.commanded, moving.able = axis.commanded, axis.state in ABLE
+        moving.commanded, moving.able = axis.output.commanded, axis.state in ABLE
         moving.unattended = axis.unattended
 
 
@@ -79,7 +79,7 @@ class MotionRunner:
         self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
         slewing = slew.bound.config.slewing
         assert slewing is not None  # checked with the deployment
-        slew.add_radius(radius)
+        slew.radius = radius
         turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]
@@ -126,10 +126,10 @@ class MotionRunner:
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
             moving, runner = member.moving, member.runner
-            runner.add_velocity(moving.added, damps=moving.damps)
+            runner.added, runner.damps = moving.added, moving.damps
             runner.displaced = moving.reached / moving.full_speed
             if self._motion.unattended:
-                runner.axis.renew_added_time()
+                runner.axis.added_time.renew()
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
         return None if apart == self._apart else self._changed(apart)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from canshaper.codec.sent import Sender
+from canshaper.codec.message import Sender
 from canshaper.config.limits import Ends, OtherFlow, Radius
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
@@ -150,7 +150,7 @@ def parts(
             yield ("input", *places[bus], *message), entry
         for sender in senders:
             bus, *message = sender.key
-            yield ("sender", *places[bus], *message), sender.protector
+            yield ("sender", *places[bus], *message), sender
         for name, runner in axes.items():
             bus, *message = runner.valve.key
             signal = runner.bound.config.valve.signal

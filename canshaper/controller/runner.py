@@ -6,18 +6,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.sent import Sender
+from canshaper.codec.message import Sender
 from canshaper.config.schema import AxisSection
-from canshaper.controller.parameter_sets import Load, SetChooser
-from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
-from canshaper.inputs.value import ProfileChoice, Value
+from canshaper.inputs.value import Feedback, ProfileChoice, Value
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.end_stops import RunOn
+from canshaper.shaping.demands import RunOn
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
@@ -33,6 +31,7 @@ from canshaper.shaping.states import (
 from canshaper.shaping.sway import SwayModel
 
 if TYPE_CHECKING:
+    from canshaper.controller.parameter_sets import Load, SetChooser
     from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
@@ -53,6 +52,8 @@ class AxisControl:
             seconds.
         displaced: how far the motion has moved it from where its own commands lead, in the same
             unit.
+        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
+        radius: measured radius of the tip of an axis that slews, where that is known.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.
@@ -92,14 +93,14 @@ class AxisControl:
         self._trip: Reason | None = None  # noted since the last tick
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
-        self.add_velocity(0.0, damps=False)
+        self.added, self.damps = 0.0, False
         self.room = -math.inf, math.inf
         self.displaced = 0.0
         self.run_on: RunOn | None = None
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
-        self._radius: Value | None = None
+        self.radius: Value | None = None
         self._sway_signal: SwaySignal | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
@@ -130,18 +131,9 @@ class AxisControl:
         self._trip = self._trip or Reason.SECOND_SENDER
         self._foreign_ns = now_ns
 
-    @property
-    def added(self) -> float:
-        """Velocity that a two-axis motion adds to this axis, fraction of full speed."""
-        return self._added
-
-    def add_velocity(self, added: float, *, damps: bool) -> None:
-        """Take the velocity that a two-axis motion adds from now on, see ``ShapedAxis.act``."""
-        self._added, self._damps = added, damps
-
     def drop_added(self) -> None:
         """Add nothing from now on; the next output is not faster for what was added."""
-        self.add_velocity(0.0, damps=False)
+        self.added, self.damps = 0.0, False
         self.axis.drop_added()
 
     def new_filter(self) -> tuple[Shaper, SwayModel | None]:
@@ -161,8 +153,10 @@ class AxisControl:
         """Add an interlock: it has to agree before the axis may move."""
         self._interlocks.append(interlock)
 
-    def add_chooser(self, load: Load | None, profile: ProfileChoice | None) -> None:
+    def add_chooser(self, load: "Load | None", profile: ProfileChoice | None) -> None:
         """Let load and operator choose sway data and filter."""
+        from canshaper.controller.parameter_sets import SetChooser
+
         self.chooser = SetChooser(self.bound, self.axis, load, profile)
 
     def add_sway_sensor(self, message: "SwaySensorInput") -> None:
@@ -176,10 +170,6 @@ class AxisControl:
         self._sway_signal = SwaySignal(message, bound)
         damps = bound.config.use == "damp"
         self.axis.sensed = SensedSway(sway, bound.timing, bound.limits, bound.gains, damps=damps)
-
-    def add_radius(self, radius: Value | None) -> None:
-        """Take the measured radius of a slewing axis, by which the speed of its tip is computed."""
-        self._radius = radius
 
     def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of the sway sensor only while this node works."""
@@ -195,7 +185,7 @@ class AxisControl:
         """
         self._joystick = joystick
         self.alone = True
-        self.add_velocity(0.0, damps=False)
+        self.added, self.damps = 0.0, False
         if axis is not None:
             self.axis, self.chooser = axis, None
 
@@ -253,8 +243,9 @@ class AxisControl:
             fault = self._objections(now_ns, emergency)
         axis, joystick = self.axis, self._joystick
         trip, self._trip = self._trip, None
-        command = joystick.command(self._signal, now_ns, self._releases, trip, self._neutral_band)
-        self._releases = joystick.releases
+        command, self._releases = joystick.command(
+            self._signal, now_ns, self._releases, trip, self._neutral_band
+        )
         # A release is more than a fault.
         if fault is not None and (command.enabled or axis.neutral):
             # Another switch that does not agree must not hide a release of the one to press. Where
@@ -272,13 +263,13 @@ class AxisControl:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
-            axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
-        state = axis.state
-        transition = axis.act(command, self._added, damps=self._damps)
+            axis.sensed.measure(value, scale, commanded=axis.output.commanded, damps=self.damps)
+        transition = axis.act(command, self.added, damps=self.damps)
         try:
             self._put(self.valve.raw, axis.output.steps)
         except Exception as error:  # nothing of it is left in the message
-            transition = axis.invalidate(state, error)
+            old = axis.state if transition is None else transition.old
+            transition = axis.invalidate(old, error)
             self.put(0)
         return transition
 
@@ -316,7 +307,7 @@ class AxisControl:
 
     def _scale(self, now_ns: int) -> float:
         """Swing in rad of a model angle of 1, see ``SwayModel``, at the tip's full speed now."""
-        if self._radius is not None and (radius_m := self._radius.fresh(now_ns)):
+        if self.radius is not None and (radius_m := self.radius.fresh(now_ns)):
             slewing = self.bound.config.slewing
             assert slewing is not None  # checked with the deployment
             self._full_speed_m_s = max(radius_m, LEAST_RADIUS_M) * slewing.full_speed_rad_s

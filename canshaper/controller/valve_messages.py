@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.sent import Sender
+from canshaper.codec.message import Sender
 from canshaper.controller.runner import AxisControl
 from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
@@ -58,7 +58,7 @@ class ValveOutputs:
         runners = self._axes[frame[:3]]
         if not any(runner.axis.raw for runner in runners):
             return False
-        runners[-1].valve.protector.take_back()
+        runners[-1].valve.take_back()
         return True
 
     def refused(self, frame: Frame) -> Frame:

@@ -2,28 +2,25 @@
 
 import logging
 import os
-import re
 import signal
-import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
-from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
     close_ports,
     new_ports,
     open_ports,
+    opened_ports,
     received_at_first,
     seen_sent,
     send_neutral,
@@ -39,6 +36,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 
 if TYPE_CHECKING:
+    from canshaper.daemon.control import Control
     from canshaper.daemon.gateway import InlineGateway
 
 log = logging.getLogger("canshaper")
@@ -47,8 +45,6 @@ log = logging.getLogger("canshaper")
 _AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE, BusState.UNFIT)
 INTERNAL_ERROR = "INTERNAL_ERROR"
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))
-# How often buses are tried that cannot be opened at the start.
-WAIT_S = 0.5
 
 
 class Daemon:
@@ -74,7 +70,7 @@ class Daemon:
         self._black_box = BlackBox(folder)
         deployment = load()
         program_sha256()  # kept from now on: to read the program takes longer than a tick
-        self._ports = self._opened(deployment)
+        self._ports = opened_ports(deployment, self._on_fault, self._manager)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)
         self._use(deployment)
@@ -171,7 +167,7 @@ class Daemon:
         if self._line:
             self._line.check(now_ns, neutral=controller.neutral)
         if self._control:
-            self._control.serve(self._answer, now_ns)
+            self._control.serve(now_ns)
         if self._reporter.status(now_ns, self._trouble):
             for name, port in self._ports.items():
                 if news := port.look():
@@ -185,49 +181,6 @@ class Daemon:
         trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
         return trouble + ["tick plain"] * bool(self._follower and not self._follower.follows)
 
-    def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
-        """Answer one request from the control socket."""
-        values = request.get("set", {})
-        if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
-            peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
-        if request.keys() - {"set", "black_box", "by"} or not isinstance(values, dict):
-            expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
-            raise ValueError(f"expected {expected}, got another object")
-        if "black_box" in request:
-            if request["black_box"] == "write":
-                self._black_box.request()
-                log.info("black-box=requested %s", peer)
-            return {"black_box": self._black_box.report()}
-        if "set" in request:
-            try:
-                changes = self._adjuster.change(values)
-            except ValueError as error:
-                log.warning("set=refused %s %s", peer, error)
-                raise
-            self._recorder.set(values)
-            for change in changes:
-                log.info("set %s %s", change, peer)
-        return {"adjustable": self._adjuster.table()}
-
-    def _opened(self, deployment: Deployment) -> dict[str, Port]:
-        """Open the buses; under a service manager, wait for them.
-
-        A restart for each try would load the program each time, and take the processor from the
-        instance of another machine.
-        """
-        said = ""
-        while True:
-            try:
-                return open_ports(deployment, {}, self._on_fault)
-            except BusError as error:
-                if not self._manager.present:
-                    raise
-                if str(error) != said:
-                    said = str(error)
-                    log.error("waiting for a bus: %s", said)
-                self._manager.waiting(f"waiting: {said.splitlines()[0]}")
-                time.sleep(WAIT_S)
-
     # -- deployments ---------------------------------------------------------------------------
 
     def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
@@ -238,7 +191,6 @@ class Daemon:
             guarded.carry_over(self._guarded)
         self._guarded: Guarded = guarded
         self._recorder = self._black_box.around(guarded, self._controller)
-        self._adjuster = Adjuster(self._controller)
         self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._follower = tick_follower(deployment, self._controller)
@@ -251,17 +203,14 @@ class Daemon:
 
         return InlineGateway(deployment, self._on_fault)
 
-    def _open_control(self, deployment: Deployment) -> ControlServer | None:
+    def _open_control(self, deployment: Deployment) -> "Control | None":
         """Open the control socket, if the file has one; a machine works without it too."""
-        control = deployment.config.control
-        if control is None:
+        if deployment.config.control is None:
             return None
-        path = control.path(deployment.path)
-        try:
-            return ControlServer(path, int(control.mode, 8))
-        except OSError as error:
-            log.warning("control=none socket=%s %s", path, error.strerror or error)
-            return None
+        from canshaper.daemon.control import open_control
+
+        parts = self._controller, self._recorder, self._black_box, self._reporter
+        return open_control(deployment, *parts)
 
     def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment, if its buses can be opened; else go on as before.

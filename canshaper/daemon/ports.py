@@ -8,11 +8,14 @@ from dataclasses import replace
 from canshaper.bus.port import ListeningPort, Port, open_port
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import Bus
+from canshaper.daemon.notify import ServiceManager
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.deployment import Deployment
 
 log = logging.getLogger("canshaper")
 
+# How often buses are tried that cannot be opened at the start.
+WAIT_S = 0.5
 # How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
 NEUTRAL_TRIES_S = 0.1
 # Until what was sent last has left a queue of some frames, also on a bus with other traffic.
@@ -48,6 +51,28 @@ def open_ports(
             raise BusError(str(deployment.source.problem(place, error.why))) from error
         raise
     return ports
+
+
+def opened_ports(
+    deployment: Deployment, on_fault: Callable[[FrameFault], None], manager: ServiceManager
+) -> dict[str, Port]:
+    """Open the buses of a deployment at the start; under a service manager, wait for them.
+
+    A restart for each try would load the program each time, and take the processor from the
+    instance of another machine.
+    """
+    said = ""
+    while True:
+        try:
+            return open_ports(deployment, {}, on_fault)
+        except BusError as error:
+            if not manager.present:
+                raise
+            if str(error) != said:
+                said = str(error)
+                log.error("waiting for a bus: %s", said)
+            manager.waiting(f"waiting: {said.splitlines()[0]}")
+            time.sleep(WAIT_S)
 
 
 def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Port]:

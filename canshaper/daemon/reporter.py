@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, FrameFault
@@ -97,6 +98,27 @@ class Reporter:
     def hold_status(self) -> None:
         """Leave what the service manager shows for a second."""
         self._status_ns = boottime_ns() + SECOND_NS
+
+    def numbers(self) -> dict[str, Any]:
+        """Return state, counters and lateness, as plain data for a program that watches."""
+        controller = self._controller
+        return {
+            "digest": controller.deployment.identity.digest,
+            "axes": {
+                name: {
+                    "state": one.axis.state.name,
+                    "reason": one.reason.name,
+                    "joystick": one.axis.command,
+                    "setpoint": one.axis.sent,
+                    "sway_deg": one.sway_deg,
+                    "set": one.active_set,
+                }
+                for name, one in controller.axes.items()
+            },
+            "buses": {name: state.value for name, state in self._bus_states.items()},
+            "counters": dict(controller.counters.values),
+            "late_s": self._latest_ns / 1e9,
+        }
 
     def refused(self, why: str) -> None:
         """Log why a reload changes nothing."""

@@ -208,6 +208,14 @@ class AxisState(Pending):
         reach = self.most if self.last > 0.0 else -self.least
         self.top = max(self.top - self.of.fall, min(self.top, reach))
 
+    def held_at(self, velocity: float) -> float:
+        """Demand in the direction of a velocity."""
+        return max(self.now if velocity > 0.0 else -self.now, 0.0)
+
+    def beyond(self, velocity: float) -> float:
+        """How much faster it is than the demand, and what a partner may add: that is run-on."""
+        return abs(velocity) - self.held_at(velocity) - self.of.added
+
     def left(self, velocity: float, made: int, number: int) -> None:
         """A frame has left."""
         of, size = self.of, abs(velocity)
@@ -225,14 +233,12 @@ class AxisState(Pending):
                 self.halt("fell to neutral at once", made, latch=False)
         self.way += velocity * of.period_s
         self.alone += velocity != 0.0
-        held = max(self.now if velocity > 0.0 else -self.now, 0.0)
-        beyond = size - held - of.added
-        if beyond > 0.0:
+        if (beyond := self.beyond(velocity)) > EPSILON:
             self.ran += beyond * of.period_s * passed
         elif self.now:
             self.ran = 0.0
         on = self.way_back - of.fall * passed if velocity * self.last > 0.0 else 0.0
-        self.way_back = max(on, held + of.step)
+        self.way_back = max(on, self.held_at(velocity) + of.step)
         if size > min(fallen, self.way_back) + EPSILON:
             asked.remaining -= size * of.period_s * passed
         self.top = size + of.step

@@ -7,9 +7,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.gate.checks import COUNTS, HEADERS, Check, Checksum, Crc, E2e, crc_of
+from canshaper.gate.checks import COUNTS, HEADERS, Checksum, Crc, E2e, crc_of
 from canshaper.gate.fields import Field, openings_of
-from canshaper.gate.record import Axis, Joystick, Key, Message, Record, Switch, Valve
+from canshaper.gate.record import Axis, Joystick, Key, Message, Protection, Record, Switch, Valve
 from canshaper.gate.signals import (
     bits_of,
     command_of,
@@ -74,11 +74,11 @@ def _message(name: str, bound: Any, config: Any) -> Message:
             ids, group = frozenset(), (mask, can_id & mask)
         else:
             ids = frozenset(priority << 26 | can_id & 0x03FFFFFF for priority in range(8))
-    check, checked, counter, counts = protection_of(section, message, can_id)
+    protection = protection_of(section, message, can_id)
     page, alone = None, False
     if (chosen := bound.chosen) is not None:
         page, alone = (field_of(message, chosen.signal), chosen.value), chosen.alone
-    node, most = config.buses[section.bus].j1939, min(3, counts // 2)
+    node, most = config.buses[section.bus].j1939, min(3, protection.counts // 2)
     return Message(
         name=name,
         bus=section.bus,
@@ -86,10 +86,7 @@ def _message(name: str, bound: Any, config: Any) -> Message:
         extended=message.is_extended_frame,
         length=message.length,
         timeout_ns=section.timeout_ms * 1_000_000,
-        check=check,
-        checked=checked,
-        counter=counter,
-        counts=counts,
+        protection=protection,
         most_step=section.alive_max_step or most,
         qualify=section.qualify,
         page=page,
@@ -109,20 +106,18 @@ def _group(can_id: int) -> int:
     return 0x03FF0000 if (can_id >> 16) & 0xFF < 240 else 0x03FFFF00
 
 
-def protection_of(
-    section: Any, message: Any, can_id: int
-) -> tuple[Check | None, bool, Field | None, int]:
-    """Check, whether it is known here, counter and its values, by a section of the file."""
+def protection_of(section: Any, message: Any, can_id: int) -> Protection:
+    """What protects a message, by its section of the file."""
     if one := section.e2e:
         counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
         check = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
-        return check, True, None, counts
+        return Protection(check, counts=counts)
     counter = field_of(message, section.alive_counter) if section.alive_counter else None
     counts = counter.mask + 1 if counter else 0
     if section.checksum is None:
-        return None, True, counter, counts
+        return Protection(None, True, counter, counts)
     checksum = _checksum(section.checksum, message, can_id)
-    return checksum, checksum is not None, counter, counts
+    return Protection(checksum, checksum is not None, counter, counts)
 
 
 def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
@@ -269,10 +264,10 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
     fixed = 0 if forwarded else (1 << 8 * message.length) - 1 & ~ours
     value = (value | ~known if j1939 else value) & fixed
     group = _group(message.frame_id) if j1939 and not forwarded else 0
-    frame = message.length, names, fixed, value, ours, tuple(words)
+    frame = message.length, names, fixed, value, ours, protection, tuple(words)
     if not forwarded:
-        return Valve(*frame, (), None, *protection, group)
-    return Valve(*frame, tuple(own), field_of(message, enable), *protection)
+        return Valve(*frame, group=group)
+    return Valve(*frame, tuple(own), field_of(message, enable))
 
 
 def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:

@@ -32,11 +32,7 @@ def longest_gap_ns(deployment: Any) -> int:
 
 
 class Standstill:
-    """Whether a loop has stood still for too long since its last tick.
-
-    Args:
-        deployment: its machine.
-        before: that of the deployment before, whose last tick counts here too.
+    """Whether a loop has stood still for too long since its last tick; that of ``before`` counts.
 
     Attributes:
         clock: the time when a frame is about to leave, ns; a test may replace it.
@@ -111,16 +107,9 @@ class FramePort(Protocol):
 def receive_waiting(
     processor: FrameProcessor, ports: Mapping[str, FramePort], now_ns: int, standstill: Standstill
 ) -> int:
-    """Receive what waits; frames of a joystick that pass a gateway leave at once or not at all.
+    """Receive what waits, none of it younger than ``now_ns``; return how many frames there were.
 
-    Args:
-        processor: what the frames are for.
-        ports: the buses by name.
-        now_ns: time by ``boottime_ns``; no frame is younger.
-        standstill: until when a frame that moves a valve may leave.
-
-    Returns:
-        How many there were.
+    Frames of a joystick that pass a gateway leave at once or not at all.
     """
     count = 0
     for port in ports.values():
@@ -150,10 +139,8 @@ def io_cycle(
     after that. Its tick is none that was made, so the next one sees how long the loop stood still.
 
     Args:
-        processor: what the frames are for.
-        ports: the buses by name.
-        now_ns: time of this tick, by ``boottime_ns``.
-        missed: deadlines missed since the last one.
+        processor, ports: what the frames are for, and the buses by name.
+        now_ns: time of this tick, by ``boottime_ns``; ``missed`` deadlines since the last one.
         standstill: when the last tick was.
     """
     if standstill.over(now_ns):

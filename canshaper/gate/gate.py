@@ -13,9 +13,6 @@ from canshaper.gate.record import Key, Message, Record, Switch
 class Gate:
     """All valves of a machine.
 
-    Args:
-        record: what is known of it.
-
     Attributes:
         moved: axes by the name of the message that moves them.
         valves: valve messages with their axes.
@@ -71,11 +68,7 @@ class Gate:
     # --- what comes in ---------------------------------------------------------------------------
 
     def receive(self, key: Key, data: bytes, now_ns: int) -> Received | None:
-        """A frame was received.
-
-        Returns:
-            The message that it is one of, where it is one with a joystick.
-        """
+        """A frame was received; return its message, where that is one with a joystick."""
         message = self.ids.get(key)
         if message is None:
             message = self._by_group(key, now_ns)
@@ -200,22 +193,17 @@ class Gate:
     # --- what goes out ---------------------------------------------------------------------------
 
     def leaving(self, key: Key, data: bytes, of: bytes | None = None) -> str:
-        """Why a frame may not leave; empty where it may.
-
-        Args:
-            key: bus and identifier.
-            data: its bytes.
-            of: in a gateway the joystick's frame that it was made from.
-        """
+        """Why a frame may not leave; in a gateway it was made ``of`` one of the joystick."""
         known = self.valves.get(key)
         if known is None:
             self.others[key] = sent = self.others.get(key, 0) + 1
             return rules.other_refused(self.record, key, data, sent)
         valve, axes = known
         word, joystick = word_of(data), axes[0].joystick
-        if why := rules.bytes_refused(valve, data, word, of, held=not joystick.pressed.released):
+        held = not joystick.pressed.released and any(one.armed or one.stop_left for one in axes)
+        if why := rules.bytes_refused(valve, data, word, of, held=held):
             return why
-        count = valve.count(data, word)
+        count = valve.protection.count(data, word)
         # Axes of one message have one period, and so their turn together.
         due = axes[-1].due if of is None else joystick.received.waiting
         if why := rules.turn_refused(valve, count, self.counts.get(key), due=due):
@@ -250,7 +238,7 @@ class Gate:
         moves = [axis.of.name for axis in axes if _velocity(axis, word) != 0.0]
         if moves:
             return f"axis={moves[0]} limit=neutral"
-        self.counts[key] = valve.count(data, word)
+        self.counts[key] = valve.protection.count(data, word)
         return ""
 
     # --- a reload --------------------------------------------------------------------------------
@@ -274,7 +262,7 @@ class Gate:
             same_key = keys.get((places[bus], *rest))
             if same_key is not None and same_key in before.counts:
                 valve, other = self.valves[key][0], before.valves[same_key][0]
-                if valve.counts == other.counts:
+                if valve.protection.counts == other.protection.counts:
                     self.counts[key] = before.counts[same_key]
         for name, axis in self.axes.items():
             bus, *rest = axis.of.valve

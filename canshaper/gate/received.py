@@ -61,11 +61,11 @@ class Received:
             return False, False
         if self.intact_ns is None or now_ns - self.intact_ns > of.timeout_ns:
             self.any_count, self.good = True, 0
-        if of.check is not None and not of.check.right(data):
+        if not of.protection.right(data):
             self.good = 0
             return False, False
         self.intact_ns = now_ns
-        if of.counts and not self._next(data, word):
+        if of.protection.counts and not self._next(data, word):
             return not other, False
         if self.good < of.qualify:
             self.good += 1
@@ -76,13 +76,12 @@ class Received:
 
     def _next(self, data: bytes, word: Word) -> bool:
         """Whether the alive counter is the next one."""
-        of = self.of
-        count = int(of.counter.raw(word)) if of.counter else of.header.count(data)  # type: ignore[union-attr]
-        last, self.count = self.count, count
-        step = 1 if last is None else (count - last) % of.counts
+        of = self.of.protection
+        last, self.count = self.count, of.count(data, word)
+        step = 1 if last is None else (self.count - last) % of.counts
         if step == 0:
             return False
-        if step > of.most_step and not self.any_count:
+        if step > self.of.most_step and not self.any_count:
             self.good = 0
             return False
         self.any_count = False
@@ -115,10 +114,9 @@ class Received:
             before: that message.
             missed: its bus was closed meanwhile.
         """
-        of, was = self.of, before.of
         self.source, self.source_ns = before.source, before.source_ns
         self.intact_ns = None if missed else before.intact_ns
-        if (of.check, of.counter, of.counts) == (was.check, was.counter, was.counts):
+        if self.of.protection == before.of.protection:
             self.count, self.any_count, self.good = before.count, before.any_count, before.good
         released = {(one.of.field, one.of.on) for one in before.switches if one.released}
         for switch in self.switches:

@@ -15,6 +15,32 @@ Key = tuple[str, int, bool]
 
 
 @dataclass(frozen=True, slots=True)
+class Protection:
+    """What protects a message.
+
+    Attributes:
+        check: of its content; None for nothing, or for what is not ``known``.
+        known: whether the gate knows its checksum; of one of another package it does not.
+        counter, counts: alive counter and its values; with E2E the counter is in its header.
+    """
+
+    check: Check | None = None
+    known: bool = True
+    counter: Field | None = None
+    counts: int = 0
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame of the right length carries what it should."""
+        return self.check is None or self.check.right(data)
+
+    def count(self, data: bytes, word: Word) -> int:
+        """The alive counter of a frame; 0 where it has none."""
+        if self.counter is not None:
+            return int(self.counter.raw(word))
+        return self.check.count(data) if isinstance(self.check, E2e) else 0
+
+
+@dataclass(frozen=True, slots=True)
 class Message:
     """A message that is received.
 
@@ -22,9 +48,6 @@ class Message:
         ids: its identifiers, in J1939 with every priority; none where any address may send it.
         group: instead of them mask and value of the group.
         own: our own address on that bus, which no one else may use; -1 for none.
-        check: what protects its content; None for nothing, or what is not ``checked``.
-        checked: whether the gate knows its checksum; of one of another package it does not.
-        counter, counts: alive counter and its values; with E2E the counter is in its header.
         most_step: largest step of the counter that is still the next one.
         qualify: good frames in a row that are needed at the start and after a wrong one.
         page: of a multiplexed message the multiplexor, and its value in the frames that are meant.
@@ -37,21 +60,13 @@ class Message:
     extended: bool
     length: int
     timeout_ns: int
-    check: Check | None = None
-    checked: bool = True
-    counter: Field | None = None
-    counts: int = 0
+    protection: Protection
     most_step: int = 0
     qualify: int = 1
     page: tuple[Field, int] | None = None
     alone: bool = False
     group: tuple[int, int] | None = None
     own: int = -1
-
-    @property
-    def header(self) -> E2e | None:
-        """Where the counter is, of a message with E2E."""
-        return self.check if isinstance(self.check, E2e) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +202,6 @@ class Valve:
         words: signals with the values that they may have, such as a control word of CiA 408.
         own: of a frame of our own in the place of a joystick's: signals with their values.
         enable: in such a frame the switch, which may be 1 only while it is held.
-        check, checked, counter, counts: protection, as of ``Message``.
         group: mask of its group in J1939, which no other address may send; 0 for none.
     """
 
@@ -196,20 +210,11 @@ class Valve:
     fixed: int
     fixed_value: int
     ours: int
+    protection: Protection
     words: tuple[tuple[Field, frozenset[int]], ...] = ()
     own: tuple[tuple[Field, frozenset[float]], ...] = ()
     enable: Field | None = None
-    check: Check | None = None
-    checked: bool = True
-    counter: Field | None = None
-    counts: int = 0
     group: int = 0
-
-    def count(self, data: bytes, word: Word) -> int:
-        """The alive counter of a frame; 0 where it has none."""
-        if self.counter is not None:
-            return int(self.counter.raw(word))
-        return self.check.count(data) if isinstance(self.check, E2e) else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,6 +240,6 @@ class Record:
     @property
     def unchecked(self) -> list[str]:
         """Messages whose checksum is of another package, which the gate does not know."""
-        received = [name for name, one in self.messages.items() if not one.checked]
-        valves = [one for one in self.valves.values() if not one.checked]
+        received = [name for name, one in self.messages.items() if not one.protection.known]
+        valves = [one for one in self.valves.values() if not one.protection.known]
         return received + [f"the valve of {' and '.join(one.axes)}" for one in valves]

@@ -110,7 +110,7 @@ def distance(axis: AxisState, velocity: float) -> str:
     Where nothing was asked within the tail a partner moves it: limits are its path and its time.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
-    if axis.ran > of.run_on:
+    if axis.ran > of.run_on and axis.beyond(velocity) > EPSILON:
         return f"limit=stop_distance_m allowed={of.run_on:.3f}"
     if asked.most:
         ahead = asked.remaining + of.slack + of.path
@@ -146,11 +146,8 @@ def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
 def bytes_refused(valve: Valve, data: bytes, word: Word, of: bytes | None, *, held: bool) -> str:
     """Rule 8: length, bits that are not ours, values of a word, checksum; limit: none.
 
-    Args:
-        valve: the message.
-        data, word: the frame.
-        of: in a gateway the joystick's frame that it was made from.
-        held: whether that joystick's enable is held.
+    In a gateway it was made ``of`` a frame of the joystick, or is one of our own: enable is on in
+    that only while it is ``held`` and an axis may move.
     """
     if len(data) != valve.length:
         return f"limit=length length={len(data)} expected={valve.length}"
@@ -168,15 +165,15 @@ def bytes_refused(valve: Valve, data: bytes, word: Word, of: bytes | None, *, he
         enabled = valve.enable.raw(word) == 1
         if enabled > held or any(field.raw(word) not in values for field, values in valve.own):
             return "limit=bits of an own frame"
-    right = valve.check is None or valve.check.right(data)
-    return "" if right else "limit=checksum"
+    return "" if valve.protection.right(data) else "limit=checksum"
 
 
 def turn_refused(valve: Valve, count: int, last: int | None, *, due: bool) -> str:
     """Rule 9: one frame in the tick in which it is due, with the next alive counter."""
     if not due:
         return "limit=one frame a tick"
-    if valve.counts and last is not None and count != (last + 1) % valve.counts:
+    counts = valve.protection.counts
+    if counts and last is not None and count != (last + 1) % counts:
         return f"limit=counter value={count}"
     return ""
 

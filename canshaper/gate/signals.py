@@ -49,7 +49,7 @@ class Scale:
         scale, offset = signal.scale, signal.offset - zero
         low, high = signal.minimum, signal.maximum
         if full is not None:
-            low, high = 0.0 if magnitude else -full, full
+            low, high = -full, full
             if not signal.is_float and not magnitude:
                 # Two's complement reaches one step farther on one side.
                 ends = sorted(raw * scale + offset for raw in ends_of(signal))

@@ -5,6 +5,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Protocol, Self
 
 from canshaper.codec.frame import FrameFault
+from canshaper.codec.message import SequenceChecker
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
@@ -67,9 +68,10 @@ class Input(ABC):
     def __init__(self, bound: BoundInput) -> None:
         self._length, self._decode = bound.message.length, bound.layout.decode
         self._chosen = bound.chosen
-        self._sequence = bound.sequence_checker()
+        config = bound.config
+        self._sequence = SequenceChecker(bound.protection, config.alive_max_step, config.qualify)
         self._counter = bound.protection.counter
-        self._timeout_ns = bound.config.timeout_ms * 1_000_000
+        self._timeout_ns = config.timeout_ms * 1_000_000
         self._last_frame_ns: int | None = None
         self._refused_ns: int | None = None
         self._received_ns: int | None = None

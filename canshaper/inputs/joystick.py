@@ -15,12 +15,8 @@ class CommandSource(Protocol):
 
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> CommandInput:
-        """Return the input that the axis may use now, see ``JoystickInput``."""
-
-    @property
-    def releases(self) -> int:
-        """How often its enable was seen released."""
+    ) -> tuple[CommandInput, int]:
+        """Return the input that the axis may use now, and the releases: see ``JoystickInput``."""
 
 
 class JoystickInput(Input):
@@ -53,15 +49,6 @@ class JoystickInput(Input):
     def watch(self, signal: str) -> Switch:
         """Watch another switch in its message, which enables it or another joystick."""
         return self._switches.setdefault(signal, Switch(self, signal, 1))
-
-    @property
-    def releases(self) -> int:
-        """How often its enable was seen released.
-
-        A release counts when it is read, however long ago its frame arrived; all that has an age is
-        as old as its arrival.
-        """
-        return self._releases if self.pressed is None else self.pressed.releases
 
     @property
     def released(self) -> bool:
@@ -116,8 +103,11 @@ class JoystickInput(Input):
 
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> CommandInput:
-        """Input of the axis that this signal drives.
+    ) -> tuple[CommandInput, int]:
+        """Return the input of the axis that this signal drives, and how often enable was released.
+
+        A release counts when it is read, however long ago its frame arrived; all that has an age is
+        as old as its arrival.
 
         Args:
             signal: name of its velocity signal.
@@ -132,7 +122,7 @@ class JoystickInput(Input):
         released = now_released or known > releases
         if pressed is not None and (gone := pressed.lost(now_ns)):
             # Not known is not enabled; that it is known again is no press.
-            return CommandInput(fault=gone, enabled=False, reset=True, trip=trip)
+            return CommandInput(fault=gone, enabled=False, reset=True, trip=trip), known
         received_ns = self._received_ns
         if received_ns is None or now_ns - received_ns > self._timeout_ns:
             lost = self.lost(now_ns)
@@ -141,7 +131,7 @@ class JoystickInput(Input):
                 now_released and (pressed is not None or lost is Reason.JOYSTICK_UNTRUSTED)
             )
             # What the switches did meanwhile is not known; one that is held was not pressed.
-            return CommandInput(fault=lost, enabled=not released, reset=True, trip=trip)
+            return CommandInput(fault=lost, enabled=not released, reset=True, trip=trip), known
         raw = self.raw
         command = self.commands[signal]
         bypass = self._off is not None and raw[self._off] == 1
@@ -156,7 +146,7 @@ class JoystickInput(Input):
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
             fault = Reason.JOYSTICK_FROZEN
         else:
-            return _new(CommandInput, (command, None, True, bypass, reset, trip))
+            return _new(CommandInput, (command, None, True, bypass, reset, trip)), known
         if pressed is None:
             doubted = enable != 0 and (self._released or self._doubted > releases)
         else:
@@ -164,5 +154,5 @@ class JoystickInput(Input):
         if released and doubted:
             fault = Reason.JOYSTICK_UNTRUSTED  # it moves nothing, and is no press
         elif fault is None:
-            return CommandInput(command, enabled=False, reset=reset, trip=trip)
-        return CommandInput(fault=fault, enabled=not released, reset=reset, trip=trip)
+            return CommandInput(command, enabled=False, reset=reset, trip=trip), known
+        return CommandInput(fault=fault, enabled=not released, reset=reset, trip=trip), known

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.enable import slowest_ms
 from canshaper.config.schema import AxisSection
@@ -24,7 +23,7 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
     if not lookup.diagnostics.problems:  # else a signal may be unused because it was not bound
         for shared in shared_valves.values():
-            if not isinstance(shared.codec, RewrittenMessage):  # its signals are the joystick's
+            if not shared.codec.rewrites:  # its signals are the joystick's
                 shared.used.check_start_values(shared.codec.start)
     bound = {n: axis for n, axis in axes.items() if axis}
     if not any(axis.sway_sensor for axis in lookup.config.axes.values()):
@@ -41,26 +40,20 @@ def _bind_axis(
     lookup: Lookup, shared_valves: SharedValves, name: str, axis: AxisSection
 ) -> BoundAxis | None:
     place: Place = ("axes", name)
-    add, problems, joysticks = (
-        lookup.diagnostics.add,
-        lookup.diagnostics.problems,
-        lookup.config.joysticks,
-    )
-    before = len(problems)
-    if axis.command.joystick not in joysticks:
-        names = ", ".join(joysticks)
-        add(
-            (*place, "command", "joystick"),
-            f"expected a joystick, got {axis.command.joystick!r}; there are {names}",
-        )
+    add, problems = lookup.diagnostics.add, lookup.diagnostics.problems
+    before, joystick = len(problems), axis.command.joystick
+    if joystick not in lookup.config.joysticks:
+        names = ", ".join(lookup.config.joysticks)
+        text = f"expected a joystick, got {joystick!r}; there are {names}"
+        add((*place, "command", "joystick"), text)
     valve = bind_valve(lookup, shared_valves, (*place, "valve"), axis.valve, axis.command)
-    status = bind_status(lookup, (*place, "status"), axis.status, AXIS_STATUS)
+    status, status_ticks = bind_status(lookup, (*place, "status"), axis.status, AXIS_STATUS)
     if valve is None or len(problems) > before:
         return None
     codec, ticks = valve
     period_s = ticks * lookup.config.tick_ms / 1000.0
     check_filters(lookup, place, axis, period_s)
-    timeout_ms = slowest_ms(lookup.config, axis.command.joystick)
+    timeout_ms = slowest_ms(lookup.config, joystick)
     if fault := stated_fault(axis, timeout_ms=timeout_ms, period_s=period_s):
         add((*place, "limits", "stop_distance_m"), fault)
     if len(problems) > before:
@@ -68,14 +61,16 @@ def _bind_axis(
     cia408, ends = axis.valve.cia408, axis.limits.ends
     at: Place = (*place, "valve", "cia408", "status")
     return BoundAxis(
-        name,
-        axis,
-        codec.message.fields.message,
-        codec,
-        ticks,
-        timeout_ms,
-        *status,
-        bind_feedback(lookup, (*place, "feedback"), axis.feedback) if axis.feedback else None,
-        bind_status_word(lookup, at, cia408.status) if cia408 else None,
-        bind_ends(lookup, (*place, "limits", "ends"), ends) if ends else None,
+        name=name,
+        config=axis,
+        valve=codec,
+        period_ticks=ticks,
+        timeout_ms=timeout_ms,
+        status=status,
+        status_ticks=status_ticks,
+        feedback=bind_feedback(lookup, (*place, "feedback"), axis.feedback)
+        if axis.feedback
+        else None,
+        status_word=bind_status_word(lookup, at, cia408.status) if cia408 else None,
+        ends=bind_ends(lookup, (*place, "limits", "ends"), ends) if ends else None,
     )

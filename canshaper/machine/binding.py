@@ -69,33 +69,31 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     profile = _bind_profile(lookup)
     if load_state:
         _check_values(lookup, load_state, values_of_schedules(config))
-    service = bind_status(lookup, ("status",), config.status, SERVICE_STATUS)
-    identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
+    status, status_ticks = bind_status(lookup, ("status",), config.status, SERVICE_STATUS)
+    identity_status, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
     _check_together(lookup, joysticks)
     diagnostics.raise_problems()
+    digests = {n: f.sha256 for n, f in zip(config.dbc, messages.files, strict=True)}
     return Deployment(
-        path,
-        config,
-        messages,
-        {name: joystick for name, joystick in joysticks.items() if joystick},
-        axes,
-        motions,
-        others,
-        stop,
-        *service,
-        Identity(
-            source.sha256,
-            {n: f.sha256 for n, f in zip(config.dbc, messages.files, strict=True)},
-            _package_lines(config),
-        ),
-        identity,
-        load_state,
-        profile,
-        switches,
-        lookup.on_bus(),
-        lookup.fd(),
+        path=path,
+        config=config,
+        messages=messages,
+        joysticks={name: joystick for name, joystick in joysticks.items() if joystick},
+        axes=axes,
+        motions=motions,
+        other_flow=others,
+        emergency_stop=stop,
+        status=status,
+        status_ticks=status_ticks,
+        identity=Identity(source.sha256, digests, _package_lines(config)),
+        identity_status=identity_status,
+        load_state=load_state,
+        profile=profile,
+        switches=switches,
+        on_bus=lookup.on_bus(),
+        fd=lookup.fd(),
         source=source,
         codes=lookup.codes(),
         starts=lookup.starts(),

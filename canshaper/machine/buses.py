@@ -11,8 +11,7 @@ from cantools.database.can import Message
 from pydantic import PydanticSchemaGenerationError, TypeAdapter, ValidationError
 
 from canshaper.codec.layout import is_fd
-from canshaper.codec.rewrite import RewrittenMessage, neutral_fault
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.config.bus import LAST_SPN, Bus, Gateway, J1939Name
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Place
@@ -43,7 +42,7 @@ def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
         if bus.options:
             yield ("options",), "expected none with socketcan, which the system sets up, got some"
         return
-    from can.interfaces import BACKENDS  # noqa: PLC0415  (SocketCAN has no need of it)
+    from can.interfaces import BACKENDS
 
     if bus.interface not in BACKENDS:
         text = f"expected an interface of python-can, got {bus.interface}"
@@ -206,7 +205,9 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[SentMessage]) -
             add(("gateway", "blocked", i), result)
     if gateway.fallback == "stop":
         return
-    rewritten = [one for one in valves if isinstance(one, RewrittenMessage)]
+    from canshaper.codec.rewrite import neutral_fault
+
+    rewritten = [one for one in valves if one.rewrites]
     if not rewritten:
         text = "expected stop where no valve has the message of a joystick on the other bus"
         add(("gateway", "fallback"), f"{text}, got {gateway.fallback}")

@@ -8,7 +8,7 @@ from typing import Any
 from cantools.database.can import Message
 
 from canshaper.codec.layout import is_j1939
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.codec.status import StatusCodec
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import OtherFlow
@@ -25,7 +25,7 @@ from canshaper.machine.used_message import NamedCode, StartValue
 from canshaper.machine.valves import BoundAxis
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Deployment:
     """Everything the controller needs, checked."""
 

@@ -6,26 +6,21 @@ from typing import Any, Generic, TypeVar
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.flags import Velocity
 from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import Chosen, Layout, is_j1939
-from canshaper.codec.protection import Protection, SequenceChecker
+from canshaper.codec.message import Protection
 from canshaper.codec.signals import ends_fault, find_signal, radius_range
+from canshaper.codec.velocity import Velocity
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Ends, OtherFlow, Position, Radius
 from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
-from canshaper.machine.contraries import ENABLE, STOP
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
-from canshaper.machine.used_message import UsedMessage, key_path
+from canshaper.machine.used_message import ENABLE, STOP, UsedMessage, key_path
 from canshaper.shaping.states import Reason
-
-# Two frames may be lost in a row; more is no longer the noise of a bus.
-USUAL_MAX_STEP = 3
-
 
 Choosing = LoadState | ProfileSwitch
 """Sections of the load state, and of the operator's choice."""
@@ -76,12 +71,6 @@ class Bound(Generic[Section_co]):
         """Whether its frames are known by group and source, whatever their priority."""
         return is_j1939(self.message) and not has_destination(self.message.frame_id)
 
-    def sequence_checker(self) -> SequenceChecker:
-        """Return a new checker of its protection."""
-        config = self.config
-        step = config.alive_max_step or min(USUAL_MAX_STEP, self.protection.counts // 2)
-        return SequenceChecker(self.protection, step, config.qualify)
-
 
 BoundInput = Bound[InputSection]
 """Whatever its section is."""
@@ -130,6 +119,7 @@ class BoundValue(Bound[Section_co]):
 
 
 AnySection = TypeVar("AnySection", bound=InputSection)
+AnyValue = TypeVar("AnyValue", LoadState, ProfileSwitch, LoadState | ProfileSwitch, FeedbackSection)
 AnyPosition = TypeVar("AnyPosition", bound=Position)
 # What of a section is about its message: the same for every part that reads it.
 OF_MESSAGE = tuple(InputSection.model_fields)
@@ -266,30 +256,36 @@ def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[
 
 def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Choosing] | None:
     """Bind the load state, or the operator's choice."""
-    if (result := bind_input(lookup, place, config, value=config.signal)) is None:
+    if (result := _bind_value(lookup, place, config)) is None:
         return None
     used, bound = result
-    signal = used.find((*place, "signal"), config.signal)
-    if signal is None:
-        return None
     if isinstance(config, ProfileSwitch):
-        used.check_integer((*place, "signal"), signal)
-    return BoundValue(**vars(bound), signal=signal)
+        used.check_integer((*place, "signal"), bound.signal)
+    return bound
 
 
 def bind_feedback(
     lookup: Lookup, place: Place, config: FeedbackSection
 ) -> BoundValue[FeedbackSection] | None:
     """Bind the feedback message of a valve."""
+    if (result := _bind_value(lookup, place, config)) is None:
+        return None
+    used, bound = result
+    if config.full is None and not bound.signal.maximum:
+        text = "expected a range in the DBC, or full, got neither"
+        used.add_fault(f"{bound.signal.name}: {text}")
+    return bound
+
+
+def _bind_value(
+    lookup: Lookup, place: Place, config: AnyValue
+) -> tuple[UsedMessage, BoundValue[AnyValue]] | None:
+    """Bind a message with one signal that is read."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
-    if signal is None:
-        return None
-    if config.full is None and not signal.maximum:
-        used.add_fault(f"{signal.name}: expected a range in the DBC, or full, got neither")
-    return BoundValue(**vars(bound), signal=signal)
+    return (used, BoundValue(**vars(bound), signal=signal)) if signal else None
 
 
 def check_source(used: UsedMessage, what: str) -> None:

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 
 from cantools.database.can import Signal
 
-from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.sense import flag_fault
 from canshaper.codec.signals import (
-    VelocitySignal,
     few_steps,
     find_signal,
     full_scale,
@@ -16,18 +14,15 @@ from canshaper.codec.signals import (
     neutral_fault,
     symmetrical_range,
 )
+from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, VelocitySignal
 from canshaper.config.enable import conditions, named_by
-from canshaper.config.inputs import InputSection, SwitchSection
+from canshaper.config.inputs import SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
 from canshaper.config.source import Place
-from canshaper.machine.contraries import SWITCH, SWITCHES, flag_of
 from canshaper.machine.diagnostics import Diagnostics
-from canshaper.machine.inputs import Bound, BoundJoystick, bind_input, check_source
+from canshaper.machine.inputs import OF_MESSAGE, Bound, BoundJoystick, bind_input, check_source
 from canshaper.machine.lookup import Lookup
-from canshaper.machine.used_message import UsedMessage
-
-# What of a section is about its message: the same for every switch in it.
-_OF_MESSAGE = tuple(InputSection.model_fields)
+from canshaper.machine.used_message import SWITCH, SWITCHES, UsedMessage, flag_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +84,7 @@ def _bind(lookup: Lookup, switches: dict[str, SwitchSection]) -> BoundSwitches |
     for other in others:
         text = f"switches.{first}, which reads the message too"
         place = ("switches", other)
-        lookup.diagnostics.check_same(place, switches[other], _OF_MESSAGE, config, text)
+        lookup.diagnostics.check_same(place, switches[other], OF_MESSAGE, config, text)
     result = bind_input(lookup, ("switches", first), config, ("signal",))
     if result is None:
         return None

@@ -16,8 +16,7 @@ from canshaper.codec.identifier import (
     with_source,
 )
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, is_fd, is_j1939
-from canshaper.codec.protection import Protection
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import Protection, SentMessage
 from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import sections

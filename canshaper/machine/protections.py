@@ -1,27 +1,22 @@
 """Protection of messages, received and sent, bound to the DBC."""
 
-from collections.abc import Callable, Mapping
-from typing import Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
 
 from cantools.database.can import Signal
 
 from canshaper.checksums.kinds import CHECKSUMS, CRC_WIDTHS, Checksum, crc_kind
-from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
-from canshaper.codec.protection import UNPROTECTED, Protection
+from canshaper.codec.message import UNPROTECTED, Protection
 from canshaper.config.protection import Checksum as ChecksumConfig
 from canshaper.config.protection import Protected
 from canshaper.config.source import Place
 from canshaper.machine.used_message import UsedMessage
 
+if TYPE_CHECKING:
+    from canshaper.codec.e2e import E2e
+
 # What a checksum of so many bits has to fill.
 PARTS = {4: "half of a byte", 8: "byte", 16: "pair of bytes"}
-# Profiles that need no more than the data ID.
-BY_DATA_ID: Mapping[str, Callable[[int], E2e]] = {
-    "p04": Profile4,
-    "p05": Profile5,
-    "p06": Profile6,
-    "p07": Profile7,
-}
 
 
 def bind_protection(used: UsedMessage, config: Protected) -> Protection:
@@ -91,15 +86,23 @@ def _bind_e2e(used: UsedMessage, config: Protected) -> Protection:
     return Protection(None, profile.counts, profile)
 
 
-def _profile(config: Protected) -> E2e:
+def _profile(config: Protected) -> "E2e":
+    from canshaper.codec import e2e as profiles
+
     e2e = config.e2e
     assert e2e is not None
     if e2e.data_ids is not None:
-        return Profile2(e2e.data_ids)
+        return profiles.Profile2(e2e.data_ids)
     assert e2e.data_id is not None  # checked with the file
     if e2e.data_id_mode is not None:
-        return Profile1(e2e.data_id, e2e.data_id_mode)
-    return BY_DATA_ID[e2e.profile](e2e.data_id)
+        return profiles.Profile1(e2e.data_id, e2e.data_id_mode)
+    by_data_id: dict[str, Callable[[int], E2e]] = {
+        "p04": profiles.Profile4,
+        "p05": profiles.Profile5,
+        "p06": profiles.Profile6,
+        "p07": profiles.Profile7,
+    }
+    return by_data_id[e2e.profile](e2e.data_id)
 
 
 def _bits(signal: Signal) -> list[int]:

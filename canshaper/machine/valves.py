@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.protection import Protection
-from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.message import Protection, SentMessage
 from canshaper.codec.sense import direction_fault
-from canshaper.codec.sent import SentMessage
 from canshaper.codec.signals import (
     command_fault,
     find_signal,
@@ -20,7 +18,7 @@ from canshaper.codec.signals import (
     symmetrical_range,
 )
 from canshaper.codec.status import ReportedAxis, StatusCodec
-from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec
+from canshaper.codec.velocity import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
 from canshaper.config.limits import Ends
 from canshaper.config.schema import (
@@ -214,6 +212,8 @@ def _rewritten_message(
     at = valve.bus, used.message, used.can_id & 0xFF, protection
     if enable is None or find_signal(used.message, enable) is None:  # noted with the joystick
         return SentMessage(*at)
+    from canshaper.codec.rewrite import RewrittenMessage
+
     return RewrittenMessage(*at, enable=enable, ours=frozenset(ours))
 
 
@@ -269,7 +269,7 @@ def _alike(one: Signal, other: Signal) -> bool:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BoundAxis:
     """An axis with its valve message and, where it has one, its status message.
 
@@ -280,7 +280,6 @@ class BoundAxis:
 
     name: str
     config: AxisSection
-    valve_message: Message
     valve: ValveCodec
     period_ticks: int
     timeout_ms: int
@@ -292,6 +291,11 @@ class BoundAxis:
     sway_sensor: "BoundSwaySensor | None" = None
 
     @property
+    def valve_message(self) -> Message:
+        """The message of its valve."""
+        return self.valve.message.fields.message
+
+    @property
     def rewrites(self) -> bool:
         """Whether its command leaves in the frames of its own joystick, through a gateway."""
-        return isinstance(self.valve.message, RewrittenMessage)
+        return self.valve.message.rewrites

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.sent import Sender
-from canshaper.inputs.feedback import Feedback
+from canshaper.codec.message import Sender
 from canshaper.inputs.input import Key, MessageInput, Part
+from canshaper.inputs.value import Feedback
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.states import Reason

@@ -21,9 +21,8 @@ from canshaper.bus.packet import (
     stamp_ns,
 )
 from canshaper.bus.port import not_opened
-from canshaper.bus.python_can import open_python_can
+from canshaper.bus.python_can import MOST_FAILURES, open_python_can, waiting
 from canshaper.bus.socketcan import dropped_frames, open_sockets
-from canshaper.bus.waiting import MOST_FAILURES, waiting
 from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError

@@ -11,7 +11,8 @@ from canshaper.controller.guarded import Guarded
 from canshaper.controller.runner import AxisControl
 from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.recording.channels import Key, Kind
-from canshaper.shaping.states import Reason
+from canshaper.shaping.states import Reason, State
+from canshaper.shaping.sway import SwayMode
 
 Timed = tuple[int, Frame]
 Sorted = tuple[int, Frame, Kind]
@@ -31,20 +32,30 @@ class Tick:
         now_ns: when it was.
         received: frames that came since the tick before, with their arrival, in order.
         others: those among them that are read after the valves have their frames.
+        logged: frames of the log such as the daemon sends: of a daemon, or of who drove instead.
     """
 
     number: int
     now_ns: int
     received: list[Timed] = field(default_factory=list)
     others: list[Frame] = field(default_factory=list)
+    logged: list[Timed] = field(default_factory=list)
 
 
 class Row(NamedTuple):
-    """One axis after a tick: command and applied velocity, [-1, 1]; predicted sway, degrees."""
+    """One axis after a tick: command and applied velocity, [-1, 1]; predicted sway, degrees.
+
+    Then what a motion of two axes adds to the velocity, which makes no swing; state, number of the
+    parameter set, and its sway mode.
+    """
 
     command: float
     applied: float
     sway_deg: float
+    added: float
+    state: State
+    active_set: int
+    mode: SwayMode | None
 
 
 new_row = tuple.__new__  # Row(...) in half the time
@@ -103,7 +114,10 @@ def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
         sway = axis.sway
         sway_deg = DEGREES * sway.sway_rad(full_speed_m_s) if sway is not None else 0.0
         command = 0.0 if type(command) is Reason else command
-        return new_row(Row, (command, axis.sent, sway_deg))
+        sent, mode = axis.sent, sway.mode if sway is not None else None
+        added = sent - axis.applied
+        values = command, sent, sway_deg, added, axis.state, runner.active_set, mode
+        return new_row(Row, values)
 
     return row
 
@@ -111,7 +125,7 @@ def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
 def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
     """Ticks of a clock, from half a tick after the first frame that is received to the last frame.
 
-    What a daemon has sent is left out: it is another daemon's. Of a pause that is longer than
+    What a daemon has sent is another daemon's, and kept apart. Of a pause that is longer than
     ``PAUSE_NS`` the ticks after that are left out, but for the last ones before the next frame.
     """
     tick: Tick | None = None
@@ -131,6 +145,8 @@ def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
             tick.received.append((time_ns, frame))
         elif kind is Kind.OTHER:
             tick.others.append(frame)
+        else:
+            tick.logged.append((time_ns, frame))
     if tick is not None:
         yield tick
 

@@ -62,7 +62,7 @@ class Trace:
                 model.step(row.command)
                 straight = math.degrees(model.sway_rad(full_speed))
             if kept:
-                for column, value in zip(self._rows[name], (*row, straight), strict=True):
+                for column, value in zip(self._rows[name], (*row[:3], straight), strict=True):
                     column.append(value)
 
     @property

@@ -24,12 +24,13 @@ body { font: 10pt/1.35 "DejaVu Sans", Arial, sans-serif; color: #222; background
 h1 { font-size: 16pt; margin: 0 0 4mm } h2 { font-size: 11pt; margin: 5mm 0 1mm }
 pre { font: 8pt/1.3 "DejaVu Sans Mono", monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 p { margin: 1.5mm 0; white-space: pre-wrap }
+.verdict { font-size: 12pt; font-weight: bold; border: .5mm solid #222; padding: 2mm 3mm }
 table { border-collapse: collapse; margin: 3mm 0; font-size: 9pt; break-inside: avoid }
 .facts th { white-space: nowrap; overflow-wrap: normal }
 caption { text-align: left; font-weight: bold; padding-bottom: 1mm }
 th, td { padding: .6mm 2.5mm .6mm 0; border-bottom: .2mm solid #bbb; text-align: left;
   vertical-align: top; white-space: pre-wrap }
-.figures { overflow-wrap: break-word }
+.figures { overflow-wrap: break-word } .figures td:empty { min-width: 28mm; height: 7mm }
 .right { text-align: right; font-variant-numeric: tabular-nums }
 figure { margin: 4mm 0; break-inside: avoid } img { width: 100% }
 .sign { margin-top: 12mm; break-inside: avoid } .sign td { width: 50mm; height: 14mm;
@@ -39,13 +40,16 @@ figure { margin: 4mm 0; break-inside: avoid } img { width: 100% }
 _SIGNATURES = ("name", "date", "signature")
 
 
-def document(title: str, facts: Iterable[tuple[str, str]], parts: Iterable[str]) -> str:
+def document(
+    title: str, facts: Iterable[tuple[str, str]], parts: Iterable[str], first: Iterable[str] = ()
+) -> str:
     """The whole file; nothing in it loads or runs anything.
 
     Args:
         title: of the report.
         facts: (name, value) of what it is of, in order.
         parts: of ``text``, ``table`` and ``picture``, in order.
+        first: such parts in front of the facts.
     """
     rows = "".join(f"<tr><th>{_safe(k)}</th><td>{_safe(v)}</td></tr>" for k, v in facts)
     lines = "".join("<td></td>" for _ in _SIGNATURES)
@@ -56,7 +60,9 @@ def document(title: str, facts: Iterable[tuple[str, str]], parts: Iterable[str])
         '<meta http-equiv="Content-Security-Policy"'
         " content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
         f"<title>{_safe(title)}</title><style>{_STYLE}</style></head><body>\n"
-        f'<h1>{_safe(title)}</h1>\n<table class="facts">{rows}</table>\n'
+        f"<h1>{_safe(title)}</h1>\n"
+        + "\n".join(first)
+        + f'\n<table class="facts">{rows}</table>\n'
         + "\n".join(parts)
         + f'\n<table class="sign"><tr>{lines}</tr><tr>{words}</tr></table>\n</body></html>\n'
     )
@@ -73,6 +79,11 @@ def facts(deployment: "Deployment | None", date: datetime) -> list[tuple[str, st
         rows.append(("deployment", str(deployment.path)))
         rows += [("", line) for line in deployment.identity.lines()]
     return rows
+
+
+def verdict(line: str) -> str:
+    """The result in one sentence."""
+    return f'<p class="verdict">{_safe(line)}</p>'
 
 
 def heading(line: str) -> str:

@@ -59,6 +59,9 @@ class ShapedAxis:
         scale: factor of the operator's demand in front of the filter, 0 to 1.
         bounds: smallest and largest demand in front of the filter and of that factor, and of what
             is added to damp a swing.
+        unattended: whether the joystick rested longer than the tail, where a motion may move the
+            axis.
+        added_time: how long a motion may still move the axis.
         error: how the filter has failed, see ``Transition``; empty unless it has while the axis
             entered TRIPPED or was in it.
     """
@@ -86,9 +89,10 @@ class ShapedAxis:
         self._transfer = BumplessTransfer(shaper, tick_s)
         self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
         self.output = self._stage.output
-        self._added_time = AddedTime(0)
+        self.added_time = AddedTime(0)
         self._asked = False  # the motion asked this axis for something in the last tick
-        self._unattended = 0  # ticks since its joystick was deflected, in whatever state
+        self._rested = 0  # ticks since its joystick was deflected, in whatever state
+        self.unattended = False
 
     @property
     def raw(self) -> int:
@@ -114,11 +118,6 @@ class ShapedAxis:
     def reason(self) -> Reason:
         """Why the axis is in that state."""
         return self._states.reason
-
-    @property
-    def commanded(self) -> bool:
-        """Whether the operator demanded motion within the tail."""
-        return self._stage.commanded
 
     @property
     def neutral(self) -> bool:
@@ -153,15 +152,16 @@ class ShapedAxis:
         asked = damps_now = may_add = False
         if stage.largest_added:
             deflected = abs(joystick.command) > self._neutral_band
-            self._unattended = 0 if deflected else self._unattended + 1
-            commanded, moved = stage.commanded, self.output.steps != 0
+            self._rested = 0 if deflected else self._rested + 1
+            self.unattended = self._rested > stage.tail + UNATTENDED_TICKS
+            commanded, moved = self.output.commanded, self.output.steps != 0
             if not joystick.bypass:
                 damps_now = damps and sensor_damps and not commanded
                 asked = added != 0.0 or damps_now
-            may_add = self._added_time.allows(asked, commanded, moved)
+            may_add = self.added_time.allows(asked, commanded, moved)
         self._asked = asked
 
-        at_rest = self.output.steps == 0 and not stage.commanded
+        at_rest = self.output.steps == 0 and not self.output.commanded
         state = states.step(joystick, at_rest, may_add)
         if state is not old:
             self._entered(state, old)
@@ -191,7 +191,7 @@ class ShapedAxis:
                 stage.drive(held, demand, reference, path, damping, sensor_damps=sensor_damps)
             else:
                 stage.rest()
-                self._transfer.rest()
+                self._transfer.offset = 0.0
         except Exception as error:  # a filter of another package may raise anything
             return self.invalidate(old, error)
         return None if state is old else Transition(old, state, states.reason)
@@ -199,11 +199,10 @@ class ShapedAxis:
     def advance(self) -> None:
         """Let the sway model swing with the output of ``act``."""
         output = self.output
-        applied = output.setpoint - output.path
         if self.sway is not None:
-            self.sway.step(applied)
+            self.sway.step(output.applied)
         if self.sensed is not None:
-            self.sensed.step(applied, self.command, output.path)
+            self.sensed.step(output.applied, self.command, output.path)
 
     def hold(self, ticks: int) -> Transition | None:
         """Count missed ticks, in which the valve kept the last output.
@@ -217,8 +216,9 @@ class ShapedAxis:
         demand = self._clamped_demand()
         self._states.hold(ticks)
         self._stage.hold(demand, ticks)
-        self._unattended += ticks
-        self._added_time.allows(self._asked, self.commanded, self.output.steps != 0, ticks)
+        self._rested += ticks
+        self.unattended = self._rested > self._stage.tail + UNATTENDED_TICKS
+        self.added_time.allows(self._asked, self.output.commanded, self.output.steps != 0, ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
                 self._transfer.hold(demand)
@@ -255,16 +255,7 @@ class ShapedAxis:
             time_s: longest time in motion.
         """
         self._stage.largest_added = largest
-        self._added_time = AddedTime(round(time_s / self._tick_s))
-
-    @property
-    def unattended(self) -> bool:
-        """Whether the joystick rested longer than the tail, where a motion may move the axis."""
-        return self._unattended > self._stage.tail + UNATTENDED_TICKS
-
-    def renew_added_time(self) -> None:
-        """Restore the full time for which a motion may move the axis."""
-        self._added_time.renew()
+        self.added_time = AddedTime(round(time_s / self._tick_s))
 
     def drop_added(self) -> None:
         """End what was added at once: the motion has lost the right to move this axis."""
@@ -290,7 +281,7 @@ class ShapedAxis:
             self._stage.interrupt_stroke()
         elif old is BYPASS_ON:
             self._stage.hold_run_on()
-        if old in MOVING and state not in MOVING and self._stage.commanded:
+        if old in MOVING and state not in MOVING and self.output.commanded:
             self._stage.hold_run_on()
         if old is TRIPPED:
             self.error = ""
@@ -309,8 +300,8 @@ class ShapedAxis:
         """
         if self._states.state is not TRIPPED:
             self._states.trip(Reason.OUTPUT_INVALID)
-        self._transfer.rest()
-        if self._stage.commanded:
+        self._transfer.offset = 0.0
+        if self.output.commanded:
             self._stage.hold_run_on()
         self._stage.rest()
         self.command = 0.0

@@ -93,8 +93,10 @@ class TwoAxisMotion:
             radius_m = circle_m
         turn = slew.path(slew.period_s)
         if near_far is None or radius_m is None:
-            if not slew.ahead_s:
-                slew.add(_psi(turn, slew.stiffness) - turn[0], weight)
+            if not slew.ahead_s:  # the grapple stays on its circle, of whatever radius
+                lead, _, speed, _ = turn
+                bottom = max(1.0 - speed * speed / slew.stiffness, _LEAST)
+                slew.add(math.atan2(lead, bottom) - lead, weight)
             if near_far is not None:
                 near_far.add(near_far.reached, 0.0)
             return
@@ -190,16 +192,17 @@ class TwoAxisMotion:
         return math.atan2(pull_t, bottom), tip_m - radius_m - out
 
 
-def _psi(turn: GrapplePath, stiffness: float) -> float:
-    """Angle of the boom ahead of a grapple that stays on its circle, of whatever radius."""
-    lead, _, speed, _ = turn
-    return math.atan2(lead, max(1.0 - speed * speed / stiffness, _LEAST))
-
-
 def range_with_added(
-    held: float, recent_low: float, recent_high: float, own: float, largest: float
+    held: float,
+    recent_low: float,
+    recent_high: float,
+    own: float,
+    largest: float,
+    *,
+    maximum: float = 1.0,
+    no_run_on: bool = False,
 ) -> tuple[float, float]:
-    """Range of an axis' own velocity and the added one together.
+    """Range of an axis' own velocity and the added one together, up to ``maximum``.
 
     - Against a joystick that is held: no further than the own velocity already runs on.
     - In a direction that was commanded within the tail: no faster than commanded there.
@@ -211,11 +214,16 @@ def range_with_added(
         recent_high: largest demand within the tail, 0 or positive.
         own: the axis' own velocity, before the ramp.
         largest: largest velocity that may be added where no one commanded.
+        maximum: largest |velocity| of the axis, which ``own`` does not exceed.
+        no_run_on: neither is faster than the joystick nor, in neutral, than ``largest``.
 
     Returns:
         (low, high) with low <= 0 <= high and low <= own <= high.
     """
     low, high = recent_low, recent_high
+    if no_run_on:
+        low = held if held < 0.0 else max(low, -largest)
+        high = held if held > 0.0 else min(high, largest)
     if held > 0.0:
         low = 0.0
     elif held < 0.0:
@@ -225,7 +233,7 @@ def range_with_added(
             low = -largest
         if high == 0.0:
             high = largest
-    return (own if own < low else low), (own if own > high else high)
+    return max(min(own, low), -maximum), min(max(own, high), maximum)
 
 
 class AddedTime:
@@ -255,7 +263,7 @@ class AddedTime:
             ticks: how many ticks have passed.
         """
         if commanded:
-            self.renew()
+            self._left = self._ticks
         elif moved:
             self._left -= ticks
         return asked and self._left > 0

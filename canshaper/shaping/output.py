@@ -40,6 +40,8 @@ from canshaper.shaping.small_strokes import SmallStrokes
 
 # Largest quantisation error of an added velocity that is carried, full speed times ticks.
 MOST_CARRY = 0.1
+# A velocity that is none: more than the rounding of floats.
+NOTHING = 1e-6
 
 
 @dataclass(slots=True)
@@ -55,17 +57,16 @@ class Output:
             no swing, so the sway model is not driven by it.
         damping: velocity that is added to damp the swing which the other axis has caused. It is
             meant to move the grapple, so the sway model is driven by it.
+        applied: the part of the setpoint that drives the sway model: all but ``path``.
+        commanded: whether the operator demanded motion within the tail, so that it may run on.
     """
 
     steps: int = 0
     setpoint: float = 0.0
     path: float = 0.0
     damping: float = 0.0
-
-    @property
-    def applied(self) -> float:
-        """The part of the setpoint that drives the sway model."""
-        return self.setpoint - self.path
+    applied: float = 0.0
+    commanded: bool = False
 
 
 class OutputStage:
@@ -131,11 +132,6 @@ class OutputStage:
         self._carry = 0.0  # what rounding has left out of an added velocity, summed up
         self._dropped_at = 0.0  # ``ramp`` when the right to add was lost, until the next tick
 
-    @property
-    def commanded(self) -> bool:
-        """Whether the operator demanded motion within the tail."""
-        return self._recent.low != 0.0 or self._recent.high != 0.0
-
     def drive(
         self,
         held: float,
@@ -168,15 +164,15 @@ class OutputStage:
         if no_run_on:
             self._no_run_on -= 1
             recent.clear()
-        self._end_run_on(held)
+        no_run_on = self._end_run_on(held) or no_run_on
         recent.add(demand)
+        output.commanded = recent.low != 0.0 or recent.high != 0.0
         low, high = allowed_range(recent.low, recent.high, limits)
         own = within(reference, low, high, limits.minimum)
 
         # 2. Small strokes
         if self._spreads:
-            applied = output.setpoint - output.path
-            movement = self._small.output(demand, applied, own, low, high)
+            movement = self._small.output(demand, output.applied, own, low, high)
             if not sensor_damps:
                 own = movement
 
@@ -190,7 +186,15 @@ class OutputStage:
             if not abs(path) <= 1.0:
                 raise ValueError(f"added velocity is {path}")
             largest = self.largest_added if added else 0.0
-            low, high = self._range_with_added(held, own, largest, no_run_on)
+            low, high = range_with_added(
+                held,
+                self._demanded.low,
+                self._demanded.high,
+                own,
+                largest,
+                maximum=limits.maximum,
+                no_run_on=no_run_on,
+            )
             target = own
             if added:
                 total = within(own + added, low, high, 0.0)
@@ -211,45 +215,39 @@ class OutputStage:
         output.steps, output.setpoint = on_grid(
             ramp, low, high, limits.deadband, self._grid_steps, curve=limits.curve
         )
+        output.applied = output.setpoint - path
         if added:
             carry = self._carry + total - output.setpoint
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
+        beyond = self._beyond(held)
+        self._ran = self._ran + beyond * self._tick_s if beyond or not held else 0.0
 
-    def _end_run_on(self, held: float) -> None:
+    def _end_run_on(self, held: float) -> bool:
         """End what runs on beyond the joystick, by the fall, where it reaches a limit.
 
         After a reversal that is a time, and always a way: what will be left of it once the axis has
         fallen from its velocity. A joystick that asks for so much velocity begins the way again.
+        Returns whether the way is at its end.
         """
-        recent, own = self._recent, self._own_ramp
+        recent = self._recent
         if held * self._side < 0.0:
             self._reverse()
         if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
             recent.clear_against(self._side)
         self._crossed += 1
-        asked = held if own > 0.0 else -held
-        beyond = abs(own) - asked if asked > 0.0 else abs(own)
-        if beyond > 0.0:
-            self._ran += beyond * self._tick_s
-            falling = 0.5 * beyond * beyond / self.limits.fall_per_s
-            if self._ran + falling > self.limits.run_on:
-                recent.clear()
-        elif held:
-            self._ran = 0.0
+        beyond, limits = self._beyond(held), self.limits
+        over = self._ran + 0.5 * beyond * beyond / limits.fall_per_s > limits.run_on
+        if over:
+            recent.clear()
+        return over
 
-    def _range_with_added(
-        self, held: float, own: float, largest: float, no_run_on: bool
-    ) -> tuple[float, float]:
-        """Range of the own and the added velocity together, see ``range_with_added``.
-
-        Without run-on they are neither faster than the joystick nor, in neutral, than ``largest``.
-        """
-        low, high, maximum = self._demanded.low, self._demanded.high, self.limits.maximum
-        if no_run_on:
-            low = held if held < 0.0 else max(low, -largest)
-            high = held if held > 0.0 else min(high, largest)
-        low, high = range_with_added(held, low, high, own, largest)
-        return max(low, -maximum), min(high, maximum)
+    def _beyond(self, held: float) -> float:
+        """How much faster than asked: the own part; or all (see gate), less what may be added."""
+        own, sent = self._own_ramp, self.output.setpoint
+        own_asked, asked = held if own > 0.0 else -held, held if sent > 0.0 else -held
+        own_beyond = abs(own) - max(own_asked, 0.0)
+        beyond = max(own_beyond, abs(sent) - max(asked, 0.0) - self.largest_added)
+        return beyond if beyond > NOTHING else 0.0
 
     def _with_carry(self, total: float, low: float, high: float) -> float:
         """Correct a velocity for what rounding has left out in the ticks before.
@@ -288,6 +286,7 @@ class OutputStage:
             self._reverse()
         if not self._reversal and held * self.ramp < 0.0:
             self._recent.clear()
+            self.output.commanded = False
 
     def hold_run_on(self) -> None:
         """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.
@@ -298,12 +297,15 @@ class OutputStage:
 
     def rest(self) -> None:
         """Go to neutral at once, and forget all that may run on."""
-        self._recent.clear()
+        output = self.output
+        if output.commanded:
+            self._recent.clear()
+            output.commanded = False
         if self.largest_added:
             self._demanded.add(0.0)
         self._small.clear()
-        output = self.output
-        output.steps, output.setpoint, output.path, output.damping = 0, 0.0, 0.0, 0.0
+        output.steps = 0
+        output.setpoint = output.path = output.damping = output.applied = 0.0
         self.ramp = self._own_ramp = self._carry = self._dropped_at = 0.0
         self._no_run_on -= 1
 
@@ -313,7 +315,7 @@ class OutputStage:
         self._demanded.age(ticks)
         self._no_run_on -= ticks
         self._crossed += ticks
-        self._ran += abs(self._own_ramp) * ticks * self._tick_s
+        self._ran += self._beyond(0.0) * ticks * self._tick_s
         self._small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:

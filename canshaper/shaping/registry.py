@@ -12,12 +12,13 @@ from importlib.metadata import EntryPoint, entry_points
 from itertools import zip_longest
 from typing import Any
 
-from canshaper.shaping.shapers import fir, gff, limit_aware, off, smoothing
+from canshaper.shaping.shapers import fir, gff, limit_aware, smoothing
 from canshaper.shaping.shapers.kind import Shaper, ShaperKind
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import OFF
 
 GROUP = "canshaper.shapers"
-BUILT_IN = (*off.KINDS, *gff.KINDS, *smoothing.KINDS, *fir.KINDS, *limit_aware.KINDS)
+BUILT_IN = (OFF, *gff.KINDS, *smoothing.KINDS, *fir.KINDS, *limit_aware.KINDS)
 
 
 def with_entry_points(

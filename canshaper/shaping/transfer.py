@@ -1,8 +1,8 @@
-"""Bumpless transfer between filter and bypass, and from one filter to another."""
+"""Reference of an axis with its filter or without one, and bumpless transfer between both."""
 
 import math
 
-from canshaper.shaping.shapers.kind import Shaper, carry_over
+from canshaper.shaping.shapers.kind import Shaper, ShaperKind, carry_over
 from canshaper.shaping.state_machine import BYPASS_ON, STOPPING
 from canshaper.shaping.states import MOVING, State
 
@@ -11,20 +11,42 @@ from canshaper.shaping.states import MOVING, State
 BLEND_S = 0.3
 
 
+class Off:
+    """No shaping: the output limits alone stand between joystick and valve."""
+
+    __slots__ = ()
+
+    def step(self, command: float) -> float:
+        """Return the command itself."""
+        return command
+
+
+OFF = ShaperKind(
+    "off",
+    "No shaping: output limits only.",
+    lambda _tick_s: Off(),
+    lambda _mode, _tick_s: {"off": {}},
+)
+
+
 class BumplessTransfer:
     """Reference of filter or bypass, with bumpless transfer from one to the other.
 
     Args:
         shaper: the filter.
         tick_s: time between two ticks.
+
+    Attributes:
+        offset: the transfer offset, which fades; an axis at rest has nothing to join to, and sets
+            it to 0.
     """
 
-    __slots__ = ("_bypassed", "_fade", "_joins", "_offset", "_shaper")
+    __slots__ = ("_bypassed", "_fade", "_joins", "_shaper", "offset")
 
     def __init__(self, shaper: Shaper, tick_s: float) -> None:
         self._shaper = shaper
         self._fade = math.exp(-tick_s / BLEND_S)
-        self._offset = 0.0  # the transfer offset, which fades
+        self.offset = 0.0
         self._joins = False  # it is to be taken at the next command
         self._bypassed = False
 
@@ -52,12 +74,12 @@ class BumplessTransfer:
             output = command
         if self._joins:
             self._joins = False
-            self._offset = applied - output - added
-        elif self._offset:
-            self._offset *= self._fade
-            if abs(self._offset) < 1e-6:  # far below any frame's resolution
-                self._offset = 0.0
-        return output + self._offset
+            self.offset = applied - output - added
+        elif self.offset:
+            self.offset *= self._fade
+            if abs(self.offset) < 1e-6:  # far below any frame's resolution
+                self.offset = 0.0
+        return output + self.offset
 
     def hold(self, command: float) -> None:
         """Count a missed tick with this command."""
@@ -68,7 +90,3 @@ class BumplessTransfer:
         carry_over(self._shaper, shaper, command)
         self._shaper = shaper
         self._joins = True
-
-    def rest(self) -> None:
-        """Forget the transfer offset: an axis at rest has nothing to join to."""
-        self._offset = 0.0

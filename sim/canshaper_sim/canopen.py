@@ -5,7 +5,7 @@ from typing import Any
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import HEARTBEAT, NMT, START, NodeState, ValveState
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
 

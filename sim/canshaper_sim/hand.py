@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import full_scale
 from canshaper.config.schema import EmergencyStop
 from canshaper.machine.deployment import Deployment

@@ -4,13 +4,12 @@ import math
 from collections.abc import Iterator, Mapping
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.protection import UNPROTECTED, SequenceChecker
-from canshaper.codec.sent import Sender, SentMessage
+from canshaper.codec.message import UNPROTECTED, Sender, SentMessage, SequenceChecker
 from canshaper.codec.signals import find_signal
 from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import USUAL_MAX_STEP, BoundValue, Choosing
+from canshaper.machine.inputs import BoundValue, Choosing
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
@@ -51,10 +50,7 @@ class _ValveInput:
         self.axis = axis
         self._length = bound.valve_message.length
         self._reader = CommandReader(deployment, axis)
-        protection = bound.valve.message.protection
-        self._sequence = SequenceChecker(
-            protection, min(USUAL_MAX_STEP, protection.counts // 2), qualify=1
-        )
+        self._sequence = SequenceChecker(bound.valve.message.protection, None, qualify=1)
         self.timeout_s = bound.config.valve.timeout_ms / 1000.0
         self.command = 0.0
         self.age_s = 0.0

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, with_source
-from canshaper.codec.signals import FieldSet
+from canshaper.codec.message import FieldSet
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis

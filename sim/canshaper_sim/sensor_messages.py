@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import BoundSwaySensor
 from canshaper_sim.axes import SLEW

@@ -409,7 +409,7 @@ def test_a_byte_that_is_another_is_reported(box: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "lacking"),
-    [(b"canshaper.codec.sent", b"canshaper.codec.gone"), (b"_releases", b"_gone")],
+    [(b"canshaper.codec.message", b"canshaper.codec.gone"), (b"_releases", b"_gone")],
 )
 def test_one_of_another_program_that_lacks_something_says_of_which(
     box: Path, tmp_path: Path, name: bytes, lacking: bytes

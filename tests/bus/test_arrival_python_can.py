@@ -4,9 +4,8 @@ import can
 import pytest
 
 from canshaper.bus.port import Port, open_port
-from canshaper.bus.python_can import PythonCanPort
+from canshaper.bus.python_can import MOST_FAILURES, PythonCanPort
 from canshaper.bus.raw import MOST_FRAMES
-from canshaper.bus.waiting import MOST_FAILURES
 from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
 from tests.bus.clocks import Clocks, arrivals_of

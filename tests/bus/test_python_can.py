@@ -9,8 +9,7 @@ from can.interfaces.socketcand import socketcand
 
 from canshaper.bus import python_can as bus_module
 from canshaper.bus.port import Port, open_port
-from canshaper.bus.python_can import MOST_ECHOES
-from canshaper.bus.waiting import MOST_FAILURES
+from canshaper.bus.python_can import MOST_ECHOES, MOST_FAILURES
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 

@@ -3,7 +3,7 @@
 import can
 import pytest
 
-from canshaper.bus.waiting import MOST_FAILURES, receive, waiting
+from canshaper.bus.python_can import MOST_FAILURES, receive, waiting
 
 FRAME = can.Message(arbitration_id=0x110, data=b"\1")
 

@@ -215,7 +215,9 @@ def test_near_far_is_moved_no_farther_than_check_says(
             if time_ms > 5500:  # its own stroke is over
                 way_m += near_far.sent * 0.02  # at 1 m/s full speed
                 farthest_m = max(farthest_m, abs(way_m))
-                moves.append(near_far.raw or simulation.controller.axes["slew"].axis.commanded)
+                moves.append(
+                    near_far.raw or simulation.controller.axes["slew"].axis.output.commanded
+                )
             if not any(moves[-1:]):
                 way_m = 0.0
     print(f"{farthest_m:.4f} m of {bound_m:g} m")

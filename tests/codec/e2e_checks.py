@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from canshaper.codec.e2e import E2e
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.protection import Protection, SequenceChecker
+from canshaper.codec.message import Protection, SequenceChecker
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP

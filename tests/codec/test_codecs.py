@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
-from canshaper.codec.protection import UNPROTECTED, Protection
-from canshaper.codec.sent import SentMessage
-from canshaper.codec.signals import VelocitySignal, named_fault
-from canshaper.codec.valve import ValveCodec
+from canshaper.codec.message import UNPROTECTED, Protection, SentMessage
+from canshaper.codec.signals import named_fault
+from canshaper.codec.velocity import ValveCodec, VelocitySignal
 from canshaper.shaping.states import Reason
 from tests.rigs.sent import command_frame
 

@@ -7,9 +7,8 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.codec.flags import FlaggedVelocity
 from canshaper.codec.layout import Layout
-from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.velocity import FlaggedVelocity, VelocitySignal
 from canshaper.shaping.states import Reason
 
 # X axis of a basic joystick message of J1939-71, a wide and a float one.

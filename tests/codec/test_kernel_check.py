@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from canshaper.checksums.algorithms import Xor
 from canshaper.checksums.kinds import CHECKSUMS, Checksum, ChecksumKind
 from canshaper.codec.e2e import COUNTER, E2e, Profile1, Profile2, Profile4, Profile5, Profile6
-from canshaper.codec.protection import Protection
+from canshaper.codec.message import Protection
 from canshaper.codec.rewrite import kernel_check, neutral_fault
 from canshaper.protocols.gateway.cangw import CS_CRC8, CS_XOR, changed_bytes
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.codec.layout import Layout, frame_length, is_fd, layout_fault
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import raw_limits
 from tests.rigs.files import Machine
 

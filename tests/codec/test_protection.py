@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from canshaper.checksums.kinds import CHECKSUMS, Checksum
 from canshaper.codec.e2e import Profile1, Profile2
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.protection import Protection, SequenceChecker
+from canshaper.codec.message import Protection, SequenceChecker
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP

@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.protection import UNPROTECTED, Protection
+from canshaper.codec.message import UNPROTECTED, Protection
 from canshaper.codec.rewrite import RewritingSender, RewrittenMessage
 
 # Two velocities that are ours, one of Motorola; one of each kind that is not.

@@ -10,10 +10,8 @@ from cantools.database.conversion import BaseConversion
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.flags import RockerVelocity
-from canshaper.codec.sent import SentMessage
-from canshaper.codec.signals import VelocitySignal
-from canshaper.codec.valve import FlagsCodec, ValveCodec
+from canshaper.codec.message import SentMessage
+from canshaper.codec.velocity import FlagsCodec, RockerVelocity, ValveCodec, VelocitySignal
 from canshaper.shaping.states import Reason
 from tests.rigs.files import Machine
 from tests.rigs.sent import command_raw

@@ -5,10 +5,9 @@ import pytest
 from cantools.database.can import Message, Signal
 from cantools.database.conversion import BaseConversion
 
+from canshaper.codec.message import FieldSet
 from canshaper.codec.signals import (
     LEAST_STEPS,
-    FieldSet,
-    VelocitySignal,
     command_fault,
     full_scale,
     magnitude_range,
@@ -17,6 +16,7 @@ from canshaper.codec.signals import (
     special_name,
     symmetrical_range,
 )
+from canshaper.codec.velocity import VelocitySignal
 from canshaper.shaping.states import Reason
 
 Number = float | None

@@ -8,7 +8,7 @@ import cantools
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.codec.status import (
     AXIS_STATUS,
     IDENTITY,

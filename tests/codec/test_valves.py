@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.protection import Protection
-from canshaper.codec.sent import SentMessage
-from canshaper.codec.valve import DirectionCodec, ValveCodec
+from canshaper.codec.message import Protection, SentMessage
+from canshaper.codec.velocity import DirectionCodec, ValveCodec
 from tests.codec.valve_machine import CODES, DBC, network, with_valves
 from tests.rigs.files import Machine
 from tests.rigs.sent import command_frame, command_raw

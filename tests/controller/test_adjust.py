@@ -85,7 +85,7 @@ def test_with_the_joystick_released_nothing_is_changed_before_the_axis_rests(mak
     rig.moving().run(50, Slew=1000)
     rig.run(20, Slew=0)
     axis = rig.controller.axes["slew"].axis
-    while axis.commanded:
+    while axis.output.commanded:
         with pytest.raises(ValueError, match=r"^axes\.slew: it runs on with its joystick released"):
             adjuster.change({"axes.slew.sway.period_s": 3.0})
         assert adjuster.table()["axes.slew.sway.period_s"]["now"] != 3.0

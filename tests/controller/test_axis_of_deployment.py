@@ -104,10 +104,9 @@ def test_an_axis_without_sway_reports_none(changed_rig: Make) -> None:
 def test_an_axis_takes_its_joystick_from_where_it_is_connected(rig: Rig) -> None:
     class Elsewhere:
         deflection = 0.0
-        releases = 0
 
-        def command(self, *_arguments: object) -> CommandInput:
-            return CommandInput(self.deflection)
+        def command(self, *_arguments: object) -> tuple[CommandInput, int]:
+            return CommandInput(self.deflection), 0
 
     source = Elsewhere()
     rig.controller.axes["slew"].isolate(source)

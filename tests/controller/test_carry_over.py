@@ -4,8 +4,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.runner import AxisControl
-from canshaper.inputs.feedback import Following
 from canshaper.inputs.input import Key
+from canshaper.inputs.value import Following
 from canshaper.shaping.states import State
 from tests.controller.reloaded import Make, reload
 from tests.rigs.canopen import OPERATIONAL, PRE_OPERATIONAL, CanopenRig
@@ -58,7 +58,7 @@ def test_a_part_is_known_by_what_it_is_on_the_machine(rig: Rig) -> None:
         part = parts["input", *here, can_id, extended]
         assert part is controller.inputs["crane", can_id, extended]
     for key, sender in controller._senders.items():
-        assert parts["sender", *here, *key[1:]] is sender.protector
+        assert parts["sender", *here, *key[1:]] is sender
 
 
 def test_of_another_node_nothing_is_known(canopen: CanopenRig) -> None:

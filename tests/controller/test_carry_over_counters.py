@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.e2e import COUNTER, E2e
 from canshaper.codec.frame import Frame
-from canshaper.codec.sent import SentMessage
+from canshaper.codec.message import SentMessage
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.j1939.network import J1939Network

@@ -61,8 +61,7 @@ class Joystick:
     def command(self, later_ms: int = 0, trip: Reason | None = None) -> CommandInput:
         """What an axis gets now, and knows from now on."""
         now_ns = self._inputs.now_ns + later_ms * MS
-        command = self.input.command("Slew", now_ns, self.releases, trip, 0.02)
-        self.releases = self.input.releases
+        command, self.releases = self.input.command("Slew", now_ns, self.releases, trip, 0.02)
         return command
 
 

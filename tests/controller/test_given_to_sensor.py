@@ -12,8 +12,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
+from canshaper.shaping.transfer import Off
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.plant import PlantNode

@@ -7,8 +7,8 @@ import pytest
 from canshaper.controller.events import StateEvent
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State
+from canshaper.shaping.transfer import Off
 from tests.controller.motion_rig import FIXED, Make, moving_as_one, near_far
 
 TICK_S = 0.02

@@ -44,7 +44,7 @@ class Watched(ShapedAxis):
 
     def move(self, command: float, applied: float) -> None:
         """In motion, with this command and output."""
-        self.at_rest, self.command, self.output.setpoint = False, command, applied
+        self.at_rest, self.command, self.output.applied = False, command, applied
 
 
 class Choice:

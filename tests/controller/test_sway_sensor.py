@@ -14,10 +14,10 @@ from canshaper.controller.status import SensorReport
 from canshaper.design.lockstep import LockStep, drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Trust
 from canshaper.shaping.sway import SwayMode
 from canshaper.shaping.swing_length import SwingLength
+from canshaper.shaping.transfer import Off
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.joysticks import JoystickNode

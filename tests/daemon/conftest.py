@@ -19,9 +19,15 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 
 @pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
+def log(caplog: pytest.LogCaptureFixture) -> Callable[..., list[str]]:
+    """The lines of the log so far that have a text."""
     caplog.set_level(logging.INFO, "canshaper")
-    return lambda: [f"{r.levelname} {r.getMessage()}" for r in caplog.records]
+
+    def lines(what: str = "") -> list[str]:
+        said = [(r.levelname, r.getMessage()) for r in caplog.records]
+        return [f"{level} {text}" for level, text in said if what in text]
+
+    return lines
 
 
 @pytest.fixture

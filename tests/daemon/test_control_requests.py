@@ -1,6 +1,5 @@
 """What the control socket of a daemon is asked, and what of that its log has."""
 
-import logging
 import os
 import stat
 from collections.abc import Callable, Mapping
@@ -14,14 +13,6 @@ from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench
 from tests.daemon.control_client import answered, control
-
-
-@pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> Callable[[str], list[str]]:
-    caplog.set_level(logging.INFO, "canshaper")
-    return lambda what: [
-        f"{r.levelname} {r.getMessage()}" for r in caplog.records if what in r.getMessage()
-    ]
 
 
 @pytest.fixture
@@ -139,7 +130,5 @@ def test_black_boxes_are_written_where_the_daemon_was_started_with(
 
 
 def test_a_request_that_is_none_is_answered_with_what_is_one(bench: Bench, path: Path) -> None:
-    assert answered(bench, path, {"get": 1}) == {
-        "erro"
-        "r": 'expected {} or {"set": {KEY: VALUE}} or {"black_box": "write"}, got another object'
-    }
+    text = 'expected {} or {"set": {KEY: VALUE}}, {"black_box": "write"}, {"status": true}'
+    assert answered(bench, path, {"get": 1}) == {"error": f"{text}, got another object"}

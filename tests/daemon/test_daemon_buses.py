@@ -185,7 +185,7 @@ def test_a_service_waits_for_its_bus(
         Daemon(lambda: load_deployment(bench.file))
     monkeypatch.setattr(module.ServiceManager, "present", True)
     monkeypatch.setattr(module.ServiceManager, "waiting", lambda _, text: said.append(text))
-    monkeypatch.setattr(module.time, "sleep", lambda _: None)
+    monkeypatch.setattr(bench, "sleep", lambda _: None)
     Daemon(lambda: load_deployment(bench.file))
     assert said == ["waiting: bus crane: cannot open"] * 2
     assert log() == ["ERROR waiting for a bus: bus crane: cannot open"]

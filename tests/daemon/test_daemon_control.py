@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench, at
 from tests.daemon.control_client import answered, control
 
@@ -76,3 +77,24 @@ def test_a_reload_opens_the_control_socket_of_the_new_file(bench: Bench, tmp_pat
         },
     )
     assert there == [(False, True)]
+
+
+def test_the_state_is_asked_for(bench: Bench, tmp_path: Path) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    status = answered(bench, path, {"status": True})["status"]
+    assert status["axes"]["slew"] == {
+        "state": "READY",
+        "reason": "JOYSTICK_NEUTRAL",
+        "joystick": 0.0,
+        "setpoint": 0.0,
+        "sway_deg": 0.0,
+        "set": 0,
+    }
+    assert list(status["axes"]) == ["slew", "near_far", "lift"]
+    assert status["buses"] == {"crane": "up"}
+    assert status["counters"]["MissedDeadlines"] == 0
+    assert (status["late_s"], status["digest"]) == (
+        0.0,
+        load_deployment(bench.file).identity.digest,
+    )

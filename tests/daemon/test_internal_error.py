@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.codec.valve import ValveCodec
+from canshaper.codec.velocity import ValveCodec
 from canshaper.controller.controller import Controller
 from canshaper.controller.runner import AxisControl
 from canshaper.daemon.daemon import Daemon
@@ -150,7 +150,7 @@ def test_a_setpoint_that_cannot_be_encoded_is_neutral_and_the_loop_goes_on(
     lines = [line for line in log() if "axis=slew" in line]
     why = "WARNING axis=slew state=TRIPPED from=ACTIVE reason=OUTPUT_INVALID error=ValueError: "
     assert lines[-1].startswith(f"{why}valve command: expected up to +-125 steps, got 126 (")
-    assert "valve.py:" in lines[-1]
+    assert "velocity.py:" in lines[-1]
 
 
 def test_a_setpoint_beyond_full_trips_its_axis_only(rig: Rig) -> None:

@@ -2,15 +2,11 @@
 
 from pathlib import Path
 
-import cantools
 import pytest
 
-from canshaper.codec.layout import Layout
-from canshaper.codec.protection import Protection, Protector
 from canshaper.controller.controller import Controller
 from canshaper.daemon.gateway import InlineGateway
 from canshaper.gate.cycle import LEAST_LEAVE_NS, Standstill, io_cycle, receive_waiting
-from tests.rigs.forwarder import ROOT
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.standing import MS, Machine, Make, valves
 from tests.rigs.waiting import Waiting
@@ -170,16 +166,3 @@ def test_between_two_ticks_of_a_gateway_a_standstill_is_left_to_the_tick(
     line.wait(0.2, gateway.rig.controller, gateway.ports, gateway.standstill)
     assert len(gateway.joysticks.queue) == 1
     assert gateway.machine.sent == []
-
-
-@pytest.mark.parametrize("counts", [0, 16])
-def test_a_count_that_is_taken_back_is_the_next_one(counts: int) -> None:
-    message = cantools.database.load_file(ROOT / "dbc" / "forwarder.dbc").get_message_by_name(
-        "SlewCommand"
-    )
-    counter = "AliveCounter" if counts else None
-    protector = Protector(Protection(counter, counts), Layout(message))
-    raw = {"Velocity": 0, "AliveCounter": 0}
-    sent = [protector.protect(raw)[1] for _ in range(20)]
-    protector.take_back()
-    assert protector.protect(raw)[1] == sent[-1]

@@ -2,13 +2,11 @@
 
 import itertools
 import os
-import signal
 import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
 
 import pytest
 
@@ -17,25 +15,10 @@ from canshaper.daemon.notify import ServiceManager
 TICK_NS = 20_000_000
 
 # The socket to the manager lives as long as the process.
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")
-
-
-# Only to end a test that hangs.
-ANSWER_S = 30
-
-
-@pytest.fixture(autouse=True)
-def never_wait() -> Iterator[None]:
-    """A manager that does not read must not hold up its service."""
-
-    def hung(_number: int, _frame: FrameType | None) -> None:
-        pytest.fail("the service waited for its manager")  # no OSError: those it catches
-
-    before = signal.signal(signal.SIGALRM, hung)
-    signal.alarm(ANSWER_S)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning"),
+    pytest.mark.usefixtures("never_wait"),
+]
 
 
 class Manager:

@@ -1,6 +1,7 @@
 """What is old after a reload: frames from before it, on whatever bus, and the time it took."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -56,17 +57,17 @@ def test_a_reload_that_takes_long_is_a_standstill(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No bus is opened, yet what comes meanwhile has waited when the next tick reads it."""
-    adjuster = module.Adjuster
+    follower = module.tick_follower
 
-    def slow(controller: module.Controller) -> module.Adjuster:
+    def slow(*arguments: Any) -> Any:
         for _ in range(20 * (len(slept) > 0)):
             bench.joysticks()
             bench.sleep(0.02)
         slept.append(1)
-        return adjuster(controller)
+        return follower(*arguments)
 
     slept: list[int] = []
-    monkeypatch.setattr(module, "Adjuster", slow)
+    monkeypatch.setattr(module, "tick_follower", slow)
     states: list[tuple[str, str]] = []
 
     def script(number: int) -> None:

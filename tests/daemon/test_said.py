@@ -19,14 +19,6 @@ AXES = "slew,near_far,lift"
 READY = "slew READY, near_far READY, lift READY, crane up"
 
 
-@pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> Callable[[str], list[str]]:
-    caplog.set_level(logging.INFO, "canshaper")
-    return lambda what: [
-        f"{r.levelname} {r.getMessage()}" for r in caplog.records if what in r.getMessage()
-    ]
-
-
 def test_neutral_goes_out_before_the_service_is_ready_and_after_its_last_tick(
     diary: Diary,
 ) -> None:

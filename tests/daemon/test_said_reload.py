@@ -1,6 +1,5 @@
 """What a daemon says of a reload, and what becomes of its ports."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -16,14 +15,6 @@ from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import BUS, SECOND, Bench, FakePort
 from tests.daemon.diary import SECOND_TICKS, VALVES, Diary
 from tests.rigs.forwarder import TICK_NS
-
-
-@pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> Callable[[str], list[str]]:
-    caplog.set_level(logging.INFO, "canshaper")
-    return lambda what: [
-        f"{r.levelname} {r.getMessage()}" for r in caplog.records if what in r.getMessage()
-    ]
 
 
 def test_a_reload_is_put_to_work_behind_neutral_and_at_once(

@@ -22,7 +22,7 @@ OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
     "CHANGELOG.md": 800,
     "CONTRIBUTING.md": 560,
-    "README.md": 600,
+    "README.md": 640,
     "SECURITY.md": 430,
     "docs/api.md": 150,
     "docs/architecture.md": 310,
@@ -41,7 +41,7 @@ BUDGET = {
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
-    "docs/monitor.md": 230,
+    "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 700,
     "docs/safety.md": 2300,
@@ -51,7 +51,7 @@ BUDGET = {
     "docs/studio.md": 717,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
-    "docs/troubleshooting.md": 600,
+    "docs/troubleshooting.md": 627,
     "docs/tuning.md": 754,
     "docs/work.md": 250,
     "studies/README.md": 760,
@@ -59,16 +59,16 @@ BUDGET = {
 
 # Lines of Python, and why so many.
 LINES = {
-    "canshaper/gate": (2_320, "read in a day by someone who has never seen it"),
+    "canshaper/gate": (2_291, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_830,
+        4_815,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (59_136, "a new ability takes the room of an old one"),
-    "tests": (93_789, "one level for each behaviour"),
+    "canshaper": (59_891, "a new ability takes the room of an old one"),
+    "tests": (94_682, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (356, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (353, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -32,6 +32,7 @@ NOT_PASTED = {
     "commission.md": "tests/commissioning/procedure/test_day.py goes its way",
     "doctor.md": "examines this PC for a minute, as root; tests/hil/test_doctor.py",
     "guide.md": "tests/docs/test_guide.py goes its way in lock-step",
+    "monitor.md": "a daemon, logs of a machine; tests/commissioning/monitor, tests/recording",
     "replay.md": "logs of a machine; tests/recording",
     "sensor.md": "a machine",
     "studio.md": "serves until it is stopped; tests/studio/test_playback.py opens drives",

@@ -110,8 +110,10 @@ class AxisRules:
             self._side, self._turned_ns = -self._side, now_ns
         turns_ns = (axis.reversal + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
         self._turns = bool(axis.reversal) and now_ns - self._turned_ns <= turns_ns
-        # The daemon may not have been ready in the tick in which it was armed here.
-        self._moved = self.armed and (self._moved or self.raw != 0)
+        # The daemon may not have been ready in the tick in which it was armed here; what moves in a
+        # stop, at rest in between or not, shows nothing of that.
+        ready = self.armed and self._stop_until_ns is None
+        self._moved = ready and (self._moved or self.raw != 0)
         recent.append((now_ns, command, self._moved))
         tail_ns = self.tail_ns
         # What was commanded until the next entry counts up to there.
@@ -140,6 +142,10 @@ class AxisRules:
         self._oil.append((now_ns, factor * self._commands[-1][1]))
         while len(self._oil) > 1 and self._oil[1][0] < now_ns - self.tail_ns:
             self._oil.popleft()
+
+    def reloaded(self) -> None:
+        """What was commanded before is forgotten: its partner may move it all the same."""
+        self._commands = deque((at_ns, command, False) for at_ns, command, _ in self._commands)
 
     def silenced(self) -> None:
         """Nothing is sent any more, and the valve closes by itself; from neutral after that."""

@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 from canshaper.codec.frame import BusState, Frame
 from canshaper.config.bus import Bus
+from canshaper.daemon import control as control_module
 from canshaper.daemon import daemon as module
 from canshaper.daemon import gateway as gateway_module
 from canshaper.daemon import ports as ports_module
@@ -191,6 +192,8 @@ class Bench:
         self.applied += 1
         for address in self.rules.addresses.values():
             address.reloaded = True
+        for axis in self.rules.axes.values():
+            axis.reloaded()
         self._hold("in a reload")
 
     def _hold(self, where: str) -> None:
@@ -241,7 +244,7 @@ class Bench:
         yield reloads, "ConfigReload", self._read
         yield module, "Controller", Unrefused
         yield module, "Collector", Uncollected
-        yield module, "ControlServer", self._control
+        yield control_module, "ControlServer", self._control
         yield gateway_module, "select", self
         yield gateway_module, "rules", _no_rules
         yield module, "lock_memory", lambda: None

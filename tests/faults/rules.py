@@ -13,7 +13,8 @@ the daemon's states nor what they are called. For every axis, in every frame of 
     the alive counter goes on by one
     where the file says so: no faster than there is oil for, and nothing towards an end stop
 
-A reload, a change of a number: nothing of this ends with them, so the rules do not know them.
+A reload, a change of a number: nothing of this ends with them, so the rules do not know them; but
+what an operator commanded before a reload does not bound what a partner adds behind it.
 """
 
 from canshaper.codec.frame import Frame

@@ -13,7 +13,7 @@ import pytest
 
 from canshaper.controller import ends
 from canshaper.controller.controller import Controller
-from canshaper.shaping.flow_budget import FlowBudget
+from canshaper.shaping.demands import FlowBudget
 from tests.faults.judge import Violation
 from tests.faults.lies import LIES
 from tests.faults.sequence import ACTS, SENDING, Sequence, kinds_for
@@ -35,9 +35,21 @@ def test_no_sequence_makes_a_wrong_move(name: str) -> None:
         Sequence(name, seed).run()
 
 
-def test_a_gateway_whose_joystick_misses_a_cycle_falls_from_the_end_of_its_tail_on() -> None:
-    """The frame that came next was refused: its fall was counted from the last frame on."""
-    Sequence("gateway-forwarder", 2000807).run()
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        # a joystick misses a cycle at the end of its tail: the fall was counted from the last frame
+        ("gateway-forwarder", 2000807),
+        # a sensor that shows anything: more was added than a motion may, and no way counted it
+        ("canopen-sensor", 2700602),
+        # a tap of 2 %, a trip and a reload: the rules asked of the axis to know of the tap
+        ("j1939-sensor", 2700324),
+        # a stop with a rest in it: the rules took what moved then for the joystick's
+        ("forwarder-robust", 3101022),
+    ],
+)
+def test_what_was_wrong_once_is_right(name: str, seed: int) -> None:
+    Sequence(name, seed).run()
 
 
 @pytest.mark.slow

@@ -71,7 +71,7 @@ class Bench:
         self.gate.tick(self.now_ns, missed)
         why = self.gate.leaving(self.key, self.frame(steps))
         if why:
-            self.sender.protector.take_back()
+            self.sender.take_back()
             self.gate.refused(self.key)
             assert not self.gate.leaving(self.key, self.frame(0))
         self.number += 1

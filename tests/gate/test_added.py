@@ -41,6 +41,16 @@ class TestAdded:
             assert ("limit=asked allowed=0.250" in why) is not passes
 
     @signs
+    @pytest.mark.parametrize(("steps", "passes"), [(31, True), (32, False)])
+    def test_behind_its_stopping_distance_too(self, sign: int, steps: int, passes: bool) -> None:
+        one = self.robust(stop_distance_m=0.29)
+        one.ramp(sign * FULL, near_far=float(sign))
+        assert not any(one.sends(sign * FULL, slew=1.0) for _ in range(20))
+        assert not one.sends(0, slew=1.0)
+        why = one.sends(sign * steps, slew=1.0)
+        assert ("limit=stop_distance_m" in why) is not passes
+
+    @signs
     def test_not_against_a_stick_that_is_held(self, sign: int) -> None:
         one = self.robust()
         one.rests()

@@ -123,6 +123,10 @@ def test_a_frame_is_made_from_one_of_its_length() -> None:
 
 def test_a_frame_of_our_own_asks_for_nothing() -> None:
     one = Gateway()
+    one.ticks()  # no joystick was seen: nothing may move, and so nothing is enabled
+    data = one.message.own(enabled=True).data
+    assert one.gate.leaving(one.key, data) == "limit=bits of an own frame"
+    one.message.protector.take_back()
     one.receives()
     one.ticks()
     for enabled in (True, False):
@@ -139,6 +143,6 @@ def test_a_frame_of_our_own_asks_for_nothing() -> None:
     assert refused
     one.receives(enable=False)
     one.ticks()
-    one.message.protector.take_back()
+    one.message.take_back()
     data = one.message.own(enabled=True).data
     assert one.gate.leaving(one.key, data) == "limit=bits of an own frame"

@@ -11,6 +11,7 @@ from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Pro
 from canshaper.config.protection import Protected
 from canshaper.gate.build import protection_of, record_of
 from canshaper.gate.checks import crc_of
+from canshaper.gate.record import Protection
 from tests.gate.bench import load
 from tests.gate.test_decoder import message
 
@@ -27,10 +28,13 @@ def test_a_crc_has_the_value_of_the_catalogue(name: str, value: int) -> None:
     assert crc_of(name).of(DIGITS) == value
 
 
+UNKNOWN = Protection(known=False)
+
+
 def checksum_of(place: str, **keys: Any) -> Any:
     one = message(f"Check : {place}+ (1,0) [0|0]")
     section = Protected(bus="crane", message="Message", checksum={"signal": "Check", **keys})
-    return protection_of(section, one, 0x1A2)[0]
+    return protection_of(section, one, 0x1A2).check
 
 
 @pytest.mark.parametrize("kind", [*CHECKSUMS, "polynomial"])
@@ -62,17 +66,17 @@ def test_of_another_package_it_is_not_known() -> None:
     assert section.checksum is not None
     theirs = section.checksum.model_copy(update={"kind": "of another package"})
     section = section.model_copy(update={"checksum": theirs})
-    assert protection_of(section, one, 0)[:2] == (None, False)
+    assert protection_of(section, one, 0) == UNKNOWN
     record = record_of(load("forwarder"))
     assert record.unchecked == []
-    messages = record.messages | {"left": replace(record.messages["left"], checked=False)}
+    messages = record.messages | {"left": replace(record.messages["left"], protection=UNKNOWN)}
     assert replace(record, messages=messages).unchecked == ["left"]
     switches = record_of(load("ecu-forwarder"))
     (name,) = (name for name in switches.messages if name not in switches.joysticks)
-    messages = {name: replace(switches.messages[name], checked=False)}
+    messages = {name: replace(switches.messages[name], protection=UNKNOWN)}
     assert replace(switches, messages=messages).unchecked == ["switch seat and crane_mode"]
     key, valve = next((k, one) for k, one in record.valves.items() if one.axes == ("slew",))
-    valves = record.valves | {key: replace(valve, checked=False)}
+    valves = record.valves | {key: replace(valve, protection=UNKNOWN)}
     assert replace(record, valves=valves).unchecked == ["the valve of slew"]
 
 
@@ -95,15 +99,16 @@ PROFILES: dict[str, tuple[E2e, dict[str, Any]]] = {
 def test_every_profile_is_what_is_sent(name: str) -> None:
     sent, keys = PROFILES[name]
     section = Protected(bus="crane", message="Message", e2e={"profile": name[:3], **keys})
-    check, known, counter, counts = protection_of(section, None, 0)
-    assert (known, counter, counts) == (True, None, sent.counts)
+    protection = protection_of(section, None, 0)
+    check, counts = protection.check, protection.counts
+    assert protection == Protection(check, counts=sent.counts)
     rng = random.Random(name)
     for _ in range(40):
         count = rng.randrange(min(counts, 1000))
         data = sent.protect(rng.randbytes(24), count)
         assert check is not None
         assert check.right(data)
-        assert check.count(data) == count  # type: ignore[attr-defined]
+        assert protection.count(data, (0, 0)) == count
         for at in range(24):
             assert not check.right(data[:at] + bytes([data[at] ^ 0x10]) + data[at + 1 :])
     assert name[:3] not in ("p01", "p11") or not check.right(sent.protect(data, 15))  # type: ignore[union-attr]

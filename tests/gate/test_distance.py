@@ -52,6 +52,14 @@ class TestDistance:
         assert "limit=stop_distance_m allowed=0.500" in left[first]
 
     @signs
+    def test_behind_it_a_frame_as_fast_as_asked_leaves(self, sign: int) -> None:
+        one = bench(tail_s=2.0, stop_distance_m=0.49)
+        one.ramp(sign * FULL, near_far=float(sign))
+        assert not any(one.sends(sign * FULL) for _ in range(25))
+        assert one.axis.ran > 0.49
+        assert not one.sends(-sign * 37, near_far=-sign * 0.3)
+
+    @signs
     @pytest.mark.parametrize(("steps", "at", "more"), [(FULL, 1.0, 24), (0, 0.0, 5)])
     def test_what_is_asked_again_begins_it_and_a_pause_does_not(
         self, sign: int, steps: int, at: float, more: int

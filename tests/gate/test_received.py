@@ -1,9 +1,7 @@
-"""The gate judges a message: its sequence, its sender, and its state over a reload."""
+"""The gate judges a message: its sequence and its sender."""
 
 import math
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,6 +11,7 @@ from canshaper.gate.build import record_of
 from canshaper.gate.checks import E2e
 from canshaper.gate.gate import Gate
 from canshaper.gate.received import Received
+from canshaper.gate.record import Protection
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.machine.deployment import Deployment
 from tests.faults import variants
@@ -66,7 +65,7 @@ def test_with_checksum_and_qualification_too(seed: int) -> None:
     config = bound.config.model_copy(update={"qualify": 1 + seed % 3})
     joysticks = {**deployment.joysticks, "left": replace(bound, config=config)}
     one = Alike(replace(deployment, joysticks=joysticks), "left")
-    field = record_of(deployment).messages["left"].counter
+    field = record_of(deployment).messages["left"].protection.counter
     assert field is not None
     assert bound.protection.check is not None
     count = now_ms = 0
@@ -85,7 +84,7 @@ def test_with_checksum_and_qualification_too(seed: int) -> None:
 
 def test_frames_with_another_multiplexor_say_nothing() -> None:
     message = record_of(load("forwarder")).messages["left"]
-    field = replace(message.counter, shift=40, mask=0xF)  # type: ignore[type-var]
+    field = replace(message.protection.counter, shift=40, mask=0xF)  # type: ignore[type-var]
     for alone in (False, True):
         one = Received(replace(message, page=(field, 3), alone=alone))
 
@@ -102,7 +101,7 @@ def test_frames_with_another_multiplexor_say_nothing() -> None:
 
 def test_the_counter_of_e2e_is_in_its_header() -> None:
     message = record_of(load("forwarder")).messages["left"]
-    header = replace(message, check=E2e("p05", 256, 7), counter=None, counts=256)
+    header = replace(message, protection=Protection(E2e("p05", 256, 7), counts=256))
     one = Received(header)
     for count, counts in ((1, True), (1, False), (2, True), (9, False)):
         data = Profile5(7).protect(bytes(8), count)
@@ -194,87 +193,6 @@ class TestSources:
         gate = Gate(record_of(load("forwarder").listening()))
         gate.receive(gate.axes["slew"].of.valve, bytes(2), 5)
         assert gate.axes["slew"].foreign_ns < 0
-
-
-class TestReload:
-    """A latch stays latched; good news has to come again."""
-
-    def reloaded(self, one: Bench, *reopened: str, **changed: Any) -> Bench:
-        after = Bench(replace(one.deployment, **changed), "near_far")
-        after.number, after.hand = one.number, one.hand
-        after.sender = one.sender
-        after.gate.carry_over(one.gate, frozenset(reopened))
-        return after
-
-    def test_a_trip_and_a_second_sender(self) -> None:
-        one = bench()
-        one.ramp(60, near_far=1.0)
-        assert one.sends(-60, near_far=1.0)
-        one.gate.receive(one.gate.axes["lift"].of.valve, bytes(2), one.now_ns)
-        after = self.reloaded(one)
-        assert after.gate.axes["lift"].foreign_ns == one.now_ns
-        after.rests(10)
-        assert not after.restarts(10, near_far=0.5)
-        after.rests(3, enable=False)
-        after.rests()
-        assert not after.sends(10, near_far=0.5)
-
-    def test_a_trip_that_no_tick_has_seen(self) -> None:
-        one = bench()
-        one.ramp(60, near_far=1.0)
-        one.receive(one.joysticks(enable=False))
-        after = self.reloaded(one)
-        assert after.axis.hard == "enable"
-        assert after.axis.joystick.pressed.released
-
-    def test_an_emergency_stop_that_is_held(self) -> None:
-        deployment = variants.machine("protected")[1]
-        one = Bench(deployment, "near_far")
-        one.rests(10)
-        stop = deployment.emergency_stop
-        assert stop is not None
-        assert stop.protection.check is not None
-        pressed = stop.protection.check.protect(b"\1\1", 0)
-        one.gate.receive(stop.key, pressed, one.now_ns)
-        after = self.reloaded(one)
-        assert after.axis.latches
-        after.axis.hard, after.axis.latches = "", False  # as if a tick had seen it before
-        after.gate.tick(after.now_ns, 0)
-        assert after.axis.latched
-
-    def test_counters_go_on(self) -> None:
-        one = bench()
-        one.rests(5)
-        count = one.gate.counts[one.key]
-        after = self.reloaded(one)
-        assert after.gate.counts[one.key] == count
-        assert after.axis.joystick.received.count == one.axis.joystick.received.count
-        assert after.axis.joystick.received.good_ns is None
-        assert after.axis.joystick.received.intact_ns is not None
-        after = self.reloaded(one, "crane")
-        assert after.axis.joystick.received.intact_ns is None
-
-    def test_of_another_machine_nothing_is_carried_over(self, tmp_path: Path) -> None:
-        one = bench()
-        one.ramp(60, near_far=1.0)
-        assert one.sends(-60, near_far=1.0)
-        buses = {"crane": one.deployment.config.buses["crane"].model_copy(update={"channel": "x"})}
-        config = one.deployment.config.model_copy(update={"buses": buses})
-        after = self.reloaded(one, config=config)
-        assert after.gate.counts == {}
-        assert after.axis.joystick.received.count is None
-        assert after.axis.latched  # an axis is known by its name too
-
-    def test_another_protection_begins_anew(self) -> None:
-        one = bench()
-        one.rests(5)
-        message = one.gate.messages["left"]
-        message.of = replace(message.of, counts=16)
-        valve, axes = one.gate.valves[one.key]
-        one.gate.valves[one.key] = replace(valve, counts=16), axes
-        after = self.reloaded(one)
-        assert after.gate.messages["left"].count is None
-        assert one.key not in after.gate.counts
 
 
 def test_numbers_are_set_within_the_range_of_the_file() -> None:

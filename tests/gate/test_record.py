@@ -80,6 +80,6 @@ def test_the_header_of_e2e_is_no_start_value(machine: Machine) -> None:
         "\n    status: { bus: crane, message: SlewStatus",
     )
     valve = record_of(machine.load()).valves["crane", 512, False]
-    assert valve.counts == 16
+    assert valve.protection.counts == 16
     assert valve.ours == 0x00FFFFFF
     assert valve.fixed == 0xFF000000

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.signals import FieldSet
+from canshaper.codec.message import FieldSet
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment

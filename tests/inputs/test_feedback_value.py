@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.feedback import Feedback, Following
+from canshaper.inputs.value import Feedback, Following
 from canshaper.shaping.states import Reason
 from tests.rigs.forwarder import Rig
 

@@ -20,7 +20,7 @@ def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make)
     rig = changed_rig(ONE_SECOND)
     for now_ns, fault in ((0, None), (10**9, None), (10**9 + 1, Reason.JOYSTICK_FROZEN)):
         joystick.receive(rig.joystick(Slew=500).data, now_ns)
-        assert joystick.command("Slew", now_ns, 0, None, 0.02).fault is fault
+        assert joystick.command("Slew", now_ns, 0, None, 0.02)[0].fault is fault
 
 
 ONE_SECOND = {LEFT: LEFT.replace("\n  right", "\n    stuck_s: 1\n  right")}

@@ -3,6 +3,7 @@
 import pytest
 
 from canshaper.codec.frame import FrameFault
+from canshaper.codec.message import SequenceChecker
 from tests.machine.protected_joystick import COUNTER, SIGNALS, joystick
 from tests.rigs.files import Machine
 
@@ -14,7 +15,7 @@ def test_the_usual_step_suits_every_counter(protected: Machine, counter: str, us
     protected.in_yaml(COUNTER, f"alive_counter: {counter}")
     bound = protected.load().joysticks["left"]
     for step in range(1, bound.protection.counts):
-        checker = bound.sequence_checker()
+        checker = SequenceChecker(bound.protection, bound.config.alive_max_step, 1)
         assert checker.check(b"", 0) is FrameFault.NONE
         expected = FrameFault.NONE if step <= usual else FrameFault.COUNTER_JUMP
         assert checker.check(b"", step) is expected

@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.checksums.kinds import Checksum
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile5
-from canshaper.codec.protection import Protection
+from canshaper.codec.message import Protection
 from tests.machine.protected_machine import IDS, JOYSTICK, STOP, line_of, load, problems
 
 

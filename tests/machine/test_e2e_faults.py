@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.protection import Protection
+from canshaper.codec.message import Protection
 from tests.machine.protected_machine import (
     JOYSTICK,
     RADIUS,

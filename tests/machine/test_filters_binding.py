@@ -9,7 +9,7 @@ from canshaper.errors import ConfigError
 from canshaper.machine.filters import filter_fault, unfit
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.transfer import Off
 from tests.rigs.files import Machine
 
 STATUS = "status: { bus: crane, message: ShaperStatus }\n"

@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.checksums.kinds import Checksum
 from canshaper.codec.frame import EFF_FLAG
-from canshaper.codec.protection import Protection
+from canshaper.codec.message import Protection
 from canshaper.codec.rewrite import RewrittenMessage, neutral_fault
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment

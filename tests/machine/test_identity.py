@@ -16,8 +16,8 @@ from canshaper.machine import identity as module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
+from canshaper.shaping import transfer
 from canshaper.shaping.registry import ADDED
-from canshaper.shaping.shapers import off
 from tests.rigs.sent import status_frame
 
 ROOT = Path(__file__).parents[2]
@@ -123,16 +123,16 @@ def test_a_monitor_compares_it_with_its_own_files() -> None:
 def test_a_filter_of_another_package_is_named_with_its_module(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    point = EntryPoint("mine", "canshaper.shaping.shapers.off:Off", "canshaper.shapers")
+    point = EntryPoint("mine", "canshaper.shaping.transfer:Off", "canshaper.shapers")
     monkeypatch.setitem(ADDED, "mine", point)
     (line,) = module.filter_lines(["off", "mine"])
-    digest = sha256(Path(str(off.__file__)).read_bytes()).hexdigest()
+    digest = sha256(Path(str(transfer.__file__)).read_bytes()).hexdigest()
     assert line == f"filter=sha256:{digest} kind=mine package={point.value}"
 
 
 def test_a_filter_is_named_with_package_and_version(monkeypatch: pytest.MonkeyPatch) -> None:
     owner = distribution("pytest")
-    point = EntryPoint("mine", "canshaper.shaping.shapers.off:Off", "canshaper.shapers")
+    point = EntryPoint("mine", "canshaper.shaping.transfer:Off", "canshaper.shapers")
     vars(point)["dist"] = owner
     monkeypatch.setitem(ADDED, "mine", point)
     (line,) = module.filter_lines(["mine"])

@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.checksums.kinds import CHECKSUMS, Checksum, ChecksumKind
-from canshaper.codec.protection import UNPROTECTED, Protection
+from canshaper.codec.message import UNPROTECTED, Protection
 from canshaper.controller.controller import Controller
 from tests.codec.checksum_reference import PLACES
 from tests.machine.protected_joystick import COUNTER, SIGNALS, joystick

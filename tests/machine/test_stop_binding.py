@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.protection import Protection
+from canshaper.codec.message import Protection
 from canshaper.controller.controller import Controller
 from tests.rigs.files import Machine
 

@@ -15,9 +15,15 @@ def rounding(axis: Axis) -> float:
     return 1.5 * axis.step + 1e-6
 
 
+def tail(axis: Axis) -> int:
+    """Periods for which a demand counts; in a motion also its partner's, and one more."""
+    partner = axis.moves_with
+    return max(axis.tail, partner.tail) + 1 if partner else axis.tail
+
+
 def run_on(axis: Axis) -> int:
     """Periods from the last demand to rest, at most."""
-    return axis.tail + math.ceil(1.0 / axis.fall) + 1
+    return tail(axis) + math.ceil(1.0 / axis.fall) + (axis.moves_with is None)
 
 
 @every
@@ -48,7 +54,7 @@ class TestNeutralStops:
                 ran[axis] = 0.0
             last = max(one.deflected for one in (seen, seen.partner or seen))
             since = seen.period - last
-            if now and since > of.tail + bool(of.moves_with):  # its partner's demand counts, too
+            if now and since > tail(of):
                 assert since <= run_on(of), f"{axis}: after the run-on"
                 least = abs(before) - of.fall + rounding(of)
                 assert abs(now) <= least and now * before > 0, f"{axis}: does not fall"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.transfer import Off
 from tests.promises.events import (
     Event,
     address_claimed,

@@ -15,6 +15,7 @@ from canshaper.gate.axis import Asked
 from canshaper.gate.build import record_of
 from canshaper.gate.fields import EPSILON
 from canshaper.gate.gate import Gate, _velocity
+from canshaper.gate.record import Protection
 from canshaper.machine.binding import load_deployment
 from tests.faults.shipped import CONFIG
 from tests.proof.symbolic import (
@@ -251,7 +252,8 @@ def test_every_frame_of_a_valve(name: str, monkeypatch: pytest.MonkeyPatch) -> N
         little = z3.BitVec("frame", bits + 8)  # so that no sum of an 8-bit field overflows
         ordered = [z3.Extract(8 * n + 7, 8 * n, little) for n in range(valve.length)]
         word = Unknown(little), Unknown(z3.Concat(z3.BitVecVal(0, 8), *ordered))
-        bare = replace(valve, check=None, words=tuple((f, tuple(v)) for f, v in valve.words))
+        words = tuple((f, tuple(v)) for f, v in valve.words)
+        bare = replace(valve, protection=Protection(), words=words)
 
         def run(valve: Any = bare, axes: Any = axes, word: Any = word, bits: int = bits) -> Any:
             if rules.bytes_refused(valve, bytes(bits // 8), word, None, held=False):

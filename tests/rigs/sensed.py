@@ -159,7 +159,7 @@ class Setup:
                 state = state._replace(theta6_rad=log.angle, theta6_rate_rad_s=log.rate)
             if sensor and sensed:
                 value = self._measured(sensor, state, tick)
-                sensed.measure(value, SCALE, commanded=axis.commanded)
+                sensed.measure(value, SCALE, commanded=axis.output.commanded)
             command = drive.script.command("near_far", state.time_s)
             axis.tick(CommandInput(command=round(1000.0 * command) / 1000.0, enabled=True))
             drive.time_s.append(state.time_s)

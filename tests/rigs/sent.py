@@ -4,7 +4,7 @@ from typing import Any
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.status import StatusCodec
-from canshaper.codec.valve import ValveCodec
+from canshaper.codec.velocity import ValveCodec
 
 
 def command_raw(valve: ValveCodec, steps: int) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
+from canshaper.shaping.transfer import Off
 
 TICK_S = 0.05
 # So fine that rounding does not hide what is added.

@@ -43,7 +43,7 @@ class Rig:
         """
         for _ in range(round(seconds / TICK_S)):
             shown = self.angle if value == math.inf else value
-            self.sensed.measure(shown, SCALE, commanded=self.axis.commanded, damps=damps)
+            self.sensed.measure(shown, SCALE, commanded=self.axis.output.commanded, damps=damps)
             joystick = CommandInput(command=self.command, enabled=True)
             self.axis.act(joystick, 0.0, damps=damps)
             self.axis.advance()

@@ -8,9 +8,9 @@ from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 TICK_S = 0.02
 MODE = SwayMode.from_period(2.356, 0.038)

@@ -166,6 +166,6 @@ def test_the_time_that_is_given_back_moves_it_again() -> None:
     for _ in range(40):
         axis.tick(CommandInput(), 0.2)
     assert axis.raw == 0
-    axis.renew_added_time()
+    axis.added_time.renew()
     axis.tick(CommandInput(), 0.2)
     assert axis.raw

@@ -4,9 +4,9 @@ import pytest
 
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 TICK_S, TAIL = 0.02, 50
 DEMAND, LARGEST = 0.09, 0.25
@@ -26,7 +26,7 @@ def stopped(sign: float, stop: CommandInput) -> ShapedAxis:
     axis.tick(CommandInput())
     axis.tick(CommandInput())
     assert axis.state is State.READY
-    assert not axis.commanded
+    assert not axis.output.commanded
     return axis
 
 

@@ -5,8 +5,8 @@ import pytest
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State
+from canshaper.shaping.transfer import Off
 from tests.shaping.added_pair import LARGEST, SLACK, TICK_S, TIME_S, pair
 
 

@@ -8,9 +8,9 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.output import MOST_CARRY
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 LARGEST = 0.3
 TICK_S = 0.05

@@ -11,10 +11,9 @@ import pytest
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.transfer import BLEND_S
+from canshaper.shaping.transfer import BLEND_S, Off
 
 Drive = Any  # the class of conftest.py
 DriveWith = Callable[..., Any]

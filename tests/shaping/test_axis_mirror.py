@@ -48,7 +48,7 @@ def test_the_mirror_image_of_a_drive(limits: OutputLimits, seed: int) -> None:
         changed = one.tick(joystick, added)
         assert other.tick(joystick._replace(command=-joystick.command), -added) == changed
         assert (other.raw, other.sent, other.applied) == (-one.raw, -one.sent, -one.applied)
-        assert (other.commanded, other.neutral) == (one.commanded, one.neutral)
+        assert (other.output.commanded, other.neutral) == (one.output.commanded, one.neutral)
         moved.add(one.raw > 0)
     assert moved == {True, False}
 
@@ -74,13 +74,13 @@ def test_an_axis_at_rest_in_the_middle_of_its_run_on_is_not_done(sign: float) ->
     sent = []
     for _ in range(50):
         axis.tick(CommandInput())
-        assert (axis.state, axis.commanded, axis.neutral) == (State.ACTIVE, True, False)
+        assert (axis.state, axis.output.commanded, axis.neutral) == (State.ACTIVE, True, False)
         sent.append(axis.sent)
     assert sent[25] == 0.0
     assert sent[-1] == pytest.approx(0.4 * sign, abs=0.01)
     for _ in range(20):
         axis.tick(CommandInput())
-    assert (axis.state, axis.reason, axis.commanded) == (State.READY, Reason.AT_REST, False)
+    assert (axis.state, axis.reason, axis.output.commanded) == (State.READY, Reason.AT_REST, False)
     assert axis.neutral
 
 

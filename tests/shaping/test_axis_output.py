@@ -10,9 +10,9 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 Drive = Any  # the class of conftest.py
 DriveWith = Callable[..., Any]

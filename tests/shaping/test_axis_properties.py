@@ -14,9 +14,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 from tests.shaping.axis_histories import (
     BAND,
     CAUSES,

@@ -8,9 +8,9 @@ import pytest
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 Drive = Any  # the class of conftest.py
 DriveWith = Callable[..., Any]
@@ -39,8 +39,9 @@ def test_before_the_first_tick_an_axis_carries_neutral() -> None:
     assert (axis.state, axis.reason) == (State.NEUTRAL_WAIT, Reason.START)
     assert (axis.raw, axis.sent, axis.applied, axis.command) == (0, 0.0, 0.0, 0.0)
     assert isinstance(axis.raw, int)
-    assert axis.commanded is False
+    assert axis.output.commanded is False
     assert axis.neutral is True
+    assert axis.unattended is False
 
 
 def test_ticks_missed_before_the_first_one_swing_nothing() -> None:

@@ -6,9 +6,9 @@ from typing import Any, cast
 
 import pytest
 
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import MOVING, CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.transfer import Off
 
 Drive = Any  # the class of conftest.py
 DriveWith = Callable[..., Any]

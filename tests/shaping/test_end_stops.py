@@ -4,12 +4,12 @@ import random
 
 import pytest
 
-from canshaper.shaping.end_stops import EndStops, RunOn, bounds
+from canshaper.shaping.demands import EndStops, RunOn, bounds
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.fir import Fir
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 TICK_S = 0.02
 MODE = SwayMode.from_period(2.3, 0.05)

@@ -17,7 +17,7 @@ def swinging(rig: Rig, push: float = 0.3) -> Rig:
     for command in (0.8, 0.5, 0.2, 0.0):
         rig.command = command
         rig.run(3.0)
-    assert not rig.axis.commanded
+    assert not rig.axis.output.commanded
     assert rig.sensed.state is Trust.TRUSTED
     rig.push = push
     rig.run(1.1)

@@ -26,7 +26,7 @@ def test_a_new_stage_begins_as_one_that_rests(sign: float) -> None:
     driven(rested, 0.4)
     rested.rest()
     for one in (stage(), rested):
-        assert not one.commanded
+        assert not one.output.commanded
         assert driven(one, sign * 0.32, sign * 0.32) == sign * 0.32
         one.drop_added()  # nothing was: it goes on
         assert one.ramp == sign * 0.32

@@ -18,9 +18,9 @@ from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, zv_taps
 from canshaper.shaping.shapers.gff import Gff, poles_from_denominator
 from canshaper.shaping.shapers.kind import Parameter, Shaper, ShaperKind
 from canshaper.shaping.shapers.limit_aware import LimitAware
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 TICK_S = 0.02
 MODE = SwayMode.from_period(2.2, 0.05)

@@ -15,9 +15,9 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff, poles_from_denominator
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 TICK_S = 0.01
 DAMPING = 0.02

@@ -9,10 +9,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.stopping import allowed_s, needed_s, travel
-from canshaper.shaping.valve_curve import ValveCurve
 from tests.shaping.test_stopping import axis_with
 
 DriveWith = Callable[..., Any]
@@ -76,6 +75,23 @@ def test_it_reaches_the_limit_and_falls(sign: float) -> None:
     assert sum(seen) * TICK_S == pytest.approx(0.5, abs=0.03)
     fall = 4.0 * TICK_S
     assert seen[-14:-1] == pytest.approx([1.0, *(1.0 - fall * n for n in range(1, 13))], abs=STEP)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("turns", [20, 999])
+def test_what_is_added_beyond_its_bound_counts_too(sign: float, turns: int) -> None:
+    """As fast as was asked within the tail, to one side or to both; then as what may be added."""
+    axis = axis_of(Anything(), replace(LIMITS, tail_s=4.0))
+    axis.allow_added(0.25, 9.0)
+    for tick in range(60):
+        axis.tick(CommandInput(sign if tick // 20 % 2 else -sign))
+    sent = []
+    for tick in range(140):
+        axis.tick(CommandInput(), sign if tick // turns % 2 else -sign)
+        sent.append(abs(axis.sent))
+    beyond = sum(max(size - 0.25, 0.0) for size in sent) * TICK_S
+    assert beyond == pytest.approx(0.5, abs=TICK_S)
+    assert max(sent[-40:]) == pytest.approx(0.25, abs=STEP)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.stopping import Travel, allowed_s, travel
 from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.valve_curve import ValveCurve
 
 MODE = SwayMode(2.7, 0.04)
 FILTERS: list[tuple[str, dict[str, Any]]] = [

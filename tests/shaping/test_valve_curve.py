@@ -5,10 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.limits import OutputLimits, on_grid, with_deadband, without_deadband
-from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.limits import (
+    OutputLimits,
+    ValveCurve,
+    on_grid,
+    with_deadband,
+    without_deadband,
+)
 from canshaper.shaping.states import CommandInput
-from canshaper.shaping.valve_curve import ValveCurve
+from canshaper.shaping.transfer import Off
 
 # Opens at 7 % one way and at 4 % the other, where it is slower.
 COMMANDS = (-1.0, -0.5, -0.04, 0.07, 0.4, 1.0)

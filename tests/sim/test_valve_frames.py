@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.layout import Layout
-from canshaper.codec.valve import ValveCodec
+from canshaper.codec.velocity import ValveCodec
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.joysticks import JoystickNode

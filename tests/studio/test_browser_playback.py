@@ -61,7 +61,7 @@ def test_a_black_box_is_looked_at_event_by_event(box: Opened, tab: Callable[...,
     page.click("#before")
     assert at_s(page) < before
     expect(page.locator("#events li", has_text="tripped")).to_have_count(2)
-    page.click("summary")
+    page.click("#about summary")
     expect(page.locator("#notes")).to_contain_text("frames compared, all the same")
     expect(page.locator("#notes")).to_contain_text("the black box is of other files")
 
@@ -69,8 +69,8 @@ def test_a_black_box_is_looked_at_event_by_event(box: Opened, tab: Callable[...,
 def test_the_time_bar_moves_cranes_and_charts(log: Opened, tab: Callable[..., Page]) -> None:
     page = tab(log)
     page.keyboard.press("ArrowRight")
-    expect(page.locator(".swing span").first).to_have_text("swing, measured")
-    expect(page.locator(".swing span").last).to_have_text("swing, simulated")
+    expect(page.locator(".swing .quiet").first).to_have_text("swing, measured")
+    expect(page.locator(".swing .quiet").last).to_have_text("swing, simulated")
     page.wait_for_timeout(500)
     scene, chart = (page.locator(s).screenshot() for s in ("#scene", "#chart-command"))
     page.locator("#time").focus()

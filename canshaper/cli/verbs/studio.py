@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 GROUP = "look"
 
 EXIT_NO_ADDRESS = 1
-DEFAULT = "forwarder.yaml"
+DEFAULT = "forwarder-robust.yaml"
 LINUX = sys.platform == "linux"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -99,7 +99,7 @@ def studio(
 
       canshaper studio
 
-      canshaper studio forwarder-robust.yaml --set grapple.l2_m=1.5
+      canshaper studio forwarder-gff.yaml --set grapple.l2_m=1.5
 
       canshaper studio --sensor --set log.grip_s=20
 

@@ -20,8 +20,8 @@ from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import MOVING, CommandInput, Reason, State
+from canshaper.shaping.transfer import Off
 
 # A command below this is neutral: the ramp begins there.
 NEUTRAL_BAND = 1e-4
@@ -42,23 +42,19 @@ class _RampJoystick:
         self.deflection = 0.0
         self.moved = False
 
-    @property
-    def releases(self) -> int:
-        """How often its enable was seen released."""
-        return self._joystick.releases
-
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> CommandInput:
-        """Return the input that the axis may use now."""
-        given = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
+    ) -> tuple[CommandInput, int]:
+        """Return the input that the axis may use now, and how often enable was released."""
+        given, releases = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
         usable = given.fault is None and given.enabled
         self.moved = usable and abs(given.command) > neutral_band
         if not usable:
-            return given
+            return given, releases
         if self.moved:  # contradicts the ramp: a fault that stops the axis through its filter
-            return CommandInput(fault=Reason.JOYSTICK_CONTRADICTORY, trip=given.trip)
-        return given._replace(command=self.deflection, bypass=False)
+            contradicts = Reason.JOYSTICK_CONTRADICTORY
+            return CommandInput(fault=contradicts, trip=given.trip), releases
+        return given._replace(command=self.deflection, bypass=False), releases
 
 
 class CalibrationDrive:

@@ -9,7 +9,7 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, group_of
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
-from canshaper.codec.protection import UNPROTECTED
+from canshaper.codec.message import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Limits

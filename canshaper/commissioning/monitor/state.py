@@ -218,12 +218,12 @@ def rows(monitor: Monitor, name: str, now_ns: int, width: int, *, plain: bool) -
     if width >= AT + LABEL + LEAST_LINE:
         samples, size = monitor.samples[name], width - AT - LABEL - 1
         commands = [(one.time_ns, one.valve_pct / 100.0) for one in samples]
-        _add(first, "valve 100 %", line_over_time(commands, now_ns, size, plain=plain), style)
+        _add(first, "to 100 %", line_over_time(commands, now_ns, size, plain=plain), style)
         if swings:
             reach = max([LEAST_SWAY_DEG, *(abs(one.sway_deg) for one in samples)])
             swing = [(one.time_ns, one.sway_deg / reach) for one in samples]
             line = line_over_time(swing, now_ns, size, plain=plain)
-            _add(second, f"sway {reach:.1f} deg", line, style)
+            _add(second, f"to {reach:.1f} deg", line, style)
     yield first
     yield second
 

@@ -10,8 +10,7 @@ import canopen
 from canopen.sdo.exceptions import SdoError
 
 from canshaper.bus.port import not_opened
-from canshaper.bus.python_can import open_python_can
-from canshaper.bus.waiting import receive
+from canshaper.bus.python_can import open_python_can, receive
 from canshaper.codec.identifier import EMERGENCY
 from canshaper.commissioning.nodes.messages import ANALOGUE_INPUTS
 from canshaper.commissioning.nodes.node import (

@@ -18,6 +18,8 @@ from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import SafeConsole, new_table
 
+REHEARSAL = ".rehearsal"
+
 
 @dataclass(frozen=True)
 class Files:
@@ -73,8 +75,10 @@ class Files:
 
 
 def rehearsal_of(path: Path) -> Path:
-    """Name of the copy that a rehearsal works on."""
-    return path.with_name(f"{path.stem}.rehearsal.yaml")
+    """Name of the copy that a rehearsal works on; a copy is its own."""
+    if path.stem.endswith(REHEARSAL):
+        return path
+    return path.with_name(f"{path.stem}{REHEARSAL}.yaml")
 
 
 def copy_for_rehearsal(path: Path) -> Path:

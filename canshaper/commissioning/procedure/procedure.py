@@ -90,7 +90,7 @@ class Procedure:
         self.steps = [step for step in steps if step.applies(deployment)]
         self.state = read_state(files.state) or _new_state(bench, origin)
         self._check_bench()
-        if origin and hash_of(origin) != self.state.origin:
+        if origin not in (None, files.deployment) and hash_of(origin) != self.state.origin:
             remedy = f"to rehearse it as it is now, move {files.deployment} and {files.state} away"
             self.news.append(f"{origin} was changed since the copy was made; {remedy}")
         files.folder.mkdir(parents=True, exist_ok=True)

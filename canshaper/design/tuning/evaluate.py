@@ -20,9 +20,9 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import Off
 
 Moves = Sequence[tuple[float, list[float]]]
 ShaperFor = Callable[[SwayModel], Shaper]

@@ -8,7 +8,7 @@ tripped until the operator resets it.
 
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.identifier import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
-from canshaper.codec.sent import Sender
+from canshaper.codec.message import Sender
 from canshaper.config.schema import StatusWord
 from canshaper.inputs.input import GOOD, Input, Raw
 from canshaper.machine.inputs import Bound

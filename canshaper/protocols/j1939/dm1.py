@@ -15,7 +15,7 @@ from canshaper.codec.identifier import (
     TRANSPORT_DATA,
     identifier,
 )
-from canshaper.inputs.feedback import Following
+from canshaper.inputs.value import Following
 from canshaper.shaping.reasons import REASON_TEXTS
 
 CYCLE_NS = 1_000_000_000

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import CLAIMED, group_of, name_bytes, pgn_of
 from canshaper.config.bus import J1939
-from canshaper.inputs.feedback import Following
 from canshaper.inputs.input import Key, MessageInput, Part
+from canshaper.inputs.value import Following
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
 from canshaper.protocols.interface import BusProtocol, DrivenAxis, FrameHandler

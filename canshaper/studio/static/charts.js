@@ -1,7 +1,7 @@
 // Command, sway and states of an axis: the last ten minutes, of which a part is shown.
 import { History } from "/static/history.js";
 import { nameOf, text } from "/static/language.js";
-import { Lanes, spans } from "/static/lanes.js";
+import { explain, Lanes, spans } from "/static/lanes.js";
 import { large } from "/static/theme.js";
 import uPlot from "/static/vendor/uplot.js";
 
@@ -34,6 +34,7 @@ export class Charts {
     this.stoppedAt = null; // the time up to which is shown, while paused
     this.at = null; // the time that is looked at, of a drive that is over
     this.onseek = null; // called with a time that was clicked at
+    explain(document.getElementById("levels"));
     this.build();
   }
 

@@ -118,6 +118,13 @@ export class Crane {
     this.write();
   }
 
+  /** Give it another name. */
+  rename(title) {
+    if (title === this.title) return;
+    this.title = title;
+    this.write();
+  }
+
   /** Its name above it, and that its sway is computed where no sensor measures it. */
   write() {
     const canvas = document.createElement("canvas");

@@ -16,6 +16,18 @@ const LOOKS = {
   bad: ["--bad", 2],
 };
 
+/** Say what the colours are. @param host where. */
+export function explain(host) {
+  host.replaceChildren(...Object.entries(LOOKS).map(([level, [color, lines]]) => {
+    const item = document.createElement("span");
+    const swatch = document.createElement("i");
+    swatch.style.setProperty("--color", `var(${color})`);
+    swatch.className = `hatch${lines}`;
+    item.append(swatch, text(`level.${level}`));
+    return item;
+  }));
+}
+
 /** From and to when a lane of the history was in which state, less `zero`; gaps where it is not known. */
 export function spans(history, lane, begin, end, zero) {
   const parts = [];

@@ -35,6 +35,11 @@ export function nameOf(kind, name) {
   return key in english ? text(key) : name.replaceAll("_", "-");
 }
 
+/** Name of a crane; the shaped one is not called so while its anti-sway is off. */
+export function craneName(name, shown) {
+  return name === "shaped" && shown?.antisway === false ? text("crane.off") : nameOf("crane", name);
+}
+
 /** What a state or reason of the daemon means; nothing in English, where it says so itself. */
 export function meaning(words) {
   const meaning = own[`term.${words}`];

@@ -82,7 +82,7 @@ function show(message) {
   if (mine) pill("seat", text(message.enable ? "seat.drive" : "seat.enable"), message.enable ? "ok" : "warn");
   else pill("seat", text(message.driver === null ? "seat.nobody" : "seat.other"), "warn");
   byId("take").hidden = mine;
-  for (const id of ["enable", "antisway", "reset", "profile"]) byId(id).disabled = !mine;
+  for (const id of ["enable", "stop", "antisway", "reset", "profile"]) byId(id).disabled = !mine;
   const profiles = Object.values(Object.values(message.cranes)[0].axes).map((axis) => axis.profile);
   byId("profile").querySelector("b").textContent = [...new Set(profiles.filter(Boolean))].join(" / ");
   byId("enable").setAttribute("aria-pressed", message.enable);
@@ -154,12 +154,14 @@ document.addEventListener("visibilitychange", () => {
 
 byId("take").onclick = () => link.send({ do: "take" });
 byId("enable").onclick = byId("hint").onclick = enable;
+byId("stop").onclick = actions.Space;
 byId("antisway").onclick = actions.KeyN;
 byId("reset").onclick = actions.KeyX;
 byId("profile").onclick = actions.KeyP;
 
 let readAt = null;
 let hiccupUntil = 0;
+let deflected = false; // whether a joystick was, when it was last read
 setInterval(() => {
   const now = performance.now();
   if (readAt !== null && drawn && !document.hidden && now - readAt > HICCUP_MS) hiccup(now - readAt, now);
@@ -168,17 +170,17 @@ setInterval(() => {
   if (link) fresh();
   if (!joysticks || !hello?.drives) return;
   const read = joysticks.read();
+  deflected = Object.values(read).some(Boolean);
   link.joysticks(shown?.driver === hello.page ? read : null);
 }, READ_MS);
 
-/** Say in large words that the page stood still. */
+/** Say that the page stood still: as an event, in large words where that stopped a drive. */
 function hiccup(ms, now) {
-  const drove = shown?.driver === hello.page && shown.enable;
   const stood = text("hiccup.stood", { s: (ms / 1000).toFixed(1) });
-  byId("hiccup").querySelector("b").textContent = stood;
-  byId("hiccup").querySelector("span").textContent = drove ? text("hiccup.drove") : "";
-  byId("hiccup").hidden = false;
   panel?.event(Date.now() / 1000, "page", stood, "warn", language);
+  if (!deflected || shown?.driver !== hello.page || !shown.enable) return;
+  byId("hiccup").querySelector("b").textContent = stood;
+  byId("hiccup").hidden = false;
   hiccupUntil = now + TOLD_MS;
 }
 

@@ -1,11 +1,12 @@
 // States, events, sliders and the large numbers.
 
-import { language, meaning, nameOf, spoken, text } from "/static/language.js";
+import { craneName, language, meaning, nameOf, spoken, text } from "/static/language.js";
 
 const MOST_EVENTS = 300;
 const OLD_S = 0.5;
 const SHOW_MS = 150; // no one reads faster
 const FILE = -1; // position of the slider of settings at which they are those of the file
+const URGENT = ["bad", "stop", "wait", "move", "ready"]; // levels of states, the first is said first
 
 const make = (tag, attributes = {}, ...children) => {
   const element = document.createElement(tag);
@@ -50,10 +51,10 @@ export class Panel {
     }
     const swings = document.getElementById("swings");
     this.swings = Object.fromEntries(hello.cranes.map((crane) => [crane,
-      { number: make("b", { id: `swing-${crane}` }, "–"), from: make("span", { className: "quiet" }), still: make("span", { id: `still-${crane}` }) }]));
+      { number: make("b", { id: `swing-${crane}` }, "–"), from: make("span", { className: "quiet" }), still: make("span", { id: `still-${crane}` }), why: make("span", { id: `why-${crane}`, className: "why" }), name: make("b") }]));
     // In the order in which the cranes stand in the picture.
-    swings.replaceChildren(...Object.entries(this.swings).map(([crane, { number, from, still }]) => {
-      const box = make("div", { className: "swing" }, make("b", {}, nameOf("crane", crane)), number, from, still);
+    swings.replaceChildren(...Object.entries(this.swings).map(([crane, { name, number, from, still, why }]) => {
+      const box = make("div", { className: "swing" }, name, number, from, still, why);
       box.style.setProperty("--color", `var(${hello.colors[crane]})`);
       return box;
     }));
@@ -62,7 +63,19 @@ export class Panel {
     sources.querySelector("ul").replaceChildren();
     this.sources = {};
     this.buildSliders(slide);
-    document.getElementById("events").replaceChildren();
+    const list = document.getElementById("events");
+    list.replaceChildren();
+    // The newest event stays in sight, also where the list gets another size, until a person scrolls up.
+    this.follows = true;
+    list.onscroll = () => { this.follows = list.scrollHeight - list.scrollTop - list.clientHeight < 30; };
+    this.sized?.disconnect();
+    this.sized = new ResizeObserver(() => this.follow());
+    this.sized.observe(list);
+  }
+
+  follow() {
+    const list = document.getElementById("events");
+    if (this.follows) list.scrollTop = list.scrollHeight;
   }
 
   buildSliders(slide) {
@@ -153,7 +166,9 @@ export class Panel {
     this.shownAt = now;
     this.mine = mine;
     for (const [name, crane] of Object.entries(shown.cranes)) {
-      const { number, from, still } = this.swings[name];
+      const { name: title, number, from, still, why } = this.swings[name];
+      set(title, craneName(name, shown));
+      this.showWhy(why, crane);
       const known = crane.swing != null && crane.sway;
       set(number, known ? `±${crane.swing.toFixed(1)}°` : "–");
       if (!known) set(from, text("swing.unknown"));
@@ -192,6 +207,22 @@ export class Panel {
     set(document.getElementById("note"), note);
   }
 
+  /** The state that matters most, of all axes, and why. */
+  showWhy(element, crane) {
+    const axes = Object.entries(crane.axes).filter(([, one]) => one.state);
+    const level = URGENT.find((one) => axes.some(([, axis]) => axis.level === one));
+    const those = axes.filter(([, one]) => one.level === level);
+    if (!those.length) {
+      element.dataset.level = "off";
+      set(element, text(crane.daemon ? "page.unknown" : "page.silent"));
+      return;
+    }
+    const [[axis, { state, reason }]] = those;
+    const words = [state, reason].filter(Boolean).map((one) => meaning(one) || one).join(": ");
+    element.dataset.level = level;
+    set(element, those.length < axes.length ? `${nameOf("axis", axis)} ${words}` : words);
+  }
+
   showSources(sources) {
     const list = document.querySelector("#sources ul");
     for (const [name, { per_s: rate, age_s: age }] of Object.entries(sources)) {
@@ -216,10 +247,9 @@ export class Panel {
   event(time, source, words, level, lang) {
     const list = document.getElementById("events");
     const stamp = this.hello.playback ? `${time.toFixed(2)} s` : new Date(time * 1000).toTimeString().slice(0, 8);
-    const down = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
     list.append(make("li", {}, make("time", {}, stamp), coloured(make("span", { className: "source" }, source === "page" ? text("event.page") : nameOf("crane", source)), this.hello.colors[source]),
       make("span", { className: level, lang }, words)));
     while (list.children.length > MOST_EVENTS) list.firstChild.remove();
-    if (down) list.scrollTop = list.scrollHeight;
+    this.follow();
   }
 }

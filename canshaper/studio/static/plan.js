@@ -112,7 +112,7 @@ export class Plan {
     const color = this.colors[this.hello.colors[name]];
     pen.font = "600 15px system-ui, sans-serif";
     pen.fillStyle = pen.strokeStyle = color;
-    pen.fillText(`${nameOf("crane", name)}: ${said(way)}`, 44, line);
+    pen.fillText(`${nameOf("crane", name)}: ${said(way)}`, 44, line, this.canvas.clientWidth - 52);
     if (!last) return;
     pen.lineWidth = 1;
     this.line(way.points.map((p) => at(p.tip)), [5, 3]);

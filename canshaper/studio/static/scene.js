@@ -1,7 +1,7 @@
 // The cranes in three dimensions. Inside `world` z is up, as in the model.
 import * as THREE from "/static/vendor/three.js";
 import { Crane, css } from "/static/crane.js";
-import { nameOf, text } from "/static/language.js";
+import { craneName, nameOf, text } from "/static/language.js";
 
 const APART_M = 6.4;
 const NEARER = 0.88;
@@ -110,7 +110,10 @@ export class Scene {
     // The smallest difference of the clocks is that of the quickest message.
     const offset = performance.now() / 1000 - shown.t;
     this.offset = this.offset === null || last?.t > shown.t ? offset : Math.min(offset, this.offset + 0.0005);
-    for (const [name, crane] of Object.entries(shown.cranes)) this.cranes[name]?.trace(this.hello, crane);
+    for (const [name, crane] of Object.entries(shown.cranes)) {
+      this.cranes[name]?.rename(craneName(name, shown));
+      this.cranes[name]?.trace(this.hello, crane);
+    }
   }
 
   draw(now) {

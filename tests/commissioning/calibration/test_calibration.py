@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
-from canshaper.codec.valve import ValveCodec
+from canshaper.codec.velocity import ValveCodec
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp

@@ -228,7 +228,7 @@ def test_a_wide_terminal_has_lines_over_time(deployment: Deployment) -> None:
     rows = text(monitor, NOW, width=200)
     assert max(map(len, rows)) <= 200
     first, second = rows[1], rows[2]
-    assert ("valve 100 %" in first, "sway 4.0 deg" in second) == (True, True)
+    assert ("to 100 %" in first, "to 4.0 deg" in second) == (True, True)
     line = first[first.index("100 %") + 5 :].strip()
     assert set(line) == {"█", "▅", "▁"}
     assert line.index("█") < line.index("▅") < line.index("▁")

@@ -66,6 +66,15 @@ def test_the_same_command_goes_on_at_the_first_open_step(machine: Path) -> None:
     assert "skipped" in commission("--list")
 
 
+def test_a_rehearsal_of_its_copy_goes_on_with_the_copy(machine: Path) -> None:
+    commission("--step", "buses", "--yes")
+    words = ["commission", str(COPY), "--simulated", "--step", "joysticks", "--yes"]
+    shown = CliRunner().invoke(app, words).output
+    assert not Path("machine.rehearsal.rehearsal.yaml").exists()
+    assert steps()["joysticks"]["status"] == "done"
+    assert "was changed since the copy was made" not in shown
+
+
 def test_another_crane_than_before_is_refused(machine: Path) -> None:
     commission(*CRANE, "--step", "buses", "--yes")
     shown = commission("--set", "grapple.l2_m=1.2", "--yes", code=2)

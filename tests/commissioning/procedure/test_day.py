@@ -57,7 +57,10 @@ def test_from_init_to_the_report(machine: Path, length_m: float) -> None:
     assert len(report) < MOST_REPORT_BYTES
     assert "REHEARSAL" in report
     assert f"grapple.l2_m={length_m}" in report
-    assert re.search(r"<td>residual sway [\d.]+ degrees without the filters, [\d.]+ with", report)
+    first = report.split("<h2>")[0]
+    assert re.search(r"[\d.]+ % of the swing is left: [\d.]+ degrees without the filters", first)
+    assert first.index("verdict") < first.index("<img ") < first.index(">date<")
+    assert "emergency stop pressed in motion" in first
     assert report.count("<img ") == 11
     for name, one in steps.items():
         assert name == "report" or f"<h2>{name}: done</h2>" in report

@@ -9,8 +9,8 @@ from canshaper.design.tuning.evaluate import Machine, evaluate, gff, press
 from canshaper.design.tuning.formulation import POLE_PER_RATE
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS, build_shaper
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.transfer import Off
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 WIDE = Machine(

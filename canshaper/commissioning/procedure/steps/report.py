@@ -21,6 +21,15 @@ from canshaper.report import html
 from canshaper.report.console import new_table
 
 NAME = "report"
+# What no program sees: tried by a person at the machine, and what should happen.
+HAND_TESTS = (
+    ("emergency stop pressed in motion", "every valve neutral at once"),
+    ("enable let go in motion", "neutral at once, TRIPPED"),
+    ("joystick's plug pulled in motion", "a shaped stop within timeout_ms and stop_s"),
+    ("daemon killed in motion", "the valves stop by their own timeout"),
+    ("full deflection and let go, empty", "the grapple hangs still"),
+    ("the same with a load", "the grapple hangs still"),
+)
 
 
 def run(context: Context) -> Outcome:
@@ -55,31 +64,48 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     if state.simulated:
         title += ": REHEARSAL, nothing in it is of a machine"
         crane.append(("simulated crane", " ".join(state.changes) or "the nominal one"))
-    facts = [*_result(steps), *crane, *html.facts(deployment, datetime.now().astimezone())]
+    facts = [*crane, *html.facts(deployment, datetime.now().astimezone())]
     summary = new_table("step", "is", "at", "canshaper", title="Steps")
     for name, one in steps.items():
         done = one.status is Status.DONE
         summary.add_row(name, _standing(one) if done else one.status.value, one.at, one.version)
     if assumed := deployment.config.assumed:
-        facts.insert(0, ("NOT FIT TO SIGN", f"assumed, not measured: {', '.join(assumed)}"))
+        facts.append(("assumed, not measured", ", ".join(assumed)))
+    by_hand = new_table("by hand", "expected", "seen", "by", title="Hand tests, to fill in")
+    for test, expected in HAND_TESTS:
+        by_hand.add_row(test, expected, "", "")
     numbers = new_table("number", "is", "by", title="Origins")
     for row in origins(deployment.config):
         numbers.add_row(*row)
-    parts = [html.table(summary), html.table(numbers)]
+    parts = [html.table(by_hand), html.table(summary), html.table(numbers)]
     for name, one in steps.items():
         parts += _step(name, one, folder)
-    return html.document(title, facts, parts)
-
-
-def _result(steps: dict[str, Record]) -> list[tuple[str, str]]:
-    """Return the result of the day, where it was measured: the swing that is left."""
     drive = steps.get(DRIVE.name)
-    crane = drive.numbers.get("crane") if drive and drive.status is Status.DONE else None
-    if not crane:
-        return []
-    before, after = (crane[f"residual_{when}_deg"] for when in ("before", "after"))
-    text = f"residual sway {before} degrees without the filters, {after} with them"
-    return [("before, after", f"{text}: {crane['residual_left_pct']:g} % left")]
+    first = [
+        html.verdict(_verdict(deployment, steps)),
+        *(_pictures(drive, folder) if drive else []),
+    ]
+    return html.document(title, facts, parts, first)
+
+
+def _verdict(deployment: Deployment, steps: dict[str, Record]) -> str:
+    """The result of the day in one sentence: the swing that is left, and what is missing."""
+    drive = steps.get(DRIVE.name)
+    done = drive if drive and drive.status is Status.DONE else None
+    if done and (crane := done.numbers.get("crane")):
+        before, after = (crane[f"residual_{when}_deg"] for when in ("before", "after"))
+        swing = f"{crane['residual_left_pct']:g} % of the swing is left"
+        swing += f": {before} degrees without the filters, {after} with them"
+    else:
+        swing = f"the swing that is left was not measured{f': {done.why}' if done else ''}"
+    missing = []
+    if assumed := deployment.config.assumed:
+        missing.append(f"{len(assumed)} values are assumed, not measured")
+    if undone := [name for name, one in steps.items() if one.status is not Status.DONE]:
+        missing.append(f"not done: {', '.join(undone)}")
+    if missing:
+        return f"NOT FIT TO SIGN: {'; '.join(missing)}; {swing}."
+    return f"Fit to sign after the hand tests: {swing}."
 
 
 def _standing(one: Record) -> str:
@@ -94,14 +120,18 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
         again = shown(part)
         parts.append(html.text(again) if isinstance(again, str) else html.table(again))
     parts += [html.text(f"NOT ENOUGH DATA: {fault}") for fault in one.poor]
-    paths = [folder / picture for picture in one.pictures]
-    drawings = {path.stem for path in paths if path.suffix == ".svg"}
-    for path in paths:
-        if path.suffix == ".svg" or path.stem not in drawings:
-            parts.append(embedded(path))
+    if name != DRIVE.name:  # that one is on the first page
+        parts += _pictures(one, folder)
     if one.diff:
         parts += [html.text("Written:"), html.listing(one.diff)]
     return parts
+
+
+def _pictures(one: Record, folder: Path) -> list[str]:
+    """Pictures of a step: drawings, and dots of what has no drawing."""
+    paths = [folder / picture for picture in one.pictures]
+    drawings = {path.stem for path in paths if path.suffix == ".svg"}
+    return [embedded(one) for one in paths if one.suffix == ".svg" or one.stem not in drawings]
 
 
 REPORT = Step(

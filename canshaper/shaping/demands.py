@@ -1,13 +1,18 @@
-"""End stops: an axis is slowed down so that its filter's run-on ends ahead of them.
+"""Demands in front of the filters: bounded ahead of end stops, and scaled by the oil there is.
 
-A stop takes its speed from the tip at once, and the grapple swings. So the demand is bounded in
-front of the filter: by the distance that is left once everything has come that the axis still asks
-for without any demand. It dies away with ``TIME_S``, the filter shapes that as any other demand,
-and an operator can creep up to the stop.
+A stop takes its speed from the tip at once, and the grapple swings. So the demand is bounded by the
+distance that is left once everything has come that the axis still asks for without any demand. It
+dies away with ``TIME_S``, the filter shapes that as any other demand, and an operator can creep up
+to the stop.
+
+A filter cancels the swing of the speeds that it asks for. Where the pump delivers less, the valves
+give other speeds, and swing is left. So the demands of all axes are scaled by one factor: the tip
+goes where the operator points, only slower.
 """
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import mul
 
@@ -124,3 +129,49 @@ def bounds(room: tuple[float, float], displaced: float) -> tuple[float, float]:
     low = (back + max(displaced, 0.0)) / TIME_S
     high = (ahead + min(displaced, 0.0)) / TIME_S
     return min(max(low, -1.0), 0.0), max(min(high, 1.0), 0.0)
+
+
+# The factor falls at once: oil that is not there comes from no valve. It rises so slowly that the
+# operator sees no jump where another axis stops.
+RISE_S = 0.5
+
+
+class FlowBudget:
+    """The factor of all demands, tick by tick.
+
+    Args:
+        shares: of each axis at full speed, full axis flows.
+        tick_s: time between two calls of ``step``.
+
+    Attributes:
+        scale: the factor, 0 to 1.
+    """
+
+    __slots__ = ("_rise", "_shares", "scale")
+
+    def __init__(self, shares: Sequence[float], tick_s: float) -> None:
+        self._shares = shares
+        self._rise = tick_s / RISE_S
+        self.scale = 1.0
+
+    def step(
+        self, flow: float, demands: Sequence[float], outputs: Sequence[float], ticks: int = 1
+    ) -> float:
+        """Find the factor of this tick.
+
+        An axis whose demand has ended, or was reversed, still asks for what its filter lets run on.
+
+        Args:
+            flow: what the pump delivers, full axis flows, less what others take.
+            demands: of the operator, by axis, [-1, 1].
+            outputs: velocities sent in the last tick, by axis, [-1, 1] of full speed.
+            ticks: that have passed; more than 1 where deadlines were missed.
+        """
+        asked, free = 0.0, flow
+        for share, demand, output in zip(self._shares, demands, outputs, strict=True):
+            asked += share * abs(demand)
+            if demand * output <= 0.0:
+                free -= share * abs(output)
+        wanted = max(free, 0.0) / asked if asked > max(free, 0.0) else 1.0
+        self.scale = min(wanted, self.scale + self._rise * ticks)
+        return self.scale

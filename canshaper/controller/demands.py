@@ -1,15 +1,62 @@
-"""The oil of one pump, shared by the demands of all axes."""
+"""What bounds or scales the demands of axes before they act: end stops, the oil of one pump."""
 
 from collections.abc import Iterator, Mapping
 
 from canshaper.config.limits import Hydraulics
-from canshaper.controller.events import FlowEvent, ValueEvent
+from canshaper.controller.events import ValueEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import Value
-from canshaper.shaping.flow_budget import FlowBudget
+from canshaper.shaping.demands import UNBOUNDED, EndStops, FlowBudget, bounds
 from canshaper.shaping.limits import within
 from canshaper.shaping.states import Reason, State
+
+
+class AxisEnds:
+    """Bounds the demands of an axis before it acts.
+
+    Args:
+        runner: the axis; it has ends.
+        position: its measured position.
+    """
+
+    __slots__ = ("_known", "_position", "_run_on", "_runner", "_stops")
+
+    def __init__(self, runner: AxisControl, position: Value) -> None:
+        config = runner.bound.config.limits.ends
+        assert config is not None
+        margin, lag_s = config.margin, config.lag_ms / 1000.0
+        self._runner, self._position = runner, position
+        self._stops = EndStops(
+            config.lowest + margin, config.highest - margin, config.full_speed, lag_s
+        )
+        self._run_on = runner.follow_run_on()
+        self._known = True
+
+    def step(self, now_ns: int) -> ValueEvent | None:
+        """Bound the demand of this tick.
+
+        Without a position nothing is bounded: the axis is as if it had no ends.
+
+        Args:
+            now_ns: monotonic time.
+
+        Returns:
+            Whether the position is known, where that has changed.
+        """
+        runner, position = self._runner, self._position.fresh(now_ns)
+        axis = runner.axis
+        if position is None:
+            runner.room = axis.bounds = UNBOUNDED
+        else:
+            runner.room = self._stops.room(position, axis.sent, self._run_on.travel())
+            axis.bounds = bounds(runner.room, runner.displaced)
+        known = position is not None
+        if known is self._known:
+            return None
+        self._known = known
+        return ValueEvent(f"axis={runner.bound.name} ends", "known" if known else "lost")
+
 
 # States in which a deflected joystick moves the axis, in this tick or already.
 DRIVEN = (State.READY, State.ACTIVE, State.BYPASS_ON)
@@ -46,7 +93,7 @@ class SharedFlow:
         self._enough = round(ENOUGH_S / tick_s)
         self._ticks = self._enough  # since it was scaled last
 
-    def step(self, now_ns: int, ticks: int) -> Iterator[FlowEvent | ValueEvent]:
+    def step(self, now_ns: int, ticks: int) -> Iterator[ValueEvent]:
         """Scale the demands of this tick, and yield what is to be reported.
 
         Args:
@@ -78,4 +125,5 @@ class SharedFlow:
         before = self._ticks
         self._ticks = 0 if scale < 1.0 else before + ticks
         if before >= self._enough > self._ticks or before < self._enough <= self._ticks:
-            yield FlowEvent(scale)
+            state = "enough" if scale == 1.0 else f"scaled speed_pct={100.0 * scale:.0f}"
+            yield ValueEvent("hydraulics", state)

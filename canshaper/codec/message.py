@@ -1,0 +1,249 @@
+"""A message with its protection: the frames that we send of it, and the check of those received.
+
+Protection is an alive counter and a checksum, or a profile of AUTOSAR E2E. The rule of the counter
+is that of E2E: a step of 1 up to a largest one is good (some were lost), 0 is a repetition and no
+news, a larger one is a wrong sequence.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+from cantools.database.can import Message, Signal
+
+from canshaper.checksums.kinds import Checksum
+from canshaper.codec.frame import Frame, FrameFault, new_frame
+from canshaper.codec.identifier import with_source
+from canshaper.codec.layout import Layout, is_j1939
+from canshaper.codec.signals import raw_limits
+
+if TYPE_CHECKING:
+    from canshaper.codec.e2e import E2e
+
+# Two frames may be lost in a row; more is no longer the noise of a bus.
+USUAL_MAX_STEP = 3
+GOOD = FrameFault.NONE  # by way of the class it takes ten times as long
+
+
+@dataclass(frozen=True, slots=True)
+class Protection:
+    """Protection of one message, as it is bound.
+
+    Attributes:
+        counter: signal of the alive counter, where it is one.
+        counts: values of the counter, of that signal or of E2E; 0 where there is no counter.
+        check: what protects the content.
+    """
+
+    counter: str | None = None
+    counts: int = 0
+    check: "Checksum | E2e | None" = None
+
+
+UNPROTECTED = Protection()
+
+
+class FieldSet:
+    """Physical values to the raw fields of one message; what is not set keeps its start value.
+
+    That is GenSigStartValue; without one 0, in messages of J1939 all bits 1: not available.
+
+    Attributes:
+        message: the message.
+        layout: where its signals lie.
+        start: raw start value of every signal.
+    """
+
+    def __init__(self, message: Message) -> None:
+        self.message = message
+        self.layout = Layout(message)
+        self.start: dict[str, Any] = {
+            s.name: self._start(s, is_j1939(message)) for s in message.signals
+        }
+        self._fields = {
+            s.name: (s.scale, s.offset, *raw_limits(s)) for s in message.signals if not s.is_float
+        }
+
+    @staticmethod
+    def _start(signal: Signal, all_ones: bool) -> int | float:
+        """GenSigStartValue (a raw value), within the bits of the signal."""
+        if signal.is_float:
+            return float(signal.raw_initial or 0.0)
+        low, high = raw_limits(signal)
+        if all_ones and signal.raw_initial is None:
+            return -1 if signal.is_signed else high
+        return min(max(int(signal.raw_initial or 0), low), high)
+
+    def raw(self, name: str, value: float) -> int:
+        """Raw value nearest to a physical one, held within the bits of the signal.
+
+        Held, not refused: a status beyond its range shall still be seen.
+        """
+        scale, offset, low, high = self._fields[name]
+        return min(max(round((value - offset) / scale), low), high)
+
+    def value(self, name: str, raw: float) -> float:
+        """Physical value of a raw one."""
+        scale, offset, _, _ = self._fields[name]
+        return raw * scale + offset
+
+
+class SentMessage:
+    """One message as it is bound; nothing of it changes afterwards.
+
+    Args:
+        bus: name of the bus.
+        message: its definition.
+        source: source address, for messages of J1939 instead of that of the DBC.
+        protection: that of its frames.
+
+    Attributes:
+        key: bus, id and whether that is extended.
+        fields: its signals.
+        protection: that of its frames.
+        rewrites: whether they are a joystick's on their way through a gateway.
+        start: raw value of every signal at first; valve codecs put neutral in while they are bound.
+    """
+
+    rewrites = False
+
+    def __init__(
+        self,
+        bus: str,
+        message: Message,
+        source: int | None = None,
+        protection: Protection = UNPROTECTED,
+    ) -> None:
+        can_id = message.frame_id
+        if source is not None and is_j1939(message):
+            can_id = with_source(can_id, source)
+        self.key = bus, can_id, message.is_extended_frame
+        self.fields = FieldSet(message)
+        self.protection = protection
+        self.start: dict[str, Any] = dict(self.fields.start)
+
+    def sender(self) -> "Sender":
+        """Make its sender, with the counter at the beginning."""
+        return Sender(self)
+
+
+class Sender:
+    """Sends one message: every frame is the next one, protected.
+
+    Attributes:
+        key: bus, id and whether that is extended.
+        fields: its signals.
+        raw: raw value of every signal, changed by those who put values in.
+    """
+
+    def __init__(self, message: SentMessage) -> None:
+        self.key, self.fields = message.key, message.fields
+        self._bus, self._id, self._extended = message.key  # quicker than to unpack it each time
+        protection = message.protection
+        self._counter, self._counts = protection.counter, protection.counts
+        self._check = protection.check
+        self._encode = message.fields.layout.encode
+        self._count = 0
+        self.raw = dict(message.start)
+
+    def frame(self, values: Mapping[str, Any] | None = None) -> Frame:
+        """Return the next frame.
+
+        Args:
+            values: raw values for this frame alone, by signal.
+
+        Raises:
+            OverflowError: a value is not within the bits of its signal.
+        """
+        raw = {**self.raw, **values} if values else self.raw
+        if self._counts:
+            self._count = (self._count + 1) % self._counts
+            if self._counter is not None:
+                raw[self._counter] = self._count
+        data = self._encode(raw)
+        if self._check is not None:
+            data = self._check.protect(data, self._count)
+        return new_frame(Frame, (self._bus, self._id, self._extended, data))
+
+    def take_back(self) -> None:
+        """Reuse the count of the last frame, which did not leave, for the next one."""
+        self._count = (self._count - 1) % self._counts if self._counts else 0
+
+    def instead(self, frame: Frame) -> Frame:
+        """Make the frame in the place of the last one, which was not sent: with the same count."""
+        self.take_back()
+        return self.frame()
+
+    def copy_state(self, before: Self) -> None:
+        """Go on with the counter where ``before`` stands; from 0 where it is another counter."""
+        if (self._counter, self._counts) == (before._counter, before._counts):
+            self._count = before._count
+
+
+class SequenceChecker:
+    """Checks the sequence and the content of the frames of one message that is received.
+
+    Args:
+        protection: that of the message.
+        max_step: largest step of the counter that is still the next one; None for the usual one.
+        qualify: good frames in a row that are needed at the start and after a wrong one.
+
+    Attributes:
+        qualified: whether the last frame, found good, may be used: enough have come in a row.
+    """
+
+    def __init__(self, protection: Protection, max_step: int | None, qualify: int) -> None:
+        self._protection = protection
+        self._range = protection.counts
+        self._max_step = max_step or min(USUAL_MAX_STEP, protection.counts // 2)
+        self._check = protection.check
+        # Without a signal for it, the counter is that of E2E, in its header.
+        self._header: Any = None if protection.counter else protection.check
+        self._qualify = qualify
+        self._last: int | None = None
+        self._resynced = True
+        self._good = 0
+        self.qualified = False
+
+    def copy_state(self, before: Self) -> None:
+        """Continue the sequence of the same message, where its protection is the same."""
+        if self._protection == before._protection:
+            self._last, self._resynced, self._good = before._last, before._resynced, before._good
+            self.qualified = self._good >= self._qualify
+
+    def resync(self) -> None:
+        """Accept any counter but the last one next, because the sender was silent."""
+        self._resynced = True
+        self._requalify()
+
+    def check(self, data: bytes, count: int) -> FrameFault:
+        """Check a frame of the right length, and return its fault.
+
+        Args:
+            data: its bytes.
+            count: value of its alive counter; E2E has one of its own, which counts instead.
+        """
+        if self._check is not None and not self._check.verify(data):
+            self._requalify()
+            return FrameFault.CHECKSUM
+        if self._range:
+            if self._header is not None:
+                count = self._header.count(data)
+            last = self._last
+            self._last = count
+            if last is not None:
+                step = (count - last) % self._range
+                if step == 0:
+                    return FrameFault.COUNTER_REPEATED
+                if step > self._max_step and not self._resynced:
+                    self._requalify()
+                    return FrameFault.COUNTER_JUMP
+            self._resynced = False
+        if not self.qualified:
+            self._good += 1
+            self.qualified = self._good >= self._qualify
+        return GOOD
+
+    def _requalify(self) -> None:
+        self._good = 0
+        self.qualified = False

@@ -1,0 +1,92 @@
+"""What the clients of the control socket may ask of a running machine, and who asked for what."""
+
+import logging
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from canshaper.blackbox.keeper import BlackBox
+from canshaper.blackbox.recorder import Recorder
+from canshaper.controller.adjust import Adjuster
+from canshaper.controller.controller import Controller
+from canshaper.daemon.control_server import ControlServer
+from canshaper.daemon.reporter import Reporter
+from canshaper.machine.deployment import Deployment
+
+log = logging.getLogger("canshaper")
+
+
+class Control:
+    """The control socket of a deployment.
+
+    Args:
+        server: its socket.
+        controller: the machine.
+        recorder: takes the numbers that were changed.
+        black_box: takes requests for a file.
+        reporter: knows state, counters and lateness.
+    """
+
+    def __init__(
+        self,
+        server: ControlServer,
+        controller: Controller,
+        recorder: Recorder,
+        black_box: BlackBox,
+        reporter: Reporter,
+    ) -> None:
+        self._server, self._recorder, self._black_box = server, recorder, black_box
+        self._reporter = reporter
+        self._adjuster = Adjuster(controller)
+
+    def serve(self, now_ns: int) -> None:
+        """Answer one request, where one waits."""
+        self._server.serve(self._answer, now_ns)
+
+    def close(self) -> None:
+        """End; the path of the socket is free again."""
+        self._server.close()
+
+    def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
+        values = request.get("set", {})
+        if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
+            peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
+        if request.keys() - {"set", "black_box", "by", "status"} or not isinstance(values, dict):
+            expected = '{} or {"set": {KEY: VALUE}}, {"black_box": "write"}, {"status": true}'
+            raise ValueError(f"expected {expected}, got another object")
+        if "black_box" in request:
+            if request["black_box"] == "write":
+                self._black_box.request()
+                log.info("black-box=requested %s", peer)
+            return {"black_box": self._black_box.report()}
+        if "status" in request:
+            return {"status": self._reporter.numbers()}
+        if "set" in request:
+            try:
+                changes = self._adjuster.change(values)
+            except ValueError as error:
+                log.warning("set=refused %s %s", peer, error)
+                raise
+            self._recorder.set(values)
+            for change in changes:
+                log.info("set %s %s", change, peer)
+        return {"adjustable": self._adjuster.table()}
+
+
+def open_control(
+    deployment: Deployment,
+    controller: Controller,
+    recorder: Recorder,
+    black_box: BlackBox,
+    reporter: Reporter,
+) -> Control | None:
+    """Open the control socket that a file has; None where it cannot: the machine works without."""
+    control = deployment.config.control
+    assert control is not None  # asked for such deployments only
+    path = control.path(deployment.path)
+    try:
+        server = ControlServer(path, int(control.mode, 8))
+    except OSError as error:
+        log.warning("control=none socket=%s %s", path, error.strerror or error)
+        return None
+    return Control(server, controller, recorder, black_box, reporter)

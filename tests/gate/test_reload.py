@@ -1,0 +1,93 @@
+"""The gate over a reload: a latch stays latched; good news has to come again."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tests.faults import variants
+from tests.gate.bench import Bench, bench
+
+
+def reloaded(one: Bench, *reopened: str, **changed: Any) -> Bench:
+    after = Bench(replace(one.deployment, **changed), "near_far")
+    after.number, after.hand = one.number, one.hand
+    after.sender = one.sender
+    after.gate.carry_over(one.gate, frozenset(reopened))
+    return after
+
+
+def test_a_trip_and_a_second_sender() -> None:
+    one = bench()
+    one.ramp(60, near_far=1.0)
+    assert one.sends(-60, near_far=1.0)
+    one.gate.receive(one.gate.axes["lift"].of.valve, bytes(2), one.now_ns)
+    after = reloaded(one)
+    assert after.gate.axes["lift"].foreign_ns == one.now_ns
+    after.rests(10)
+    assert not after.restarts(10, near_far=0.5)
+    after.rests(3, enable=False)
+    after.rests()
+    assert not after.sends(10, near_far=0.5)
+
+
+def test_a_trip_that_no_tick_has_seen() -> None:
+    one = bench()
+    one.ramp(60, near_far=1.0)
+    one.receive(one.joysticks(enable=False))
+    after = reloaded(one)
+    assert after.axis.hard == "enable"
+    assert after.axis.joystick.pressed.released
+
+
+def test_an_emergency_stop_that_is_held() -> None:
+    deployment = variants.machine("protected")[1]
+    one = Bench(deployment, "near_far")
+    one.rests(10)
+    stop = deployment.emergency_stop
+    assert stop is not None
+    assert stop.protection.check is not None
+    pressed = stop.protection.check.protect(b"\1\1", 0)
+    one.gate.receive(stop.key, pressed, one.now_ns)
+    after = reloaded(one)
+    assert after.axis.latches
+    after.axis.hard, after.axis.latches = "", False  # as if a tick had seen it before
+    after.gate.tick(after.now_ns, 0)
+    assert after.axis.latched
+
+
+def test_counters_go_on() -> None:
+    one = bench()
+    one.rests(5)
+    count = one.gate.counts[one.key]
+    after = reloaded(one)
+    assert after.gate.counts[one.key] == count
+    assert after.axis.joystick.received.count == one.axis.joystick.received.count
+    assert after.axis.joystick.received.good_ns is None
+    assert after.axis.joystick.received.intact_ns is not None
+    after = reloaded(one, "crane")
+    assert after.axis.joystick.received.intact_ns is None
+
+
+def test_of_another_machine_nothing_is_carried_over(tmp_path: Path) -> None:
+    one = bench()
+    one.ramp(60, near_far=1.0)
+    assert one.sends(-60, near_far=1.0)
+    buses = {"crane": one.deployment.config.buses["crane"].model_copy(update={"channel": "x"})}
+    config = one.deployment.config.model_copy(update={"buses": buses})
+    after = reloaded(one, config=config)
+    assert after.gate.counts == {}
+    assert after.axis.joystick.received.count is None
+    assert after.axis.latched  # an axis is known by its name too
+
+
+def test_another_protection_begins_anew() -> None:
+    one = bench()
+    one.rests(5)
+    message = one.gate.messages["left"]
+    message.of = replace(message.of, protection=replace(message.of.protection, counts=16))
+    valve, axes = one.gate.valves[one.key]
+    other = replace(valve.protection, counts=16)
+    one.gate.valves[one.key] = replace(valve, protection=other), axes
+    after = reloaded(one)
+    assert after.gate.messages["left"].count is None
+    assert one.key not in after.gate.counts

@@ -1,0 +1,353 @@
+"""``canshaper shift``: figures of logs whose numbers are known, and of the simulator's operator."""
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from canshaper.campaign.run import Source
+from canshaper.campaign.work import Work, do_work, learn
+from canshaper.cli.app import app
+from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
+from canshaper.recording.replay import look
+from canshaper.recording.shift import LogOfWork, Shifts, first_ns
+from canshaper.report.shift import FIGURES, Figures, WorkCounter
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.operator_model import Skill
+from canshaper_sim.recorder import Recorder
+from tests.blackbox.driven import SECOND, TRIP, drive
+from tests.controller.test_profiles import BUTTON, FAST, SLEW
+from tests.daemon.bench import Bench
+from tests.recording.shift_logs import (
+    MONDAY_S,
+    ROOT,
+    Part,
+    dbc,
+    lines,
+    swing_deg,
+    tip_m_s,
+    waited_s,
+    written,
+)
+
+HOUR_S = 3600.0
+CONFIG, DBC = ROOT / "config", ROOT / "dbc"
+# Out, a tap on the way, a tap back against one, and the way back: one cycle. Then with anti-sway
+# off: near-far alone.
+OUT = [Part(1.0), Part(3.0, (100, 0), (80, 0)), Part(4.0)]
+TAPS = [Part(0.4, (-50, 0), (-48, 0)), Part(0.2), Part(0.4, (50, 0), (48, 0)), Part(5.0)]
+BACK = [Part(3.0, (-100, 0), (-80, 0)), Part(6.0)]
+SHORT = [Part(0.5), Part(0.5, (100, 0), (80, 0)), Part(0.2)]
+CYCLE = [*OUT, *TAPS, *BACK]
+OFF = [Part(2.0, (0, 100), (0, 60), "BYPASS_ON"), Part(6.0, state="READY")]
+
+
+def counted(*logs: Path, file: str = "forwarder.yaml", by: str = "gap") -> tuple[Any, list[str]]:
+    """Rows and notes of logs, in their order."""
+    shifts, notes, deployment = Shifts(by, HOUR_S), [], loader(file)()
+    for log in logs:
+        drive = look(deployment, log, {}, own=False)
+        opened = LogOfWork("", log.name, first_ns(drive), deployment, drive)
+        notes += shifts.add(opened, lambda _part: None)
+    return shifts.rows(), notes
+
+
+def test_figures_are_those_that_the_log_was_made_with(tmp_path: Path) -> None:
+    parts = [*CYCLE, *OFF]
+    (on, off), notes = counted(written(tmp_path / "a.log", parts))
+    assert notes == ["no valve frames of lift: taken is what the file would send"]
+    assert list(on) == list(FIGURES)
+    assert (on["shift"], on["anti_sway"], off["anti_sway"]) == ("2026-09-21 14:13", "on", "off")
+    swing = swing_deg(parts)
+    first = round(sum(part.seconds for part in CYCLE) / 0.02)
+    way_m = 6.0 * tip_m_s(80, "slew") + 0.8 * tip_m_s(48, "slew")
+    assert on["way_m"] == pytest.approx(way_m, rel=0.01)
+    assert off["way_m"] == pytest.approx(2.0 * tip_m_s(60, "near_far"), rel=0.015)
+    assert on["driven_s"] == pytest.approx(6.8, abs=0.07)
+    assert on["logged_s"] + off["logged_s"] == pytest.approx(30.0, abs=0.07)
+    assert (on["cycles"], on["taps"], on["reversals"]) == (1, 2, 1)
+    assert (off["cycles"], off["taps"], off["reversals"]) == (0, 0, 0)
+    assert on["peak_deg"] == pytest.approx(max(swing[:first]), abs=0.2)
+    assert off["peak_deg"] == pytest.approx(max(swing[first:]), abs=0.2)
+    on_s = waited_s(CYCLE, swing)
+    assert on["waiting_s"] == pytest.approx(on_s, abs=0.1)
+    assert off["waiting_s"] == pytest.approx(waited_s(parts, swing) - on_s, abs=0.1)
+    assert on_s > 10.0
+    assert on["measured_pct"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("parts", "taps", "reversals"),
+    [
+        ([Part(0.6, (40, 0)), Part(1.0)], 1, 0),
+        ([Part(0.8, (40, 0)), Part(1.0)], 0, 0),
+        ([Part(1.0, (40, 0)), Part(1.0, (-40, 0)), Part(1.0)], 0, 1),
+        ([Part(1.0, (40, 0)), Part(0.4), Part(1.0, (-40, 0)), Part(1.0)], 0, 1),
+        ([Part(1.0, (40, 0)), Part(0.6), Part(1.0, (-40, 0)), Part(1.0)], 0, 0),
+        ([Part(1.0, (40, 0)), Part(0.4), Part(1.0, (40, 0)), Part(1.0)], 0, 0),
+        ([Part(0.4, (40, 0)), Part(0.4, (0, 40)), Part(1.0)], 2, 0),
+        ([Part(0.4, (1.5, 0)), Part(1.0)], 0, 0),  # within the neutral band
+    ],
+)
+def test_what_a_tap_and_a_reversal_are(
+    tmp_path: Path, parts: list[Part], taps: int, reversals: int
+) -> None:
+    (row,), _ = counted(written(tmp_path / "a.log", [Part(1.0), *parts]))
+    assert (row["taps"], row["reversals"]) == (taps, reversals)
+
+
+@pytest.mark.parametrize(("seconds", "cycles"), [((3, 3, 3, 3), 2), ((3, 3, 3), 1), ((1.5, 3), 0)])
+def test_what_a_cycle_is(tmp_path: Path, seconds: tuple[float, ...], cycles: int) -> None:
+    """At 1.18 m/s: 2 m take 1.7 s; a shorter way back belongs to the way there."""
+    parts = [Part(1.0)]
+    for number, one in enumerate(seconds):
+        sign = (-1) ** number
+        short = [Part(1.0, (-50 * sign, 0), (-80 * sign, 0)), Part(0.5)]
+        parts += [Part(one, (50 * sign, 0), (80 * sign, 0)), *short, short[0]._replace(seconds=0.5)]
+        parts += [Part(1.5, (50 * sign, 0), (80 * sign, 0))]
+    if cycles == 0:
+        parts = [Part(1.0), Part(3.0, (50, 0), (80, 0)), Part(1.5, (-50, 0), (-80, 0)), Part(1.0)]
+    (row,), _ = counted(written(tmp_path / "a.log", parts))
+    assert row["cycles"] == cycles
+
+
+def test_valve_frames_of_another_controller_are_no_anti_sway(tmp_path: Path) -> None:
+    parts = [part._replace(state=None) for part in CYCLE]
+    (row,), notes = counted(written(tmp_path / "a.log", parts))
+    assert row["anti_sway"] == "off"
+    assert "valve frames but no status of slew, near_far: without anti-sway" in notes
+    assert row["peak_deg"] == pytest.approx(max(swing_deg(parts)), abs=0.2)
+
+
+def test_without_valve_frames_it_is_what_the_file_would_send(tmp_path: Path) -> None:
+    (row,), notes = counted(written(tmp_path / "a.log", CYCLE, valves=False))
+    assert notes[0].startswith("no valve frames of slew, near_far, lift")
+    assert (row["anti_sway"], row["cycles"], row["taps"]) == ("on", 1, 2)
+    assert 7.0 < row["way_m"] < 12.0  # full speed, less what the filter leaves of taps
+
+
+def test_a_valve_without_frames_closes(tmp_path: Path) -> None:
+    """Its timeout is 200 ms. Until then the crane is driven, though no joystick is held."""
+    path = written(tmp_path / "a.log", [Part(1.0), Part(2.0, (0, 0), (80, 0))])
+    with path.open("a") as log:
+        log.writelines(lines([Part(3.0)], MONDAY_S + 3.0, valves=False))
+    (row,), _ = counted(path)
+    assert row["way_m"] == pytest.approx(2.2 * tip_m_s(80, "slew"), abs=0.06)
+    assert row["driven_s"] == pytest.approx(2.2, abs=0.05)
+
+
+def test_an_axis_that_was_never_ready_is_said(tmp_path: Path) -> None:
+    log = written(tmp_path / "a.log", OUT, valves=False, Enable=0)
+    (row,), notes = counted(log)
+    assert "slew was never ready: enable is off (ENABLE_OFF)" in notes
+    assert (row["way_m"], row["taps"], row["anti_sway"]) == (0.0, 0, "")
+
+
+def test_shifts_end_with_an_hour_without_a_frame_a_day_or_a_log(tmp_path: Path) -> None:
+    begins = (MONDAY_S, MONDAY_S + 600.0, MONDAY_S + 2.5 * HOUR_S, MONDAY_S + 24 * HOUR_S)
+    logs = [written(tmp_path / f"{k}.log", SHORT, at) for k, at in enumerate(begins)]
+    rows, _ = counted(*logs)
+    assert [row["shift"] for row in rows] == [
+        "2026-09-21 14:13",
+        "2026-09-21 16:43",
+        "2026-09-22 14:13",
+    ]
+    assert rows[0]["logged_s"] == pytest.approx(2 * rows[1]["logged_s"])
+    rows, _ = counted(*logs, by="day")
+    assert [row["shift"] for row in rows] == ["2026-09-21", "2026-09-22"]
+    rows, _ = counted(*logs, by="file")
+    assert [row["shift"] for row in rows] == ["0.log", "1.log", "2.log", "3.log"]
+
+
+def test_a_pause_within_a_log_ends_a_shift_too(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.log", OUT)
+    with path.open("a") as log:
+        later = written(tmp_path / "b.log", CYCLE, MONDAY_S + 2 * HOUR_S)
+        log.write(later.read_text())
+    rows, _ = counted(path)
+    assert [row["cycles"] for row in rows] == [0, 1]
+    assert rows[1]["logged_s"] == pytest.approx(23.0 + 1.0, abs=0.1)  # a second ahead of it
+    # It swings on for the 12 s of which a replay has ticks; then nothing is known.
+    assert rows[0]["waiting_s"] == pytest.approx(16.0, abs=0.1)
+
+
+def test_a_grapple_calms_while_a_log_pauses(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.log", [Part(0.5), Part(1.0, (100, 0), (80, 0)), Part(1.0)])
+    with path.open("a") as log:
+        log.writelines(lines([Part(1.0, state="READY")], MONDAY_S + 600.0))
+    (row,), _ = counted(path)
+    assert 10.0 < row["waiting_s"] < 14.5  # the last second, and 12 s of which there are ticks
+
+
+def test_where_the_status_ends_canshaper_does_not_drive(tmp_path: Path) -> None:
+    silent = Part(2.1, state=None), Part(1.0, (50, 0), (80, 0), None)
+    rows, _ = counted(written(tmp_path / "a.log", [*SHORT, *silent]))
+    assert [row["anti_sway"] for row in rows] == ["on", "off"]
+
+
+def test_what_two_logs_have_counts_once(tmp_path: Path) -> None:
+    whole = written(tmp_path / "a.log", OUT)
+    again = tmp_path / "b.log"
+    text = whole.read_text().splitlines(keepends=True)
+    again.write_text("".join(text[len(text) // 2 :]))
+    (both,), notes = counted(whole, again)
+    (one,), _ = counted(whole)
+    assert both == one
+    assert any("s are in a log before it too" in note for note in notes)
+
+
+def test_each_crane_has_its_rows(tmp_path: Path) -> None:
+    rear = [line.replace(" vcan0 ", " vcan1 ") for line in lines([*OUT, *BACK])]
+    path = tmp_path / "a.log"
+    path.write_text("".join(sorted([*lines(SHORT), *rear])))
+    rows, _ = counted(path, file="two-cranes.yaml")
+    assert [(row["crane"], row["cycles"]) for row in rows] == [("front", 0), ("rear", 1)]
+    assert [row["way_m"] for row in rows] == pytest.approx(
+        [0.5 * tip_m_s(80, "slew"), 6.0 * tip_m_s(80, "slew")], abs=0.05
+    )
+
+
+def test_each_profile_has_its_row(tmp_path: Path) -> None:
+    text = (CONFIG / "forwarder.yaml").read_text(encoding="utf-8").replace("../dbc", f"{DBC}")
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace(*BUTTON).replace(SLEW, FAST), encoding="utf-8")
+    path = written(tmp_path / "a.log", OUT)
+    with path.open("a") as log:
+        log.writelines(lines([Part(0.3)], MONDAY_S + 8.0, AntiSwayOff=1))
+        log.writelines(lines(BACK, MONDAY_S + 8.3))
+    rows, _ = counted(path, file=str(file))
+    assert [(row["profile"], row["cycles"]) for row in rows] == [("", 0), ("fast", 1)]
+
+
+def test_a_break_is_no_waiting() -> None:
+    """Of a pause in which the grapple swings for long, a minute counts."""
+    counter, figures = WorkCounter("slew", 2.0), Figures()
+    for joystick, seconds in ((1.0, 1.0), (0.0, 300.0), (1.0, 1.0), (0.0, 10.0)):
+        for _ in range(round(10 * seconds)):
+            stick, speed = {"slew": joystick}, {"slew": 0.0}
+            counter.add(figures, 0.1, stick, speed, 5.0, moving=False, measured=False)
+    counter.end()
+    assert figures.waiting_s == pytest.approx(70.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bypass", [False, True])
+@pytest.mark.parametrize("file", ["forwarder-robust.yaml", "forwarder-sensor.yaml"])
+def test_the_simulators_operator_is_counted_as_it_counted(
+    tmp_path: Path, file: str, *, bypass: bool
+) -> None:
+    """Of its taps each one; the way of the tip, the swing and the waits by its own record."""
+    deployment = loader(file)()
+    known = learn(deployment, CraneParameters(), bypass=bypass)
+    work = Work(bypass, "catching", Skill(), known, ((0.6, 1.0),) * 2, (0.3, 6.0), "0")
+    recorder, path = Recorder(deployment), tmp_path / "work.log"
+    with path.open("w") as log:
+
+        def on_frame(frame: Frame, time_s: float) -> None:
+            recorder.receive(frame, time_s)
+            data = frame.data.hex()
+            log.write(f"({MONDAY_S + time_s:.6f}) vcan0 {frame.can_id:03X}#{data}\n")
+
+        source = Source.of(deployment, deployment.config.uncertainty, ())
+        moves = do_work(source, work, on_frame, 4)
+    (row,), notes = counted(path, file=file)
+    recording = recorder.recording()
+    assert recording.crane
+    crane, t_s = recording.crane, recording.t_s
+    assert notes == []
+    assert row["anti_sway"] == ("off" if bypass else "on")
+    assert row["taps"] == sum(move.taps for move in moves)
+    assert row["cycles"] == len(moves) / 2
+    way_m = sum(math.dist(a, b) for a, b in zip(crane.tip_m, crane.tip_m[1:], strict=False))
+    assert row["way_m"] == pytest.approx(way_m, rel=0.02)
+    waits_s, at = 0.0, None
+    joysticks = [one.joystick for one in recording.axes.values()]
+    for k, now_s in enumerate(t_s):
+        if any(one[k] for one in joysticks):
+            at, large_s = now_s, now_s
+        elif at is not None:
+            waits_s += (now_s - large_s) if crane.sway_deg[k] >= 2.0 else 0.0
+            large_s = now_s if crane.sway_deg[k] >= 2.0 else large_s
+    sensor = "sensor" in file
+    assert row["measured_pct"] == pytest.approx(100.0 if sensor else 0.0, abs=1.0)
+    assert row["waiting_s"] == pytest.approx(waits_s, rel=0.05 if sensor else 0.45)
+    assert row["peak_deg"] == pytest.approx(max(crane.sway_deg), rel=0.03 if sensor else 0.15)
+
+
+@pytest.mark.slow
+def test_a_black_box_is_counted_by_what_its_daemon_sent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, folder = Bench(tmp_path, monkeypatch), tmp_path / "boxes"
+    folder.mkdir()
+    drive(bench, folder, TRIP + 6 * SECOND)
+    out = tmp_path / "t.csv"
+    result = run(folder / "machine-0001.zip", "--out", out)
+    assert result.exit_code == 0, result.output
+    with out.open() as file:
+        (row,) = csv.DictReader(file)
+    valve = dbc.get_message_by_name("SlewCommand")
+    sent = [f for f in bench.sent if f.can_id == valve.frame_id]
+    sent = sent[: len(sent) - SECOND]  # it is written 5 s after the trip
+    way_m = sum(abs(tip_m_s(valve.decode(f.data)["Velocity"], "slew")) * 0.02 for f in sent)
+    assert float(row["way_m"]) == pytest.approx(way_m, rel=0.02)
+    assert (row["anti_sway"], row["cycles"], row["taps"]) == ("on", "0", "0")
+    assert "note:" not in result.output
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["shift", *map(str, arguments)])
+
+
+def test_the_command_writes_one_table_three_times(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    folder = tmp_path / "logs" / "seven"
+    folder.mkdir(parents=True)
+    written(folder / "b.log", SHORT, MONDAY_S + 600.0)
+    written(folder / "a.log", [*SHORT, *OFF[:1]])
+    outs = tmp_path / "out" / "t.csv", tmp_path / "out" / "t.parquet"
+    result = run(
+        tmp_path / "logs", "--config", "forwarder.yaml", "--out", outs[0], "--out", outs[1]
+    )
+    assert result.exit_code == 0, result.output
+    assert "seven 2026-09-21 14:13 on" in result.output
+    assert "Swing that is not measured is that of the model" in result.output
+    with outs[0].open() as file:
+        rows = [*csv.DictReader(file)]
+    assert [row["anti_sway"] for row in rows] == ["on", "off"]
+    kept = parquet.read_table(outs[1]).to_pylist()
+    assert [{k: "" if v is None else str(v) for k, v in row.items()} for row in kept] == rows
+    assert list(rows[0]) == list(FIGURES)
+
+
+def test_a_log_that_cannot_be_read_is_named_and_the_others_count(tmp_path: Path) -> None:
+    good, bad = written(tmp_path / "a.log", OUT), tmp_path / "b.log"
+    bad.write_text("no log\n")
+    result = run(bad, good, "--config", "forwarder.yaml")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("not read: ")
+    assert "b.log:1" in result.stderr
+    assert "2026-09-21 14:13 on" in result.stdout
+    assert run(bad, "--config", "forwarder.yaml").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["a.log"], "a.log: --config is missing: which deployment?"),
+        (["a.log", "--config", "forwarder.yaml", "--out", "t.xls"], "expected a file with .csv or"),
+        ([".", "--config", "forwarder.yaml"], ".: expected a log, got none"),
+    ],
+)
+def test_what_is_wrong_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], text: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert text in result.stderr
+    assert result.stderr.count("\n") == 1
