@@ -65,7 +65,7 @@ LINES = {
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
     "canshaper": (59_891, "a new ability takes the room of an old one"),
-    "tests": (94_682, "one level for each behaviour"),
+    "tests": (94_680, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (353, "one that only hands on is joined to its reader")}
