@@ -31,6 +31,7 @@ from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
 from canshaper.report.console import new_table
+from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ _LEAST_TAPS = (LEAST_TAP, LEAST_TAP / 3.0, 0.0)
 # Length of the response in swings: with a range that of ZVD, which is zero twice in its middle.
 _SWINGS, _SWINGS_OF_RANGE = 0.77, 1.0
 _LONGER = (1.15, 1.3, 1.5, 2.0)  # times the duration of a shaper that leaves too much
+_MOST_TAPS = max(one.entries[1] for one in KINDS["robust"].parameters if one.entries)
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
 
@@ -167,6 +169,8 @@ def design_robust(
         verdict = judge(mode, tick_s, shaper_for, written(shaper), range_pct)
         for times in _LONGER if verdict.word != "good" and residual_pct is None else ():
             seconds = round(times * shaper.duration_s / tick_s) * tick_s
+            if round(seconds / tick_s) + 1 > _MOST_TAPS:
+                break  # of a file
             shaper_for = in_file(design(two, LEAST_TAP, seconds))[1]
             left = judge(mode, tick_s, shaper_for, with_tail(seconds + 0.1), range_pct).left
             if left <= GOOD:

@@ -21,6 +21,8 @@ from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.shapers.gff import denominator_from_poles
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from canshaper.design.tuning.optimal import Tuning
 
 # What a tuning aims at, one of: a preference, a range of lengths, Eq. 15.
@@ -187,6 +189,23 @@ def write_tuned(deployment: Deployment, one: TunedDesign) -> list[str]:
     values = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True))
     values |= {"kind": "gff", **one.setting.values(), "designed_for": designed_for}
     return write_filters(deployment, one.bound.name, [((), values)], tail_s, "tune")
+
+
+def figure(one: TunedDesign) -> "Figure":
+    """The setting next to that of the file."""
+    from canshaper.design.tuning import plot  # noqa: PLC0415  # pictures alone need it
+
+    assert one.bound.config.sway is not None
+    return plot.figure(
+        axis=one.bound.name,
+        setting=one.setting,
+        mode=one.task.mode,
+        tick_s=one.task.tick_s,
+        machine=Machine.of(one.bound),
+        full_speed_m_s=one.bound.config.sway.full_speed_m_s,
+        before=one.before,
+        choices=one.choices,
+    )
 
 
 def as_dict(one: TunedDesign) -> dict[str, Any]:

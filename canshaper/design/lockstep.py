@@ -114,6 +114,7 @@ class LockStep:
 
     Attributes:
         time_ms: when the next tick is.
+        processor: as above; another one may take its place between two ticks.
     """
 
     def __init__(
@@ -128,7 +129,7 @@ class LockStep:
     ) -> None:
         self.time_ms = 0
         self._tick_ms = deployment.config.tick_ms
-        self._processor = processor
+        self.processor = processor
         self._joysticks = joysticks
         self._port = PlantPort(plant, received, on_frame, _sends(deployment))
         self._ports = dict.fromkeys(deployment.config.buses, self._port)
@@ -141,7 +142,7 @@ class LockStep:
         hands = self._joysticks
         frames = [frame for hand in hands for frame in hand.frames_of_tick(time_ms, tick_ms)]
         self._port.begin(time_ms, frames)
-        io_cycle(self._processor, self._ports, time_ms * 1_000_000, 0, self._standstill)
+        io_cycle(self.processor, self._ports, time_ms * 1_000_000, 0, self._standstill)
         self._port.end(tick_ms / 1000.0)
         self.time_ms = time_ms + tick_ms
 

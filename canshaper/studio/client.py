@@ -123,7 +123,7 @@ class Client:
             self._numbers.receive(message)
         else:
             name, factor = message.get("slide"), message.get("to")
-            known = isinstance(name, str) and name in self._stage.sliders
+            known = isinstance(name, str) and name in self._stage.positions
             if not known or not is_number(factor):
                 raise PageMessageError("expected a message that is known, got another")
             self._pending[str(name)] = factor

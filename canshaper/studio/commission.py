@@ -58,7 +58,7 @@ class Commission:
         return FileResponse(STATIC / "commission.html")
 
     async def _state(self, _request: Request) -> Response:
-        return await self._answer("show", "")
+        return await self._answer("show", "", "")
 
     async def _do(self, request: Request) -> Response:
         """Run a step, accept what it proposes, or leave it out."""
@@ -70,7 +70,7 @@ class Commission:
             return PlainTextResponse(f"{text}\n", CONFLICT)
         if self._busy:
             return PlainTextResponse(f"{self._busy} is under way\n", CONFLICT)
-        return await self._answer(what, step)
+        return await self._answer(what, step, request.query_params.get("answer", ""))
 
     async def _file(self, request: Request) -> Response:
         """A picture of a step, or the report."""
@@ -80,12 +80,12 @@ class Commission:
             return PlainTextResponse("no such file\n", NOT_FOUND)
         return FileResponse(Path(self._shown["folder"]) / name)
 
-    async def _answer(self, what: str, step: str) -> Response:
+    async def _answer(self, what: str, step: str, answer: str) -> Response:
         """Do what was asked, and return what the page shows; while busy, return what it showed."""
         if self._path and not self._busy:
             self._busy = step or "reading"
             try:
-                self._shown = await asyncio.to_thread(self._work, what, step)
+                self._shown = await asyncio.to_thread(self._work, what, step, answer)
             except (OSError, ValueError) as error:  # it has ended, or said no such thing
                 self._shown = {**self._shown, "error": f"not done, its process ended: {error}"}
             finally:
@@ -93,7 +93,7 @@ class Commission:
         about = {"busy": self._busy, "machine": self._machine}
         return JSONResponse({**self._shown, **about})
 
-    def _work(self, what: str, step: str) -> dict[str, Any]:
+    def _work(self, what: str, step: str, answer: str) -> dict[str, Any]:
         """Let the process do it; one that has ended is started again."""
         if self._process and self._process.poll() is not None:
             self.close()
@@ -104,8 +104,7 @@ class Commission:
         assert self._process.stdin
         assert self._process.stdout
         about = {"path": str(self._path), "changes": self._changes, "machine": self._machine}
-        print(
-            json.dumps({"what": what, "step": step, **about}), file=self._process.stdin, flush=True
-        )
+        asked = {"what": what, "step": step, "answer": answer, **about}
+        print(json.dumps(asked), file=self._process.stdin, flush=True)
         shown: dict[str, Any] = json.loads(self._process.stdout.readline())
         return shown

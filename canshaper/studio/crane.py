@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import signal
 import socket
 import subprocess
 from collections.abc import Sequence
@@ -141,6 +142,11 @@ class Crane:
         priority = LOOP_PRIORITY if verb == "run" else JOYSTICKS_PRIORITY
         with contextlib.suppress(OSError):
             os.sched_setscheduler(child.process.pid, os.SCHED_FIFO, os.sched_param(priority))
+
+    def reload(self) -> None:
+        """Let the daemon read its file again, as its service manager does."""
+        if (process := self._children["run"].process) is not None:
+            process.send_signal(signal.SIGHUP)
 
     def late_us(self) -> int | None:
         """Largest lateness of a tick in the last second, when the daemon has reported one."""

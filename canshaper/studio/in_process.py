@@ -54,6 +54,8 @@ class InProcessCrane:
         self.cycle_ms = self._hand.hand.cycle_ms
         self._controller = Controller(deployment)
         self._adjuster = Adjuster(self._controller)
+        self._guarded = Guarded(self._controller)
+        self._next: Deployment | None = None
         self._report = report
         self._frames: list[Frame] = []
         try:
@@ -62,7 +64,7 @@ class InProcessCrane:
             raise DriveError(str(error)) from None
         self._lock_step = LockStep(
             deployment,
-            Guarded(self._controller),
+            self._guarded,
             plant,
             [self._hand, *others],
             lambda frame, _time_s: self._frames.append(frame),
@@ -75,6 +77,8 @@ class InProcessCrane:
         self._hand.held = held
         self._due_ms += min(passed_ms, MOST_MS)
         while self._lock_step.time_ms < self._due_ms:
+            if self._next and self._controller.neutral:
+                self._use(self._next)
             self._lock_step.step()
         for event in self._controller.events:
             if isinstance(event, StateEvent) and event.transition.error:
@@ -90,6 +94,19 @@ class InProcessCrane:
             ValueError: it does not allow that.
         """
         self._adjuster.change(values)
+
+    def reload(self, deployment: Deployment) -> None:
+        """Go on with other filters, as after a reload: once every axis is neutral."""
+        self._next = deployment
+
+    def _use(self, deployment: Deployment) -> None:
+        before, guarded, self._next = self._controller, self._guarded, None
+        self._controller = Controller(deployment)
+        self._guarded = Guarded(self._controller)
+        self._controller.carry_over(before)
+        self._guarded.carry_over(guarded)
+        self._adjuster = Adjuster(self._controller)
+        self._lock_step.processor = self._guarded
 
 
 class _HeldHand:

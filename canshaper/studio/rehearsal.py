@@ -25,17 +25,25 @@ from canshaper.report.console import OnProgress
 NICE = 10  # the cranes of the live page go first
 # The last results, not accepted yet.
 _proposals: dict[Path, Proposal] = {}
+_CHOICE = ("offered", "recommended", "chosen")  # numbers of a step that asks for one
 
 
 class Reader:
-    """The person in front of the page, who is not asked for words and sees no bar."""
+    """The person in front of the page, who sees no bar.
+
+    Args:
+        word: their answer to the question that allows it.
+    """
+
+    def __init__(self, word: str = "") -> None:
+        self._word = word
 
     def ready(self, words: str) -> None:
         """Wait for nothing: this is the desk."""
 
-    def answer(self, _question: str, default: str, _allowed: Sequence[str] = ()) -> str:
-        """The default."""
-        return default
+    def answer(self, _question: str, default: str, allowed: Sequence[str] = ()) -> str:
+        """Their word where it is allowed, else the default."""
+        return self._word if self._word in allowed else default
 
     @contextmanager
     def progress(self, _what: str) -> Iterator[OnProgress]:
@@ -47,7 +55,9 @@ class Reader:
         yield unseen
 
 
-def work(what: str, path: Path, changes: list[str], step: str, *, machine: bool) -> dict[str, Any]:
+def work(
+    what: str, path: Path, changes: list[str], step: str, *, machine: bool, answer: str = ""
+) -> dict[str, Any]:
     """Do what the page asks for.
 
     Args:
@@ -56,6 +66,7 @@ def work(what: str, path: Path, changes: list[str], step: str, *, machine: bool)
         changes: parameters of the simulated crane, NAME=VALUE.
         step: name of the step; empty to show.
         machine: whether that of the machine is shown; else its rehearsal.
+        answer: to a question of the step.
 
     Returns:
         What the page shows, and under ``error`` why something was not done.
@@ -63,7 +74,7 @@ def work(what: str, path: Path, changes: list[str], step: str, *, machine: bool)
     error, news = "", ""
     try:
         if what != "show":
-            with _procedure(path, changes) as procedure:
+            with _procedure(path, changes, answer) as procedure:
                 _do(procedure, path, what, step)
                 news = "; ".join(procedure.news)
         return {**_shown(path, changes, machine=machine), "error": "", "news": news}
@@ -76,13 +87,13 @@ def work(what: str, path: Path, changes: list[str], step: str, *, machine: bool)
 
 
 @contextmanager
-def _procedure(path: Path, changes: list[str]) -> Iterator[Procedure]:
+def _procedure(path: Path, changes: list[str], answer: str) -> Iterator[Procedure]:
     """The rehearsal of a file, while no other process works on it."""
     check_rehearsal(load_deployment(path))  # what is wrong in it is named by its own name
     files = Files(copy_for_rehearsal(path))
     with files.locked():
         state = read_state(files.state)
-        bench = Simulated(Reader(), changes or (state.changes if state else []))
+        bench = Simulated(Reader(answer), changes or (state.changes if state else []))
         yield Procedure(files, bench, load_deployment, STEPS, origin=path)
 
 
@@ -121,6 +132,7 @@ def _shown(path: Path, changes: list[str], *, machine: bool) -> dict[str, Any]:
                 "parts": record.parts,
                 "poor": record.poor,
                 "pictures": [name for name in record.pictures if name.endswith(".png")],
+                "choice": {key: record.numbers.get(key) for key in _CHOICE},
                 "diff": proposed.diff if proposed else record.diff,
                 "proposed": bool(proposed) and not record.poor,
             }

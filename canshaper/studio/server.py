@@ -130,7 +130,12 @@ def build_app(
     def left(_request: HTTPConnection) -> Response:
         return JSONResponse(residuals(stage.deployment, stage.in_force()))
 
+    async def settings(_request: HTTPConnection) -> Response:
+        found = await asyncio.to_thread(stage.preference.found) if stage.preference else {}
+        return JSONResponse(found)
+
     routes = [WebSocketRoute("/ws", connection), Route("/residuals.json", left)]
+    routes.append(Route("/preference.json", settings))
     routes += commission.routes()
     return page_app(routes, "main.js", access)
 
@@ -215,6 +220,7 @@ def _hello(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
         "numbers": stage.numbers is not None,
         "profiles": any(j.next_profile for j in stage.deployment.config.joysticks.values()),
         **links_of(parameters),
+        "preference": stage.preference is not None,
         "sliders": {
             name: {"range": RANGES[name], "numbers": [list(n) for n in _numbers(stage, name)]}
             for name in stage.sliders

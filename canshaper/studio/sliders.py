@@ -1,8 +1,8 @@
 """The sliders of the page: how calm the filter is, and how long it believes the pendulum to be.
 
-Each slider is a factor on numbers of the deployment file: "calm" stretches the filter in time, with
-its sway model as it is; "length" makes the pendulum that the filter believes in longer. Several
-numbers change together, through the daemon's control socket.
+Each slider is a factor on numbers of the deployment file: "calm" stretches a filter in time that
+has no settings to choose from (see ``preference``); "length" makes the pendulum that the filter
+believes in longer. Several numbers change together, through the daemon's control socket.
 """
 
 import math

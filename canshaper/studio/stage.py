@@ -19,11 +19,12 @@ from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
 from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.numbers import LiveNumbers
+from canshaper.studio.preference import AS_IN_FILE, PREFERENCE, Preference, offered
 from canshaper.studio.session import CraneSession
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.sources import before_the_rest
 from canshaper.studio.view import CraneView
-from canshaper.studio.words import Events
+from canshaper.studio.words import Events, said
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.realtime import open_ports
 
@@ -48,6 +49,7 @@ class Stage:
         self.cab: Cab | None = None
         self.sliders: dict[str, list[Number]] = {}
         self.positions: dict[str, float] = {}
+        self.preference: Preference | None = None
         self.numbers: LiveNumbers | None = None
         self._control: Path | None = None
         self._starts = 0
@@ -130,7 +132,7 @@ class Stage:
         self.deployment = driven_part(whole, crane)
         self._seat()
         if crane:
-            self.sliders, self.positions = {}, {}
+            self.sliders, self.positions, self.preference = {}, {}, None
         for name in (SHAPED, RAW):
             here = InProcessCrane(whole, changes, crane, self._reporter(name))
             self._cycle_ms = here.cycle_ms
@@ -141,6 +143,9 @@ class Stage:
         self.cab = Cab(self.deployment.axes, lambda text: self.events.add("page", text))
         self.sliders = sliders(self.deployment.config) if self.deployment.config.control else {}
         self.positions = dict.fromkeys(self.sliders, 1.0)
+        if self.deployment.config.control and offered(self.deployment.config):
+            self.preference = Preference(self.deployment.path)
+            self.positions[PREFERENCE] = AS_IN_FILE
 
     def start(self, failed: Callable[[], None]) -> None:
         """Begin.
@@ -164,6 +169,8 @@ class Stage:
             self._thread.join()
         if self.numbers:
             self.numbers.stop()
+        if self.preference:
+            self.preference.stop()
         if self._error:
             raise self._error
 
@@ -182,6 +189,9 @@ class Stage:
             ValueError: no such slider, or a factor that is not allowed.
             ControlError: the daemon refuses, or there is none.
         """
+        if name == PREFERENCE and self.preference:
+            self._prefer(self.preference, factor)
+            return
         changed = values(self.sliders, name, factor)
         here = self.cranes[SHAPED].here
         with self._control_lock:
@@ -194,21 +204,35 @@ class Stage:
             self.positions[name] = factor
         self.events.add(SHAPED, ", ".join(f"{key} = {v:.4g}" for key, v in changed.items()))
 
+    def _prefer(self, preference: Preference, position: float) -> None:
+        """Let the daemon read its file again with other filters, which it takes at rest."""
+        shaped = self.cranes[SHAPED]
+        with self._control_lock:
+            self.deployment = preference.write(position)
+            if shaped.here:
+                with self._lock:
+                    shaped.here.reload(self.deployment)
+            elif shaped.crane:
+                shaped.crane.reload()
+            self.positions = {**dict.fromkeys(self.sliders, 1.0), PREFERENCE: position}
+        self.events.add(SHAPED, said("filters"))
+
     def in_force(self) -> dict[str, float]:
         """Numbers that may be others than those of the file, by key."""
         if self.numbers:
             return self.numbers.in_force()
         values_by_key: dict[str, float] = {}
-        for name, factor in self.positions.items():
-            values_by_key |= values(self.sliders, name, factor)
+        for name in self.sliders:
+            values_by_key |= values(self.sliders, name, self.positions[name])
         return values_by_key
 
     def _reset_sliders(self) -> None:
         """Put back what the driver has moved: the next one finds what the file says."""
         for name, factor in list(self.positions.items()):
-            if factor != 1.0:
+            rest = AS_IN_FILE if name == PREFERENCE else 1.0
+            if factor != rest:
                 with contextlib.suppress(ControlError):  # it starts again, with those of the file
-                    self.slide(name, 1.0)
+                    self.slide(name, rest)
 
     def snapshot(self) -> dict[str, Any]:
         """Return the values that a page shows now."""
@@ -267,7 +291,7 @@ class Stage:
                     seen.view.report_lateness(late)
                 if seen.shaped and seen.crane.starts != self._starts:
                     self._starts = seen.crane.starts
-                    self.positions = dict.fromkeys(self.sliders, 1.0)  # it has those of the file
+                    self.positions |= dict.fromkeys(self.sliders, 1.0)  # it has those of the file
         return not self._stop.is_set()
 
     def _exchange(self, seen: CraneSession, held: Held, now_s: float, passed_ms: int) -> None:

@@ -30,7 +30,7 @@ BUDGET = {
     "docs/campaign.md": 945,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
-    "docs/commission.md": 650,
+    "docs/commission.md": 675,
     "docs/comparison.md": 610,
     "docs/decisions.md": 895,
     "docs/deployment.md": 2210,
@@ -48,11 +48,11 @@ BUDGET = {
     "docs/sensor.md": 1170,
     "docs/service.md": 790,
     "docs/states.md": 300,
-    "docs/studio.md": 690,
+    "docs/studio.md": 717,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
-    "docs/tuning.md": 700,
+    "docs/tuning.md": 754,
     "docs/work.md": 250,
     "studies/README.md": 760,
 }
@@ -61,14 +61,14 @@ BUDGET = {
 LINES = {
     "canshaper/gate": (2_291, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_818,
+        4_815,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (60_533, "a new ability takes the room of an old one"),
-    "tests": (94_705, "one level for each behaviour"),
+    "canshaper": (60_981, "a new ability takes the room of an old one"),
+    "tests": (95_445, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (359, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (360, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -185,16 +185,16 @@ def test_a_slider_is_felt_by_the_daemon(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
     page = tab(own())
-    slider = page.locator("#slider-calm")
+    slider = page.locator("#slider-length")
     expect(slider).to_be_enabled()
     slider.focus()
     page.keyboard.press("End")
-    expect(page.locator("#events")).to_contain_text("axes.slew.filter.a2 = 0.48")
+    expect(page.locator("#events")).to_contain_text("axes.slew.sway.period_s = 3.332")
     page.wait_for_timeout(1500)  # by then it shows what the daemon has
     assert slider.input_value() == "1"
-    back = page.locator(".slider .back").first
+    back = page.locator(".slider .back").last
     back.click()
-    expect(page.locator("#events li").last).to_contain_text("axes.slew.filter.a2 = 0.12")
+    expect(page.locator("#events li").last).to_contain_text("axes.slew.sway.period_s = 2.356")
     expect(back).to_be_disabled()
     assert slider.input_value() == "0"
 
@@ -205,9 +205,9 @@ def test_a_second_tab_takes_the_joysticks(
     studio = own()
     first = tab(studio)
     enabled(first)
-    first.locator("#slider-calm").focus()
+    first.locator("#slider-length").focus()
     first.keyboard.press("End")
-    expect(first.locator("#events")).to_contain_text("axes.slew.filter.a2 = 0.48")
+    expect(first.locator("#events")).to_contain_text("axes.slew.sway.period_s = 3.332")
     second = tab(studio)
     expect(second.locator("#seat")).to_have_text("another page drives")
     expect(second.locator("#enable")).to_be_disabled()
@@ -215,8 +215,8 @@ def test_a_second_tab_takes_the_joysticks(
     expect(first.locator("#seat")).to_have_text("another page drives")
     enabled(second)
     # What the driver before has changed is put back.
-    expect(second.locator("#events")).to_contain_text("axes.slew.filter.a2 = 0.12")
-    expect(second.locator(".slider b").first).to_contain_text("1.00")
+    expect(second.locator("#events")).to_contain_text("axes.slew.sway.period_s = 2.356")
+    expect(second.locator(".slider b").last).to_contain_text("1.00")
 
 
 def test_the_page_is_back_when_the_daemon_is_back_and_when_the_studio_is(
@@ -272,3 +272,24 @@ def test_without_profiles_there_is_no_button(shared: Studio, tab: Callable[..., 
     page = tab(shared)
     expect(page.locator("#reset")).to_be_visible()
     expect(page.locator("#profile")).to_be_hidden()
+
+
+def test_the_slider_of_settings_says_what_each_leaves(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    slider, words = page.locator("#slider-preference"), page.locator(".slider .numbers").first
+    expect(slider).to_be_enabled(timeout=120_000)
+    in_file = words.inner_text()
+    assert re.search(r"near-far: leaves \d+ % of the swing, runs on [\d.]+ m, still", in_file)
+    slider.focus()
+    page.keyboard.press("End")
+    expect(page.locator("#events")).to_contain_text("at the next standstill")
+    page.wait_for_timeout(1500)  # by then it shows what the studio has
+    assert slider.input_value() == "1"
+    calm = words.inner_text()
+    assert calm != in_file
+    back = page.locator(".slider .back").first
+    back.click()
+    expect(back).to_be_disabled()
+    expect(words).to_have_text(in_file)

@@ -94,19 +94,19 @@ def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> No
         assert page.joysticks is not None
         page.joysticks["slew"] = 0.3
         page.until(lambda s: valves(s, "shaped")[0] > 0.1)
-        page.send(slide="calm", to=2.0)
-        page.until(lambda s: s["sliders"]["calm"] == 2.0, "slider")
-        assert any("axes.slew.filter.a2 = 0.48" in text for text in page.texts())
-        page.send(slide="calm", to=3.0)
+        page.send(slide="length", to=2.0)
+        page.until(lambda s: s["sliders"]["length"] == 2.0, "slider")
+        assert any("axes.slew.sway.period_s = 3.332" in text for text in page.texts())
+        page.send(slide="length", to=3.0)
         page.until(lambda _: any("expected 0.5 to 2" in text for text in page.refused))
-        assert page.look()["sliders"]["calm"] == 2.0
+        assert page.look()["sliders"]["length"] == 2.0
 
 
 def test_without_a_driver_no_one_moves_the_sliders(shared: Studio) -> None:
     with shared.page() as page:
-        page.send(slide="calm", to=2.0)
+        page.send(slide="length", to=2.0)
         page.until(lambda _: any("only the page that drives" in text for text in page.refused))
-        assert page.shown["sliders"]["calm"] == 1.0
+        assert page.shown["sliders"]["length"] == 1.0
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", None])

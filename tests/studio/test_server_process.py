@@ -21,15 +21,15 @@ def test_a_daemon_that_ends_is_reported_and_starts_again(own: Callable[..., Stud
     studio = own()
     with studio.page() as page:
         page.drive()
-        page.send(slide="calm", to=2.0)
-        page.until(lambda s: s["sliders"]["calm"] == 2.0, "slider")
+        page.send(slide="length", to=2.0)
+        page.until(lambda s: s["sliders"]["length"] == 2.0, "slider")
         first = next(pid for pid in studio.children("run") if studio.groups[0] in command_of(pid))
         os.kill(first, signal.SIGKILL)
         page.until(lambda s: not s["cranes"]["shaped"]["daemon"], "silent")
         page.until(lambda s: s["cranes"]["shaped"]["daemon"], "back")
         assert any("canshaper run ended with status -9" in text for text in page.texts())
         assert page.shown["cranes"]["raw"]["daemon"]
-        assert page.shown["sliders"]["calm"] == 1.0  # it has the numbers of its file
+        assert page.shown["sliders"]["length"] == 1.0  # it has the numbers of its file
         page.until(lambda _: page.states() == {"ready"}, "ready again")
 
 
@@ -61,7 +61,7 @@ def test_the_shadow_shows_a_machine_and_never_sends(
         page.send(do="enable")
         page.send(joysticks={"slew": 1.0})
         page.connection.send("nonsense")
-        page.send(slide="calm", to=1.0)
+        page.send(slide="length", to=1.0)
         for frame in hand.frames(0, Held({"slew": 0.25})):
             machine.port.send(frame)
         page.until(lambda s: s["cranes"]["machine"]["axes"]["slew"]["joystick"] == 0.25)

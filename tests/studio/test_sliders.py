@@ -9,7 +9,6 @@ from canshaper.config.filters import Profile
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from canshaper.shaping.shapers.gff import poles_from_denominator
 from canshaper.studio.crane import copied
 from canshaper.studio.sliders import CALM, LENGTH, RANGES, adjustable, sliders, values
 
@@ -17,15 +16,22 @@ CONFIG = Path(__file__).parents[2] / "config"
 FILES = sorted(path.name for path in CONFIG.glob("*.yaml") if "axes:" in path.read_text())
 
 
-def test_calm_moves_the_poles_along_their_rays() -> None:
-    offered = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
-    before, after = values(offered, CALM, 1.0), values(offered, CALM, 1.5)
-    place = "axes.slew.filter"
-    assert before == {n.key: n.value for n in offered[CALM]}
-    old = poles_from_denominator(before[f"{place}.a1"], before[f"{place}.a2"])
-    new = poles_from_denominator(after[f"{place}.a1"], after[f"{place}.a2"])
-    for one, other in zip(sorted(old), sorted(new), strict=True):
-        assert other * 1.5 == pytest.approx(one)
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """A filter that is no design: it may be stretched in time."""
+    text = (CONFIG / "forwarder.yaml").read_text().replace("../dbc", str(CONFIG.parent / "dbc"))
+    lag = "kind: first_order, time_constant_s: 0.5"
+    path = tmp_path / "lag.yaml"
+    path.write_text(text.replace("kind: gff, a1: 0.708, a2: 0.12", lag))
+    return path
+
+
+def test_calm_stretches_a_filter_that_is_no_design(file: Path) -> None:
+    offered = sliders(load_deployment(file).config)
+    keys = [f"axes.{axis}.filter.time_constant_s" for axis in ("slew", "near_far")]
+    assert values(offered, CALM, 1.0) == dict.fromkeys(keys, 0.5)
+    assert values(offered, CALM, 1.5) == dict.fromkeys(keys, 0.75)
+    assert CALM not in sliders(load_deployment(CONFIG / "forwarder.yaml").config)
 
 
 def test_length_is_that_of_the_pendulum() -> None:
@@ -38,7 +44,7 @@ def test_length_is_that_of_the_pendulum() -> None:
 
 @pytest.mark.parametrize(
     ("name", "factor"),
-    [("calm", 2.1), ("calm", 0.4), ("calm", math.nan), ("calm", 10**400), ("speed", 1.0)],
+    [("length", 2.1), ("length", 0.4), ("length", math.nan), ("length", 10**400), ("speed", 1.0)],
 )
 def test_what_is_no_position_of_a_slider_is_refused(name: str, factor: float) -> None:
     offered = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
@@ -69,12 +75,13 @@ def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
     _, copy = copied(file, tmp_path / "copy")
     assert copy.config.control
     assert copy.config.control.adjustable["axes.slew.limits.max_pct"] == [50, 100]
-    assert "axes.slew.filter.a1" in copy.config.control.adjustable
+    assert "axes.slew.sway.period_s" in copy.config.control.adjustable
 
 
 @pytest.mark.parametrize("name", RANGES)
-def test_the_daemon_takes_both_ends(name: str, tmp_path: Path) -> None:
-    _, deployment = copied(CONFIG / "forwarder.yaml", tmp_path)
+def test_the_daemon_takes_both_ends(name: str, file: Path, tmp_path: Path) -> None:
+    (tmp_path / "copy").mkdir()
+    _, deployment = copied(file, tmp_path / "copy")
     adjuster = Adjuster(Controller(deployment))
     offered = sliders(deployment.config)
     for factor in (*RANGES[name], 1.0):

@@ -1,7 +1,6 @@
 """``canshaper check``: is a deployment fit to start?"""
 
 import json
-import math
 from dataclasses import asdict
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from canshaper.config.limits import Motion
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.used_message import NamedCode
-    from canshaper.machine.valves import BoundAxis
 
 GROUP = "setup"
 
@@ -178,7 +176,7 @@ def _of_axis(deployment: "Deployment", name: str) -> "Iterator[str]":
     """Describe sensor, end stops and oil of an axis, in words."""
     from canshaper.shaping.registry import KINDS
 
-    config, bound = deployment.config, deployment.axes[name]
+    config = deployment.config
     axis = config.axes[name]
     if sensor := axis.sway_sensor:
         does = "damps" if sensor.use == "damp" else "is watched"
@@ -190,11 +188,7 @@ def _of_axis(deployment: "Deployment", name: str) -> "Iterator[str]":
         text = f"takes {oil.shares.get(name, 1.0):g} of {oil.flow:g} full axis flows of the pump"
         yield f"{text}, others {others}"
     if axis.sway and KINDS[axis.filter.kind].needs_sway:
-        tick_s, usual_pct = (
-            bound.period_ticks * config.tick_ms / 1000.0,
-            config.uncertainty.length_pct,
-        )
-        yield f"pendulum: {'; '.join(_pendulums(bound, tick_s, usual_pct))} of the swing left"
+        yield f"pendulum: {'; '.join(_pendulums(deployment, name))} of the swing left"
 
 
 def _print_codes(codes: "Sequence[NamedCode]") -> None:
@@ -240,29 +234,30 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
     )
 
 
-def _pendulums(bound: "BoundAxis", tick_s: float, usual_pct: "Sequence[float]") -> "Iterator[str]":
-    """For which pendulums each filter holds, and what it leaves of the swing of either end.
+def _pendulums(deployment: "Deployment", axis: str) -> "Iterator[str]":
+    """For which pendulums each filter holds, and what its machine leaves of the swing at both ends.
 
     Those that it was designed for, else those that a campaign draws.
     """
-    from canshaper.design.tuning.evaluate import gain_at, shaper_of, step_response
+    from canshaper.design.tuning.evaluate import evaluate
+    from canshaper.design.tuning.verdict import on_axis
     from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
-    config, rate = bound.config, bound.config.limits.slowest_per_s
+    config, usual_pct = deployment.axes[axis].config, deployment.config.uncertainty.length_pct
     own = "load not known " if config.gain_schedule else ""
     loads = [(f"at {one.breakpoint:g} ", one.sway, one.filter) for one in config.gain_schedule]
     for name, sway, chosen in (*loads, (own, config.sway, config.filter)):
         assert sway is not None
-        mode, percents = sway.mode(), usual_pct
-        steps = step_response(mode, tick_s, shaper_of(chosen, tick_s, rate))
+        mode, percents = sway.mode(), tuple(usual_pct)
         if (design := chosen.design()) and (range_pct := design.length_range_pct):
             mode = SwayMode.from_period(design.period_s, design.damping_ratio)
             percents = -range_pct, range_pct
-        roots = [math.sqrt(1.0 + percent / 100.0) for percent in percents]
-        ends = [SwayMode(mode.omega_rad_s / root, mode.damping_ratio) for root in roots]
-        low, high = (f"{GRAVITY_M_S2 / end.omega_rad_s**2:.2f}" for end in ends)
-        short, long = (f"{100.0 * gain_at(end, tick_s, steps):.0f}" for end in ends)
-        yield f"{name}{low} to {high} m, {short} and {long} %"
+        middle_m, own_m = (GRAVITY_M_S2 / one.omega_rad_s**2 for one in (mode, sway.mode()))
+        ends = [middle_m * (1.0 + percent / 100.0) for percent in percents]
+        wrong = [100.0 * (m / own_m - 1.0) for m in ends]
+        left = evaluate(*on_axis(deployment, axis, chosen, sway=sway), wrong).residuals
+        short, long = (f"{100.0 * one.machine:.0f}" for one in left)
+        yield f"{name}{ends[0]:.2f} to {ends[1]:.2f} m, {short} and {long} %"
 
 
 def _load(deployment: "Deployment", bus: str) -> str:

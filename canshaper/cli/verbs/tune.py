@@ -2,17 +2,12 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, echo, loader, refuse_shipped
 from canshaper.errors import UsageError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from canshaper.commissioning.tuned import TunedDesign
 
 GROUP = "design"
 
@@ -92,7 +87,13 @@ def tune(
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.filter_file import written_line
-    from canshaper.commissioning.tuned import as_dict, design_tuned, print_tuned, write_tuned
+    from canshaper.commissioning.tuned import (
+        as_dict,
+        design_tuned,
+        figure,
+        print_tuned,
+        write_tuned,
+    )
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)()
@@ -115,7 +116,7 @@ def tune(
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
     useless = one.verdict.useless and not force
-    drawn = results.picture(out / f"{axis}.png", lambda: _figure(one))
+    drawn = results.picture(out / f"{axis}.png", lambda: figure(one))
     changed = write_tuned(deployment, one) if write and not useless else []
     written = deployment.path if write and not useless else None
     if as_json:
@@ -137,20 +138,3 @@ def _numbers(text: str | None) -> list[float] | None:
     except ValueError:
         form = "Q, Q11,Q22 or Q11,Q12,Q21,Q22"
         raise UsageError(f"--q: expected {form}, got {text!r}") from None
-
-
-def _figure(one: "TunedDesign") -> "Figure":
-    from canshaper.design.tuning.evaluate import Machine
-    from canshaper.design.tuning.plot import figure
-
-    assert one.bound.config.sway is not None
-    return figure(
-        axis=one.bound.name,
-        setting=one.setting,
-        mode=one.task.mode,
-        tick_s=one.task.tick_s,
-        machine=Machine.of(one.bound),
-        full_speed_m_s=one.bound.config.sway.full_speed_m_s,
-        before=one.before,
-        choices=one.choices,
-    )

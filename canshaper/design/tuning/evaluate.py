@@ -31,6 +31,8 @@ LENGTHS_PCT = (-30, -20, -10, 0, 10, 20, 30)
 RISEN = 0.95
 # A response is watched until it stays this close to its end, and no longer than this.
 _AT_END, _LONGEST_S, _HELD_S = 1e-9, 120.0, 4.0
+STILL = 0.02
+_LAGS = 10.0  # of the valve, until it has followed
 # Longer than any plateau between two taps (half the longest second mode of 12 s).
 _STILL_S = 8.0
 
@@ -73,7 +75,8 @@ class Residual:
         length_pct: how much longer the pendulum is than the sway data says.
         linear: |H(e^(pT))| at the true sway pole p, nothing but the filter.
         machine: full press and full release through the axis with its limits and a lagging
-            valve; the worse of the two.
+            valve, when both have ended, with and without the filter; the worse of the two. Less
+            than ``STILL`` of the largest raw swing counts as that: the tool hangs still by itself.
     """
 
     length_pct: float
@@ -268,21 +271,25 @@ def _worst(
     raw: Moves,
 ) -> float:
     """See ``Residual.machine``."""
-    left, unshaped = (
-        [_swing_left(true, tick_s, machine.lag_s, move) for move in moves]
-        for moves in (shaped, raw)
-    )
-    worst = max(a / b for a, b in zip(left, unshaped, strict=True))
+    worst = 0.0
+    for (speed, sent), (raw_speed, raw_sent) in zip(shaped, raw, strict=True):
+        count = max(_moving(sent), _moving(raw_sent))
+        count += round(_LAGS * machine.lag_s / tick_s)
+        swing = _modal(true, tick_s, machine.lag_s, speed, sent[:count])
+        other = _modal(true, tick_s, machine.lag_s, raw_speed, raw_sent[:count])
+        least = STILL * max(abs(c.imag) for c in other)
+        worst = max(worst, abs(swing[-1]) / max(abs(other[-1]), least, 1e-12))
     if shaped[0][1][-1] < 0.5 * machine.limits.maximum:
         return max(worst, 1.0)  # no swing, because its first steps are rounded to none
     return worst
 
 
-def _swing_left(
-    mode: SwayMode, tick_s: float, lag_s: float, move: tuple[float, Sequence[float]]
-) -> float:
-    """Amplitude of the swing at the end of a move that began at rest."""
-    return max(1e-12, abs(_modal(mode, tick_s, lag_s, *move)[-1]))
+def _moving(sent: Sequence[float]) -> int:
+    """Ticks until the output stands still."""
+    count = len(sent)
+    while count > 1 and sent[count - 1] == sent[count - 2]:
+        count -= 1
+    return count
 
 
 def _modal(

@@ -9,11 +9,14 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
+from canshaper.config.filters import Filter
+from canshaper.config.limits import Sway
 from canshaper.config.source import Place
 from canshaper.design.tuning.evaluate import Machine, ShaperFor, evaluate, shaper_of
 from canshaper.design.tuning.formulation import MOST_DAMPED
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import every_filter
+from canshaper.machine.stopping import output_limits, when
 from canshaper.shaping.sway import SwayMode
 
 # Of the swing: up to GOOD is left by a good filter, more than USELESS by one that is not written.
@@ -91,21 +94,26 @@ def judge(
     if worst.length_pct:
         right = next(one.machine for one in residuals if not one.length_pct)
         verdict = verdict.with_cure(right, "the right length")
-    for changes in (_faster(machine), _longer(machine)):
-        best, what = math.inf, ""
-        for words, changed in changes:
-            other = replace(machine, limits=replace(machine.limits, **changed))
-            left = evaluate(mode, tick_s, shaper_for, other, (worst.length_pct,)).worst(100.0)
-            best, what = min((best, what), (left, words))
-            if best <= GOOD:
-                break
-        verdict = verdict.with_cure(best, what)
+
+    def left_with(**changed: Any) -> float:
+        other = replace(machine, limits=replace(machine.limits, **changed))
+        return evaluate(mode, tick_s, shaper_for, other, (worst.length_pct,)).worst(100.0)
+
+    best, what = math.inf, ""
+    for words, rates in _faster(machine):
+        best, what = min((best, what), (left_with(**rates), words))
+        if best <= GOOD:
+            break
+    verdict = verdict.with_cure(best, what)
+    low, high = int(10.0 * machine.limits.tail_s), _LONGEST_TENTHS
+    if low < high:
+        best = left_with(tail_s=high / 10.0)
+        while best <= GOOD and high - low > 1:  # the shortest that is good: halve what is between
+            middle = (low + high) // 2
+            left = left_with(tail_s=middle / 10.0)
+            low, high, best = (low, middle, left) if left <= GOOD else (middle, high, best)
+        verdict = verdict.with_cure(best, f"tail_s: {high / 10.0:g}")
     return verdict
-
-
-def _longer(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
-    for tenths in range(int(10.0 * machine.limits.tail_s) + 1, _LONGEST_TENTHS + 1):
-        yield f"tail_s: {tenths / 10.0:g}", {"tail_s": tenths / 10.0}
 
 
 def _faster(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -117,13 +125,50 @@ def _faster(machine: Machine) -> Iterator[tuple[str, dict[str, Any]]]:
         yield f"a valve with {slow} of {rate:.3g}", rates
 
 
+def on_axis(
+    deployment: Deployment,
+    axis: str,
+    chosen: Filter,
+    *,
+    sway: Sway | None = None,
+    tail_s: float | None = None,
+) -> tuple[SwayMode, float, ShaperFor, Machine]:
+    """Arguments of ``judge``, ``evaluate`` and ``press`` for a filter on an axis that swings.
+
+    Args:
+        deployment: the machine; the limits are those of the axis, its stopping distance too.
+        axis: name of the axis.
+        chosen: the filter.
+        sway: swing; None for that of the axis.
+        tail_s: tail in place of that of the file.
+    """
+    bound = deployment.axes[axis]
+    sway = sway or bound.config.sway
+    assert sway is not None
+    limits = output_limits(bound.config, **when(deployment, axis))
+    limits = limits if tail_s is None else replace(limits, tail_s=tail_s)
+    tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
+    shaper = shaper_of(chosen, tick_s, bound.config.limits.slowest_per_s)
+    return sway.mode(), tick_s, shaper, replace(Machine.of(bound), limits=limits)
+
+
 def verdicts(deployment: Deployment) -> Iterator[tuple[Place, Verdict]]:
     """Judge each filter of a swinging axis, profiles and breakpoints too; yield them by place."""
     for name, bound in deployment.axes.items():
-        tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
-        rate, machine = bound.config.limits.slowest_per_s, Machine.of(bound)
         for place, chosen, sway in every_filter(("axes", name), bound.config):
             if sway is not None and chosen.kind != "off":
-                design, shaper = chosen.design(), shaper_of(chosen, tick_s, rate)
-                range_pct = (design.length_range_pct if design else None) or 0.0
-                yield place, judge(sway.mode(), tick_s, shaper, machine, range_pct)
+                yield place, judged(deployment, name, chosen, sway=sway)
+
+
+def judged(
+    deployment: Deployment,
+    axis: str,
+    chosen: Filter,
+    *,
+    sway: Sway | None = None,
+    tail_s: float | None = None,
+) -> Verdict:
+    """Judge a filter on an axis over the range that it was designed for; see ``on_axis``."""
+    design = chosen.design()
+    range_pct = (design.length_range_pct if design else None) or 0.0
+    return judge(*on_axis(deployment, axis, chosen, sway=sway, tail_s=tail_s), range_pct)

@@ -157,10 +157,8 @@ def _settings(mode: SwayMode, _tick_s: float) -> dict[str, Parameters]:
 
 
 _PARAMETERS = (
-    Parameter("a1", 1e-3, 20, "s", "coefficient a1 of the denominator", optional=True, stretch=1.0),
-    Parameter(
-        "a2", 1e-6, 100, "s^2", "coefficient a2 of the denominator", optional=True, stretch=2.0
-    ),
+    Parameter("a1", 1e-3, 20, "s", "coefficient a1 of the denominator", optional=True),
+    Parameter("a2", 1e-6, 100, "s^2", "coefficient a2 of the denominator", optional=True),
     Parameter(
         "poles_rad_s", -100, -0.1, "rad/s", "pole of the filter", optional=True, entries=(2, 2)
     ),
@@ -171,7 +169,6 @@ _PARAMETERS = (
         "rad/s",
         "a third pole, which removes the first jump",
         optional=True,
-        stretch=-1.0,
     ),
 )
 KINDS = (

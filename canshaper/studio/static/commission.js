@@ -74,6 +74,11 @@ function drawStep(step) {
     byId(id).hidden = shown.machine || !offered;
     byId(id).disabled = busy;
   }
+  const { offered, recommended, chosen: taken } = step.choice;
+  byId("choose").hidden = shown.machine || !(offered?.length > 1);
+  byId("choice").disabled = busy;
+  byId("choice").replaceChildren(...(offered ?? []).map((kind) => element("option",
+    kind === recommended ? text("commission.recommended", { kind }) : kind, { value: kind, selected: kind === taken })));
   byId("run").textContent = text(step.at ? "commission.again" : "commission.run");
   byId("poor").replaceChildren(...step.poor.map((fault) => element("li", fault)));
   byId("parts").replaceChildren(...step.parts.map(part));
@@ -124,6 +129,10 @@ for (const what of ["run", "accept", "skip"]) {
     ask(`/commission/${what}/${name}`, "POST");
   });
 }
+byId("choice").addEventListener("change", ({ target }) => {
+  chosen = current().name;
+  ask(`/commission/run/${chosen}?answer=${target.value}`, "POST");
+});
 translate(byId("language"));
 document.documentElement.dataset.theme = chosenTheme();
 ask("/commission/state");

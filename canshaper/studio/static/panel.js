@@ -5,6 +5,7 @@ import { craneName, language, meaning, nameOf, spoken, text } from "/static/lang
 const MOST_EVENTS = 300;
 const OLD_S = 0.5;
 const SHOW_MS = 150; // no one reads faster
+const FILE = -1; // position of the slider of settings at which they are those of the file
 const URGENT = ["bad", "stop", "wait", "move", "ready"]; // levels of states, the first is said first
 
 const make = (tag, attributes = {}, ...children) => {
@@ -81,6 +82,7 @@ export class Panel {
     this.sliders = {};
     const host = document.getElementById("sliders");
     host.replaceChildren();
+    this.preference = this.hello.preference ? this.buildPreference(host, slide) : null;
     for (const [name, { range, numbers }] of Object.entries(this.hello.sliders)) {
       const title = text(`slider.${name}`);
       // By its logarithm: half and double are as far from the middle.
@@ -116,6 +118,46 @@ export class Panel {
     if (!host.children.length && this.hello.drives) {
       host.append(make("p", { className: "quiet" }, text("slider.none")));
     }
+  }
+
+  /** The slider of settings that each filter has; their numbers take the studio some seconds. */
+  buildPreference(host, slide) {
+    const title = text("slider.preference");
+    const input = make("input", { type: "range", id: "slider-preference", min: 0, max: 1, step: 0.1, value: 0.5, disabled: true });
+    const value = make("b");
+    const found = make("span", { className: "numbers" }, text("preference.wait"));
+    const back = make("button", { className: "back", title: text("slider.back"), disabled: true, onclick: () => slide("preference", FILE) }, text("preference.file"));
+    back.setAttribute("aria-label", `${title}: ${text("preference.file")}`);
+    const one = { input, back, at: FILE, load: async () => {
+      one.settings = await (await fetch("/preference.json")).json();
+      one.words(one.at);
+    }, words: (at) => {
+      set(value, at === FILE ? text("preference.file") : at.toFixed(1));
+      set(found, Object.entries(one.settings ?? {}).map(([axis, { file, choose }]) => {
+        const setting = at === FILE || !choose.length ? file : choose[Math.round(at * (choose.length - 1))];
+        return text("preference.words", { axis: nameOf("axis", axis), percent: (100 * setting.left).toFixed(0),
+          m: setting.run_on_m.toFixed(2), s: setting.still_s?.toFixed(1) ?? "∞" });
+      }).join(" · "));
+    } };
+    input.addEventListener("input", () => {
+      this.touched = performance.now();
+      one.words(Number(input.value));
+    });
+    input.addEventListener("change", () => slide("preference", Number(input.value)));
+    host.append(make("div", { className: "slider" }, back, make("label", { htmlFor: input.id }, `${title} `, value), input,
+      make("div", { className: "ends" }, make("span", {}, text("slider.preference.low")), found, make("span", {}, text("slider.preference.high")))));
+    one.load().catch(() => set(found, ""));
+    return one;
+  }
+
+  showPreference(at, mine) {
+    const { input, back, words, settings } = this.preference;
+    input.disabled = !mine || !settings;
+    back.disabled = !mine || at === FILE;
+    if (!settings || this.preference.at === at || performance.now() - (this.touched ?? -1e9) <= 1000) return;
+    this.preference.at = at;
+    if (at !== FILE) input.value = at;
+    words(at);
   }
 
   show(shown, mine, soon = false) {
@@ -154,6 +196,7 @@ export class Panel {
       }
     }
     const first = Object.values(shown.cranes)[0];
+    if (this.preference) this.showPreference(shown.sliders.preference, mine);
     const late = first?.late_us == null ? "" : text("page.late", { ms: (first.late_us / 1000).toFixed(2), missed: first.missed });
     set(document.getElementById("late"), late);
     const silent = Object.entries(shown.cranes).filter(([, crane]) => !crane.crane).map(([name]) => nameOf("crane", name));
