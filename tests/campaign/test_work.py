@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 
 from canshaper.campaign import work_results
 from canshaper.campaign.run import Source
-from canshaper.campaign.work import AXES, LIMIT_S, LOADS, Move, Work, do_work, learn, places
+from canshaper.campaign.work import AXES, LIMIT_S, LOADS, Move, SetUp, Work, do_work, learn, places
 from canshaper.campaign.work_results import do_all, gain, practised, table
 from canshaper.cli.app import app
 from canshaper.errors import CampaignError
@@ -30,7 +30,7 @@ WITHIN = 0.30, 6.0
 
 @cache
 def known(*, bypass: bool) -> tuple[Known, ...]:
-    return learn(read(Path(ROBUST)), CraneParameters(), bypass=bypass)
+    return learn(source(), SetUp(bypass=bypass))
 
 
 def source(*changes: str, file: str = ROBUST) -> Source:
@@ -42,7 +42,9 @@ def works(
     *, bypass: bool, seed: str = "0", speed: float = 0.6, within: tuple[float, float] = WITHIN
 ) -> Work:
     learned, technique = known(bypass=bypass), (speed, 1.0)
-    return Work(bypass, "catching", Skill(), learned, (technique, technique), within, seed)
+    return Work(
+        SetUp(bypass=bypass), "catching", Skill(), learned, (technique, technique), within, seed
+    )
 
 
 def test_places_are_those_of_the_seed_and_within_reach() -> None:
@@ -67,21 +69,18 @@ def test_practice_teaches_speed_and_run_on(run_on_s: float, *, bypass: bool) -> 
 
 
 def test_a_machine_whose_nodes_have_to_boot_is_waited_for() -> None:
-    learned = learn(read(CONFIG / "canopen-forwarder.yaml"), CraneParameters(), bypass=True)
+    learned = learn(source(file=str(CONFIG / "canopen-forwarder.yaml")), SetUp(bypass=True))
     assert [one.full_m_s for one in learned] == pytest.approx([0.5, 1.0], rel=0.02)
 
 
 def test_a_crane_that_cannot_do_the_work_is_refused() -> None:
-    joints, still = (
-        CONFIG / "forwarder-joints.yaml",
-        changed_parameters(["slew_min_rad=0", "slew_max_rad=0"]),
-    )
+    joints, still = str(CONFIG / "forwarder-joints.yaml"), ("slew_min_rad=0", "slew_max_rad=0")
     with pytest.raises(
         CampaignError, match="yaml: expected axes slew and near_far, got slew, lift"
     ):
-        learn(read(joints), CraneParameters(), bypass=True)
+        learn(source(file=joints), SetUp(bypass=True))
     with pytest.raises(CampaignError, match="expected slew to move when its joystick is at 50%"):
-        learn(read(Path(ROBUST)), still, bypass=True)
+        learn(source(*still), SetUp(bypass=True))
 
 
 def test_moves_are_done_and_anti_sway_swings_less() -> None:
@@ -169,10 +168,10 @@ def test_practice_chooses_the_fastest_technique_of_each_load() -> None:
             results[one] = [Move(load, True, seconds[load] + slower) for load in LOADS]
         return results
 
-    chosen = practised(source(), Operators(), WITHIN, do)
-    assert [(one.bypass, one.operator) for one in chosen] == [
-        (bypass, name) for bypass in (True, False) for name in ("catching", "waiting", "novice")
-    ]
+    people = {name: getattr(Operators(), name) for name in ("catching", "waiting", "novice")}
+    set_ups = [SetUp(bypass=bypass) for bypass in (True, False)]
+    chosen = practised(source(), set_ups, people, WITHIN, do)
+    assert [(one.set_up, one.operator) for one in chosen] == [*product(set_ups, people)]
     for one in chosen:
         catch = 0.5 if one.operator == "catching" else 0.0
         assert one.techniques == ((1.0, catch), (0.25, catch))
