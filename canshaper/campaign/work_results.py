@@ -66,6 +66,7 @@ def practised(
     people: Mapping[str, Skill],
     within: tuple[float, float],
     do: Doing,
+    *,
     cycles: int = _PRACTICE,
 ) -> list[Work]:
     """Let each person practise with each set-up; return works by the fastest technique of each.
@@ -119,7 +120,7 @@ def moves_of(
         CampaignError: see ``learn``.
     """
     people = {task.operator: getattr(Operators(), task.operator)}
-    plans = practised(source, set_ups, people, task.within, do, 1)
+    plans = practised(source, set_ups, people, task.within, do, cycles=1)
     done = do([replace(one, seed=str(seed)) for seed in range(seeds) for one in plans])
     by_set_up: dict[SetUp, list[Move]] = {one: [] for one in set_ups}
     for work, moves in done.items():

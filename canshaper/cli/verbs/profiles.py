@@ -23,7 +23,7 @@ _ALMOST = 0.95  # the response is taken to be over at 5 %
 
 def profiles(
     file: str = typer.Argument(
-        "j1939-profiles.yaml", help="Deployment file; by default a shipped one."
+        "forwarder-load.yaml", help="Deployment file; by default a shipped one."
     ),
     work: bool = typer.Option(True, "--work/--no-work", help="Seconds a move too: minutes."),
     seeds: int = typer.Option(6, "--seeds", min=2, help="Working cycles with each profile."),
