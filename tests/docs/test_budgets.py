@@ -53,7 +53,7 @@ BUDGET = {
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 600,
     "docs/tuning.md": 700,
-    "docs/work.md": 250,
+    "docs/work.md": 305,
     "studies/README.md": 760,
 }
 
@@ -64,8 +64,8 @@ LINES = {
         4_836,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (58_800, "a new ability takes the room of an old one"),
-    "tests": (93_200, "one level for each behaviour"),
+    "canshaper": (59_100, "a new ability takes the room of an old one"),
+    "tests": (93_550, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (355, "one that only hands on is joined to its reader")}
