@@ -241,7 +241,8 @@ def test_what_is_slower_than_off_is_red_and_said() -> None:
     still = {OFF: moves(9.0, 9.5), own: moves(6.0, 7.0), precise: moves(8.0, 12.0)}
     tip = {OFF: moves(4.0, 4.1), own: moves(5.0, 4.0), precise: moves(4.0, 4.0)}
     drawn, slower = choice("s", TWO, {"loading": still, "tip only": tip})
-    heads, cells = [one.header for one in drawn.columns], [[*one.cells] for one in drawn.columns]
+    heads = [one.header for one in drawn.columns]
+    cells: list[list[Any]] = [[*one.cells] for one in drawn.columns]
     assert heads == ["s", "30 cm\n6 deg", "30 cm\ntip only"]
     assert cells[0] == ["off", "normal", "precise"]
     assert [(one.plain, one.style) for one in cells[1]] == [
