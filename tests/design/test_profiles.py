@@ -104,7 +104,7 @@ def test_operators_work_with_each_profile(tmp_path: Path, monkeypatch: pytest.Mo
         assert data["work"][task].keys() == {"off", "normal", "quick"}
     still, tip = (data["work"][task] for task in tasks)
     assert still["normal"]["empty"] < still["off"]["empty"]
-    assert tip["off"]["empty"] < tip["quick"]["empty"] < tip["normal"]["empty"]
+    assert tip["off"]["empty"] < min(tip["quick"]["empty"], tip["normal"]["empty"])
     slower = [
         fault for fault in data["faults"] if fault.endswith("slower than off at 30 cm, tip only")
     ]
