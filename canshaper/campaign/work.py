@@ -13,7 +13,9 @@ from typing import NamedTuple
 
 from canshaper.campaign.draw import driven_axes
 from canshaper.campaign.run import Source
+from canshaper.design.comparison.candidates import Candidate, with_candidate
 from canshaper.design.lockstep import DriveOptions, OnFrame, Simulation
+from canshaper.design.profiles import choosing
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import NEAR_FAR, SLEW
@@ -34,10 +36,37 @@ _STANDS = 0.01  # of the speed before
 
 
 @dataclass(frozen=True)
+class SetUp:
+    """What stands between joysticks and crane.
+
+    Attributes:
+        name: of it; where it is no candidate the profile that is chosen, "" for the own filters.
+        bypass: anti-sway is switched off.
+        candidate: filters in place of those of the file.
+    """
+
+    name: str = ""
+    bypass: bool = False
+    candidate: Candidate | None = field(default=None, compare=False)
+
+    def deployment(self, source: Source) -> Deployment:
+        """The deployment that is driven."""
+        loaded = source.load()
+        return with_candidate(loaded, self.candidate) if self.candidate else loaded
+
+    @property
+    def options(self) -> DriveOptions:
+        """Options of its drives."""
+        if self.bypass or self.candidate or not self.name:
+            return {"bypass": self.bypass}
+        return {"prepare": choosing(self.name)}
+
+
+@dataclass(frozen=True)
 class Work:
     """One working cycle."""
 
-    bypass: bool  # with anti-sway switched off
+    set_up: SetUp
     operator: str
     skill: Skill
     known: tuple[Known, ...]  # of each axis; of slew a m is a rad
@@ -81,20 +110,21 @@ def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
     return at
 
 
-def learn(deployment: Deployment, nominal: CraneParameters, *, bypass: bool) -> tuple[Known, ...]:
+def learn(source: Source, set_up: SetUp) -> tuple[Known, ...]:
     """Press and let go each joystick once: what practice teaches of a crane.
 
     Raises:
         CampaignError: it has no tip that slew and near-far move, or they do not move it.
         ConfigError: the deployment does not fit the machine.
     """
+    deployment, nominal = set_up.deployment(source), changed_parameters([*source.changes])
     crane, axes = driven_axes(deployment)
     if not {*AXES} <= {*axes}:
         text = f"expected axes {' and '.join(AXES)}, got {', '.join(axes)}"
         raise CampaignError(f"{deployment.path}: {text}")
     middle_m, known = 0.5 * (nominal.radius_min_m + nominal.radius_max_m), []
     start = replace(nominal, start_radius_m=middle_m)
-    options: DriveOptions = {"parameters": start, "crane": crane, "bypass": bypass}
+    options: DriveOptions = {"parameters": start, "crane": crane, **set_up.options}
     for axis in AXES:
         press = Stroke(axis, *_PRESS)
         simulation = Simulation(deployment, Script("press", (press,), 9.0), **options)
@@ -117,13 +147,14 @@ def do_work(
     source: Source, work: Work, on_frame: OnFrame | None = None, moves: int = MOVES
 ) -> list[Move]:
     """Do one working cycle, or its first moves; ``on_frame`` gets all frames, with times in s."""
-    deployment, nominal = source.load(), changed_parameters([*source.changes])
+    deployment = work.set_up.deployment(source)
+    nominal = changed_parameters([*source.changes])
     at, tick_s = places(nominal, work.seed), deployment.config.tick_ms / 1000.0
     joysticks = _Joysticks("work", (), (MOVES + 1) * (_GRIP_S + LIMIT_S))
     options: DriveOptions = {
         "parameters": replace(nominal, start_theta1_rad=at[0][0], start_radius_m=at[0][1]),
         "crane": driven_axes(deployment)[0],
-        "bypass": work.bypass,
+        **work.set_up.options,
     }
     simulation = Simulation(deployment, joysticks, on_frame, **options)
     crane, ticks, done = simulation.plant.crane, simulation.ticks(), list[Move]()

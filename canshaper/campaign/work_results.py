@@ -1,23 +1,26 @@
 """Practice, then the work that counts, with and without anti-sway; a table and picture of it."""
 
+import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from statistics import fmean, median
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
+from rich.text import Text
 from scipy import stats
 
 from canshaper.campaign.engine import Engine
 from canshaper.campaign.run import Source
 from canshaper.campaign.statistics import CONFIDENCE
-from canshaper.campaign.work import LIMIT_S, LOADS, Move, Work, do_work, learn
+from canshaper.campaign.work import LIMIT_S, LOADS, Move, SetUp, Work, do_work, learn
+from canshaper.inputs.value import OWN
 from canshaper.report.console import OnProgress, new_table
-from canshaper_sim.operator_model import Operators
+from canshaper_sim.operator_model import Operators, Skill
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import CraneTrace
@@ -29,41 +32,74 @@ if TYPE_CHECKING:
 _SPEEDS, _CATCHES, _PRACTICE = (0.25, 0.5, 0.75, 1.0), (0.0, 0.5, 1.0), 2
 Done = dict[Work, list[Move]]
 """Moves of each working cycle, in the order of the seeds."""
+Doing = Callable[[Sequence[Work]], Done]
+"""Does works."""
+
+
+class Task(NamedTuple):
+    """A tolerance, and who works to it."""
+
+    operator: str
+    within: tuple[float, float]  # tip, m, and swing, degrees; infinite: any
+
+    @property
+    def head(self) -> str:
+        """Head of its column."""
+        tip_m, most_deg = self.within
+        swing = "tip only" if most_deg == math.inf else f"{most_deg:g} deg"
+        return f"{100.0 * tip_m:g} cm\n{swing}"
+
+
+# By the profile that is for it.
+TASKS = {
+    "precise": Task("waiting", (0.30, 2.0)),
+    "loading": Task("catching", (0.30, 6.0)),
+    "rough": Task("catching", (0.60, 20.0)),
+    "tip only": Task("catching", (0.30, math.inf)),
+}
+OFF = SetUp("off", bypass=True)
 
 
 def practised(
     source: Source,
-    operators: Operators,
+    set_ups: Sequence[SetUp],
+    people: Mapping[str, Skill],
     within: tuple[float, float],
-    do: Callable[[Sequence[Work]], Done],
+    do: Doing,
+    *,
+    cycles: int = _PRACTICE,
 ) -> list[Work]:
-    """Let each operator practise, anti-sway off and on; return works by the fastest technique.
+    """Let each person practise with each set-up; return works by the fastest technique of each.
+
+    Args:
+        source: the deployment.
+        set_ups: with what they work.
+        people: who works.
+        within: tip from the target, m, and swing, degrees.
+        do: does works.
+        cycles: of practice with each technique.
 
     Raises:
         CampaignError: see ``learn``.
     """
-    deployment, nominal = source.load(), changed_parameters([*source.changes])
-    known = {bypass: learn(deployment, nominal, bypass=bypass) for bypass in (True, False)}
+    known = {one: learn(source, one) for one in set_ups}
     works = [
-        Work(bypass, one.name, getattr(operators, one.name), known[bypass], (), within, "")
-        for bypass, one in product(known, fields(operators))
+        Work(set_up, name, skill, known[set_up], (), within, "")
+        for set_up, (name, skill) in product(set_ups, people.items())
     ]
     trials = [
         replace(one, techniques=(way,) * len(LOADS), seed=f"practice {number}")
-        for one, way, number in product(works, product(_SPEEDS, _CATCHES), range(_PRACTICE))
+        for one, way, number in product(works, product(_SPEEDS, _CATCHES), range(cycles))
         if way[1] <= one.skill.catch
     ]
     tried = defaultdict[Any, list[float]](list)
     for one, moves in do(trials).items():
         for move in moves:
-            key = one.bypass, one.operator, move.load, one.techniques[0]
-            tried[key].append(move.seconds)
+            plan = replace(one, techniques=(), seed="")
+            tried[plan, move.load, one.techniques[0]].append(move.seconds)
     order = sorted(tried, key=lambda key: fmean(tried[key]), reverse=True)
-    best = {key[:3]: key[3] for key in order}  # the fastest comes last
-    return [
-        replace(one, techniques=tuple(best[one.bypass, one.operator, load] for load in LOADS))
-        for one in works
-    ]
+    best = {key[:2]: key[2] for key in order}  # the fastest comes last
+    return [replace(one, techniques=tuple(best[one, load] for load in LOADS)) for one in works]
 
 
 def do_all(engine: Engine, source: Source, progress: OnProgress, works: Sequence[Work]) -> Done:
@@ -73,6 +109,66 @@ def do_all(engine: Engine, source: Source, progress: OnProgress, works: Sequence
         done[work] = moves
         progress(len(done) / len(works))
     return {work: done[work] for work in works}
+
+
+def moves_of(
+    source: Source, set_ups: Sequence[SetUp], task: Task, do: Doing, seeds: int
+) -> dict[SetUp, list[Move]]:
+    """Practise for one cycle and do a task, with each set-up.
+
+    Raises:
+        CampaignError: see ``learn``.
+    """
+    people = {task.operator: getattr(Operators(), task.operator)}
+    plans = practised(source, set_ups, people, task.within, do, cycles=1)
+    done = do([replace(one, seed=str(seed)) for seed in range(seeds) for one in plans])
+    by_set_up: dict[SetUp, list[Move]] = {one: [] for one in set_ups}
+    for work, moves in done.items():
+        by_set_up[work.set_up] += moves
+    return by_set_up
+
+
+def choice(
+    title: str, tasks: Mapping[str, Task], moves: Mapping[str, Mapping[SetUp, Sequence[Move]]]
+) -> tuple[Table, list[str]]:
+    """Seconds a move of each set-up, empty / log, in a column for each task.
+
+    Red where it is slower than ``OFF``; and that in words.
+    """
+    drawn = new_table(title, *(task.head for task in tasks.values()))
+    slower = []
+    for one in next(iter(moves.values())):
+        cells = []
+        for name, done in moves.items():
+            means = {load: _seconds(done[one], load) for load in LOADS}
+            more_s = _seconds(done[one]) - _seconds(done[OFF])
+            style = "red" if more_s > 0.0 else "bold" if name == (one.name or "loading") else ""
+            cells.append(Text(" / ".join(f"{mean:.1f}" for mean in means.values()), style))
+            if more_s > 0.0:
+                at = tasks[name].head.replace("\n", ", ")
+                slower.append(f"{set_up_name(one)}: {more_s:.1f} s a move slower than off at {at}")
+        drawn.add_row(set_up_name(one), *cells)
+    return drawn, slower
+
+
+def set_up_name(one: SetUp) -> str:
+    """What a table calls it."""
+    return one.name or OWN
+
+
+def as_data(moves: Mapping[str, Mapping[SetUp, Sequence[Move]]]) -> dict[str, Any]:
+    """Seconds a move by task, set-up and load, for ``--json``."""
+    return {
+        name: {
+            set_up_name(one): {load: _seconds(done, load) for load in LOADS}
+            for one, done in by_set_up.items()
+        }
+        for name, by_set_up in moves.items()
+    }
+
+
+def _seconds(moves: Sequence[Move], load: str | None = None) -> float:
+    return fmean(move.seconds for move in moves if load in (None, move.load))
 
 
 def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, float]:
@@ -106,7 +202,7 @@ def table(done: Done) -> Table:
             [
                 [move for move in moves if move.load == load]
                 for one, moves in done.items()
-                if (one.bypass, one.operator) == (bypass, name)
+                if (one.set_up.bypass, one.operator) == (bypass, name)
             ]
             for bypass in (True, False)
         ]

@@ -24,13 +24,14 @@ NEUTRAL = re.compile(r"neutral|centre|center|rest", re.IGNORECASE)
 NEGATIVE = re.compile(r"neg|left|back|down|minus", re.IGNORECASE)
 POSITIVE = re.compile(r"pos|right|forward|fwd|up|plus", re.IGNORECASE)
 RADIUS = re.compile(r"radius|reach", re.IGNORECASE)
+LOAD = re.compile(r"weight|load|grip|grapple|gripped|lift.?press", re.IGNORECASE)
 COUNTER = re.compile(r"alive|count|rolling", re.IGNORECASE)
 _JOYSTICK = re.compile(r"lever|joy|joystick|stick|paddle", re.IGNORECASE)
 _VALVE = re.compile(r"valve|command|cmd|set.?point|pump|flow|actuat|motor", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[a-z]+\d*")
 _GENERIC = {"velocity", "speed", "command", "cmd", "valve", "flow", "position", "value", "axis"}
 # A switch has two bits at most: off, on, error, not available.
-_SWITCH_BITS = 2
+SWITCH_BITS = 2
 _BYTE = 8
 # Part of a name that two have in common, from which on they are likely to belong together.
 LIKELY = 0.6
@@ -59,7 +60,7 @@ def one_sided(message: Message) -> list[Signal]:
     return [
         s
         for s in message.signals
-        if s.length > _SWITCH_BITS and s.scale and not (two_sided(s) or s.is_float)
+        if s.length > SWITCH_BITS and s.scale and not (two_sided(s) or s.is_float)
         if not (s.is_multiplexer or COUNTER.search(s.name))
     ]
 
@@ -104,14 +105,14 @@ def likely_full(signal: Signal, zero: float = 0.0) -> float:
 
 def switches(message: Message) -> list[Signal]:
     """Signals of a message that can be a switch."""
-    return [s for s in message.signals if not s.is_signed and s.length <= _SWITCH_BITS]
+    return [s for s in message.signals if not s.is_signed and s.length <= SWITCH_BITS]
 
 
 def switch_parts(message: Message) -> list[Signal]:
     """Other signals that can be a switch as a whole, and each bit of them: SIGNAL/BIT."""
     parts: list[Signal] = []
     for s in message.signals:
-        bits = s.length <= _SWITCH_BITS if s.is_signed else _SWITCH_BITS < s.length <= _BYTE
+        bits = s.length <= SWITCH_BITS if s.is_signed else SWITCH_BITS < s.length <= _BYTE
         apart = s.is_float or s.is_multiplexer or s.unit or COUNTER.search(s.name)
         if bits and not apart and (s.is_signed or not s.choices):
             parts += [] if s.is_signed else [s]
@@ -130,7 +131,7 @@ def modes(message: Message) -> list[Signal]:
     return [
         s
         for s in message.signals
-        if s.choices and s.length > _SWITCH_BITS and not (s.is_signed or s.is_float)
+        if s.choices and s.length > SWITCH_BITS and not (s.is_signed or s.is_float)
         if not s.is_multiplexer
     ]
 
@@ -220,6 +221,20 @@ def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
         if message.cycle_time and 2 * message.cycle_time <= timeout_ms and not is_status(message)
         for signal in message.signals
         if signal.unit == "m" and RADIUS.search(signal.name)
+    ]
+
+
+def loads(messages: Sequence[Message]) -> list[tuple[Message, Signal]]:
+    """Return signals that can say what the grapple holds.
+
+    Not of J1939 where the sender is to be named besides.
+    """
+    return [
+        (message, signal)
+        for message in messages
+        if not (is_status(message) or is_j1939(message))
+        for signal in message.signals
+        if not (signal.is_multiplexer or signal.is_float or COUNTER.search(signal.name))
     ]
 
 

@@ -76,9 +76,10 @@ class SetChooser:
         bound: the axis.
         axis: its state machine, which is retuned.
         load: what hangs on the crane, where there is a signal for it.
-        profile: the operator's choice, where there is one.
+        profile: see below.
 
     Attributes:
+        profile: the operator's choice, where there is one.
         number: set in force: 0 the axis' own, then its sets, then each profile and its sets, in the
             order of the file; between two sets the nearer one.
     """
@@ -94,7 +95,7 @@ class SetChooser:
         self.number = 0
         self._axis = axis
         self._load = load
-        self._profile = profile
+        self.profile = profile
         self._rate = config.limits.slowest_per_s
         self._programs = programs(bound)
         self._first: dict[str, int] = {}
@@ -109,7 +110,7 @@ class SetChooser:
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
-        name = self._profile.name(now_ns) if self._profile else ""
+        name = self.profile.name(now_ns) if self.profile else ""
         if name not in self._programs:
             name = ""
         before, steps = self._now

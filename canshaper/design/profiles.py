@@ -1,6 +1,6 @@
 """Measures of each profile of a deployment with a full press, on the simulated crane."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from canshaper.config.limits import Sway
@@ -58,6 +58,17 @@ class Chosen:
         return self._name
 
 
+def choosing(name: str) -> Callable[[Controller], None]:
+    """Choose a profile in a fresh controller; its gain schedule goes on by the load."""
+
+    def choose(controller: Controller) -> None:
+        for runner in controller.axes.values():
+            if runner.chooser:
+                runner.chooser.profile = Chosen(name)
+
+    return choose
+
+
 def figures(deployment: Deployment) -> Iterator[Figures]:
     """Yield the measures of every profile on every axis that has it, and of the axis' own filter.
 
@@ -89,13 +100,8 @@ def _press(deployment: Deployment, axis: str, name: str, length_pct: int) -> Axi
     crane = CraneParameters()
     crane = replace(crane, grapple=crane.grapple.longer(length_pct))
 
-    def choose(controller: Controller) -> None:
-        for runner in controller.axes.values():
-            if runner.chooser:
-                runner.add_chooser(None, Chosen(name))
-
     script = Script("press", (Stroke(axis, *_PRESS),), _DRIVE_S)
-    recording = drive(deployment, script, parameters=crane, prepare=choose)
+    recording = drive(deployment, script, parameters=crane, prepare=choosing(name))
     return axis_metrics(recording, axis, deployment.config.still_deg)
 
 

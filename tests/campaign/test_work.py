@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,22 @@ from typer.testing import CliRunner, Result
 
 from canshaper.campaign import work_results
 from canshaper.campaign.run import Source
-from canshaper.campaign.work import AXES, LIMIT_S, LOADS, Move, Work, do_work, learn, places
-from canshaper.campaign.work_results import do_all, gain, practised, table
+from canshaper.campaign.work import AXES, LIMIT_S, LOADS, Move, SetUp, Work, do_work, learn, places
+from canshaper.campaign.work_results import (
+    OFF,
+    TASKS,
+    Task,
+    as_data,
+    choice,
+    do_all,
+    gain,
+    moves_of,
+    practised,
+    table,
+)
 from canshaper.cli.app import app
+from canshaper.config.filters import filter_of
+from canshaper.design.comparison.candidates import Candidate
 from canshaper.errors import CampaignError
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator_model import Known, Operators, Skill
@@ -30,7 +43,7 @@ WITHIN = 0.30, 6.0
 
 @cache
 def known(*, bypass: bool) -> tuple[Known, ...]:
-    return learn(read(Path(ROBUST)), CraneParameters(), bypass=bypass)
+    return learn(source(), SetUp(bypass=bypass))
 
 
 def source(*changes: str, file: str = ROBUST) -> Source:
@@ -42,7 +55,9 @@ def works(
     *, bypass: bool, seed: str = "0", speed: float = 0.6, within: tuple[float, float] = WITHIN
 ) -> Work:
     learned, technique = known(bypass=bypass), (speed, 1.0)
-    return Work(bypass, "catching", Skill(), learned, (technique, technique), within, seed)
+    return Work(
+        SetUp(bypass=bypass), "catching", Skill(), learned, (technique, technique), within, seed
+    )
 
 
 def test_places_are_those_of_the_seed_and_within_reach() -> None:
@@ -67,21 +82,18 @@ def test_practice_teaches_speed_and_run_on(run_on_s: float, *, bypass: bool) -> 
 
 
 def test_a_machine_whose_nodes_have_to_boot_is_waited_for() -> None:
-    learned = learn(read(CONFIG / "canopen-forwarder.yaml"), CraneParameters(), bypass=True)
+    learned = learn(source(file=str(CONFIG / "canopen-forwarder.yaml")), SetUp(bypass=True))
     assert [one.full_m_s for one in learned] == pytest.approx([0.5, 1.0], rel=0.02)
 
 
 def test_a_crane_that_cannot_do_the_work_is_refused() -> None:
-    joints, still = (
-        CONFIG / "forwarder-joints.yaml",
-        changed_parameters(["slew_min_rad=0", "slew_max_rad=0"]),
-    )
+    joints, still = str(CONFIG / "forwarder-joints.yaml"), ("slew_min_rad=0", "slew_max_rad=0")
     with pytest.raises(
         CampaignError, match="yaml: expected axes slew and near_far, got slew, lift"
     ):
-        learn(read(joints), CraneParameters(), bypass=True)
+        learn(source(file=joints), SetUp(bypass=True))
     with pytest.raises(CampaignError, match="expected slew to move when its joystick is at 50%"):
-        learn(read(Path(ROBUST)), still, bypass=True)
+        learn(source(*still), SetUp(bypass=True))
 
 
 def test_moves_are_done_and_anti_sway_swings_less() -> None:
@@ -169,15 +181,81 @@ def test_practice_chooses_the_fastest_technique_of_each_load() -> None:
             results[one] = [Move(load, True, seconds[load] + slower) for load in LOADS]
         return results
 
-    chosen = practised(source(), Operators(), WITHIN, do)
-    assert [(one.bypass, one.operator) for one in chosen] == [
-        (bypass, name) for bypass in (True, False) for name in ("catching", "waiting", "novice")
-    ]
+    people = {name: getattr(Operators(), name) for name in ("catching", "waiting", "novice")}
+    set_ups = [SetUp(bypass=bypass) for bypass in (True, False)]
+    chosen = practised(source(), set_ups, people, WITHIN, do)
+    assert [(one.set_up, one.operator) for one in chosen] == [*product(set_ups, people)]
     for one in chosen:
         catch = 0.5 if one.operator == "catching" else 0.0
         assert one.techniques == ((1.0, catch), (0.25, catch))
         assert one.skill == getattr(Operators(), one.operator)
     assert sum(chosen[0].known[0].fall) < 0.25 * sum(chosen[3].known[0].fall)
+
+
+def run_on_s(learned: tuple[Known, ...]) -> float:
+    return 0.02 * sum(learned[1].fall)
+
+
+def test_a_profile_works_by_its_gain_schedule() -> None:
+    load = source(file=str(CONFIG / "forwarder-load.yaml"))
+    precise, rough = (run_on_s(learn(load, SetUp(one))) for one in ("precise", "rough"))
+    own = run_on_s(known(bypass=False))  # that of an empty grapple is the same
+    assert rough < 0.85 * own < own < 0.95 * precise
+
+
+def test_another_filter_works() -> None:
+    zv = Candidate("ZV", {axis: filter_of("zv") for axis in AXES})
+    learned = learn(source(), SetUp("ZV", candidate=zv))
+    assert run_on_s(learned) < 0.85 * run_on_s(known(bypass=False))
+
+
+TWO = {name: TASKS[name] for name in ("loading", "tip only")}
+
+
+def test_each_set_up_does_the_task_with_its_own_moves() -> None:
+    set_ups = OFF, SetUp()
+    seen: list[Work] = []
+
+    def do(works: Sequence[Work]) -> dict[Work, list[Move]]:
+        seen.extend(works)
+        seconds = {"off": 9.0, "": 7.0}
+        return {
+            one: [Move(load, True, seconds[one.set_up.name]) for load in LOADS] for one in works
+        }
+
+    moves = moves_of(source(), set_ups, Task("waiting", (0.2, 3.0)), do, 3)
+    assert {one: [move.seconds for move in done] for one, done in moves.items()} == {
+        OFF: [9.0] * 6,
+        SetUp(): [7.0] * 6,
+    }
+    assert {one.operator for one in seen} == {"waiting"}
+    assert {one.within for one in seen} == {(0.2, 3.0)}
+    assert {one.seed for one in seen[-6:]} == {"0", "1", "2"}
+
+
+def test_what_is_slower_than_off_is_red_and_said() -> None:
+    def moves(empty_s: float, log_s: float) -> list[Move]:
+        return [Move("empty", True, empty_s), Move("log", True, log_s)]
+
+    precise, own = SetUp("precise"), SetUp()
+    still = {OFF: moves(9.0, 9.5), own: moves(6.0, 7.0), precise: moves(8.0, 12.0)}
+    tip = {OFF: moves(4.0, 4.1), own: moves(5.0, 4.0), precise: moves(4.0, 4.0)}
+    drawn, slower = choice("s", TWO, {"loading": still, "tip only": tip})
+    heads = [one.header for one in drawn.columns]
+    cells: list[list[Any]] = [[*one.cells] for one in drawn.columns]
+    assert heads == ["s", "30 cm\n6 deg", "30 cm\ntip only"]
+    assert cells[0] == ["off", "normal", "precise"]
+    assert [(one.plain, one.style) for one in cells[1]] == [
+        ("9.0 / 9.5", ""),
+        ("6.0 / 7.0", "bold"),
+        ("8.0 / 12.0", "red"),
+    ]
+    assert [one.style for one in cells[2]] == ["", "red", ""]
+    assert slower == [
+        "normal: 0.5 s a move slower than off at 30 cm, tip only",
+        "precise: 0.8 s a move slower than off at 30 cm, 6 deg",
+    ]
+    assert as_data({"loading": still})["loading"]["normal"] == {"empty": 6.0, "log": 7.0}
 
 
 def test_a_gain_is_that_of_the_pairs() -> None:

@@ -51,6 +51,8 @@ QUESTIONS = (
     "rotate valve",
     "Axis that moves the tip",
     "Measured radius",
+    "log gripped",
+    "one response",
 )
 
 

@@ -1,5 +1,6 @@
 """A sway sensor damps what slewing makes the grapple swing along the boom."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from canshaper.design.lockstep import drive as lock_step
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.grapple import Sway
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
 
@@ -24,10 +26,11 @@ def watching(tmp_path: Path) -> Deployment:
 
 
 def drive_both(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> Recording:
-    """A drive of 13 s with a grapple that is so much longer."""
+    """A drive of 13 s, or 15, with a grapple that is so much longer."""
     crane = CraneParameters()
     crane = replace(crane, grapple=crane.grapple.longer(length_pct))
-    return lock_step(deployment, Script("both", strokes, 13.0), parameters=crane)
+    end_s = 13.0 if strokes[-1].end_s < 9.0 else 15.0
+    return lock_step(deployment, Script("both", strokes, end_s), parameters=crane)
 
 
 def tilt_deg(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> float:
@@ -49,7 +52,7 @@ def test_a_slew_is_damped_in_its_plane(tmp_path: Path) -> None:
         left = [max(map(abs, plane[300:])) for plane in planes]
         print(f"{length_pct:+.0f} %: {left[0]:.2f} degrees, only watched {left[1]:.2f}")
         assert left[0] < 0.8
-        assert left[1] > 4.0
+        assert left[1] > 2.0
 
 
 # Near-far proves its sensor; 3.7 s later slew, and for a reversal it turns at 8 s.
@@ -79,7 +82,7 @@ def test_what_slewing_swings_along_the_boom_is_damped(slew: str, tmp_path: Path)
     left = [along_boom_deg(one, SLEWS[slew], 15.0) for one in (damped, watched)]
     print(f"{left[0]:.2f} degrees, only watched {left[1]:.2f}")
     assert left[0] < 0.6
-    assert left[1] > 1.4
+    assert left[1] > 1.0
 
 
 @pytest.mark.study
@@ -112,3 +115,42 @@ def test_both_joysticks_at_once_are_better_with_a_wrong_length_and_as_good_with_
     print(", ".join(f"{one:.2f}" for one in left))
     assert left[0] < left[1] + 0.15
     assert left[2] < 0.6 * left[3]
+
+
+# The first drive of the day: near-far has not moved, its sensor is unproved, slew turns at 2 s.
+COLD = (Stroke("slew", 0.5, 1.5, 1.0, 0.1), Stroke("slew", 2.0, 1.5, -1.0, 0.1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("length_pct", [0.0, 30.0])
+@pytest.mark.parametrize("strokes", [COLD, (*PROVED, *SLEWS["reversal"])], ids=["cold", "proved"])
+def test_it_leaves_no_more_than_its_filters_alone(
+    strokes: tuple[Stroke, ...], length_pct: float, tmp_path: Path
+) -> None:
+    left = [
+        tilt_deg(one, strokes, length_pct) for one in (load_deployment(FILE), watching(tmp_path))
+    ]
+    print(", ".join(f"{one:.2f}" for one in left))
+    assert left[0] < left[1] + 0.05
+    assert left[0] < (0.5 if length_pct == 0.0 else 4.0)
+
+
+# Near-far is pressed on the way, or not; then slew.
+PRESSED = (Stroke("near_far", 0.5, 0.8, 0.5), Stroke("slew", 2.0, 2.5, 1.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("strokes", "most_deg"), [((Stroke("slew", 0.5, 2.5, 1.0),), 0.9), (PRESSED, 0.3)]
+)
+def test_ten_degrees_along_the_boom_at_the_start_of_a_slew(
+    strokes: tuple[Stroke, ...], most_deg: float, tmp_path: Path
+) -> None:
+    left = []
+    for deployment in (load_deployment(FILE), watching(tmp_path)):
+        script, swing = Script("slew", strokes, 15.0), Sway(theta6_rad=math.radians(10.0))
+        recording = lock_step(deployment, script, sway=swing)
+        assert recording.crane is not None
+        left.append(max(recording.crane.sway_deg[-150:]))
+    print(", ".join(f"{one:.2f}" for one in left))
+    assert left[0] < most_deg < left[1]

@@ -93,7 +93,8 @@ def test_the_status_message_says_it() -> None:
 
 def test_it_is_reported_and_shown_how_long_the_pendulum_seems() -> None:
     deployment = load_deployment(FILE)
-    run = Run(deployment, PULSE, CraneParameters(grapple=Grapple(l2_m=1.56)))
+    press = Script("press", (Stroke("near_far", 0.5, 1.0, 1.0),), 5.0)
+    run = Run(deployment, press, CraneParameters(grapple=Grapple(l2_m=1.56)))
     (event,) = [one for one in run.events if "swings_like" in one]
     match = re.fullmatch(
         r"axis=near_far swings_like_length_m=(1\.\d\d) sd_pct=\d damping_ratio=0\.0\d file=1\.20"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from canshaper.campaign import work_results
 from canshaper.cli.app import app
 
 ROOT = Path(__file__).parents[2]
@@ -19,9 +20,9 @@ def run(*words: str) -> tuple[int, str]:
 
 @pytest.fixture(scope="module")
 def figures() -> dict[tuple[str, str], dict[str, float]]:
-    status, output = run("--json")
+    status, output = run("j1939-profiles.yaml", "--json", "--no-work")
     assert status == 0, output
-    return {(one["axis"], one["profile"]): one for one in json.loads(output)}
+    return {(one["axis"], one["profile"]): one for one in json.loads(output)["presses"]}
 
 
 @pytest.mark.slow
@@ -49,6 +50,65 @@ def test_the_file_has_these_figures(figures: dict[tuple[str, str], dict[str, flo
             numbers.split(), keys, (0.03, 0.02, 0.15, 0.05, 0.15), strict=True
         ):
             assert float(value) == pytest.approx(one[key], abs=room), (axis, name, key)
+
+
+@pytest.mark.slow
+def test_the_recommended_file_has_a_calmer_and_a_quicker_one_and_all_last_half_a_swing() -> None:
+    status, output = run("--json", "--no-work")
+    assert status == 0, output
+    data = json.loads(output)
+    assert not data["faults"]
+    by_name = {(one["axis"], one["profile"]): one for one in data["presses"]}
+    for axis in ("slew", "near_far"):
+        precise, own, rough = (by_name[axis, name] for name in ("precise", "normal", "rough"))
+        for key in ("run_on_s", "run_on_travel_s"):
+            assert rough[key] < 0.8 * own[key] < own[key] < 0.95 * precise[key]
+        for key in ("peak_deg", "residual_wrong_deg"):
+            assert precise[key] < own[key] < rough[key]
+        assert precise["residual_deg"] < 0.4
+
+
+def short(folder: Path) -> Path:
+    """Profiles on near-far alone, one of them shorter than half a swing."""
+    text = (ROOT / "config" / "j1939-profiles.yaml").read_text(encoding="utf-8")
+    text = text.replace("../dbc", str(ROOT / "dbc"))
+    slew, near_far = text.partition("  near_far:\n")[::2]
+    slew = re.sub(r"    profiles:\n(      \w+: .*\n)+", "", slew)
+    taps = "taps: [2 x 0.1, 32 x 0.0125, 4 x 0.1]"
+    near_far = re.sub(r"(quick: .*?)taps: \[.*?\], designed_for: {.*?} ", rf"\1{taps} ", near_far)
+    near_far = re.sub(r"      fine: .*\n", "", near_far)
+    file = folder / "short.yaml"
+    file.write_text(f"{slew}  near_far:\n{near_far}")
+    return file
+
+
+@pytest.mark.slow
+def test_a_response_shorter_than_half_a_swing_is_named(tmp_path: Path) -> None:
+    status, output = run(str(short(tmp_path)), "--no-work")
+    assert status == 0, output
+    line = "near_far.profiles.quick.filter: expected half a swing, 1.10 s, or longer, got 0.7"
+    assert line in " ".join(output.split())
+    assert output.count("half a swing") == 1
+
+
+@pytest.mark.slow
+def test_operators_work_with_each_profile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work_results, "_SPEEDS", (1.0,))
+    monkeypatch.setattr(work_results, "_CATCHES", (0.0,))
+    tasks = {name: work_results.TASKS[name] for name in ("loading", "tip only")}
+    monkeypatch.setattr(work_results, "TASKS", tasks)
+    status, output = run(str(short(tmp_path)), "--seeds", "2", "--json")
+    assert status == 0, output
+    data = json.loads(output[output.index("{") :])
+    for task in tasks:
+        assert data["work"][task].keys() == {"off", "normal", "quick"}
+    still, tip = (data["work"][task] for task in tasks)
+    assert still["normal"]["empty"] < still["off"]["empty"]
+    assert tip["off"]["empty"] < min(tip["quick"]["empty"], tip["normal"]["empty"])
+    slower = [
+        fault for fault in data["faults"] if fault.endswith("slower than off at 30 cm, tip only")
+    ]
+    assert [fault.partition(":")[0] for fault in slower] == ["normal", "quick"]
 
 
 def test_without_profiles_it_says_so() -> None:

@@ -53,7 +53,7 @@ BUDGET = {
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
     "docs/tuning.md": 754,
-    "docs/work.md": 250,
+    "docs/work.md": 305,
     "studies/README.md": 760,
 }
 
@@ -64,11 +64,11 @@ LINES = {
         4_815,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (60_981, "a new ability takes the room of an old one"),
-    "tests": (95_445, "one level for each behaviour"),
+    "canshaper": (61_430, "a new ability takes the room of an old one"),
+    "tests": (95_746, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (360, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (361, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

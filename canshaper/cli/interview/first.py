@@ -107,6 +107,22 @@ class FirstMotion:
 
 
 @dataclass(frozen=True)
+class FirstLoad:
+    """Time of ten swings with a log, by axis, and the signal that says that there is one.
+
+    Without a signal one response has to hold for both; ``empty`` and ``log`` are its values.
+    """
+
+    ten_swings_s: Mapping[str, float]
+    message: str | None = None
+    signal: str = ""
+    timeout_ms: int = 0
+    empty: float = 0.0
+    log: float = 0.0
+    codes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class FirstSensor:
     """A sway sensor, to be watched first; an inclination has a time constant of its fusion."""
 
@@ -213,6 +229,7 @@ class FirstMachine:
     data_bitrate: int | None = None
     """Bit rate of the data of a bus of CAN FD."""
     notes: Sequence[str] = field(default=())
+    load: FirstLoad | None = None
 
 
 def ten_swings_s() -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from canshaper.cli.interview.first import (
     FIRST_MAX_PCT,
@@ -13,9 +14,11 @@ from canshaper.cli.interview.first import (
     FirstCanopen,
     FirstCia408,
     FirstJoystick,
+    FirstLoad,
     FirstMachine,
     FirstMotion,
     FirstScaling,
+    Stopwatch,
     rounded,
     stop_distance_m,
 )
@@ -54,10 +57,13 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     yield "axes:"
     timeouts_ms = {joystick.name: joystick.timeout_ms for joystick in machine.joysticks}
     for axis in machine.axes:
-        yield from _axis(axis, timeouts_ms[axis.joystick])
+        yield from _axis(axis, timeouts_ms[axis.joystick], machine.load)
         yield ""
     if machine.motion:
         yield from _motion(machine.motion)
+        yield ""
+    if machine.load and machine.load.message:
+        yield from _load(machine.load)
         yield ""
     for key in ("status", "identity"):
         if (message := getattr(machine, key)) is not None:
@@ -69,10 +75,17 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
         yield "assumed:"
         yield from (f"  - {key}" for key in assumed)
         yield ""
+    yield from _adjustable(machine)
+
+
+def _adjustable(machine: FirstMachine) -> Iterator[str]:
+    by_load = bool(machine.load and machine.load.message)  # it chooses the numbers of those
+    if not (settable := [axis for axis in machine.axes if not (axis.swing and by_load)]):
+        return
     yield "# What `canshaper set` may change while the machine works."
     yield "control:"
     yield "  adjustable:"
-    for axis in machine.axes:
+    for axis in settable:
         yield f"    axes.{axis.name}.limits.max_pct: [20, 100]"
         if axis.swing:
             low, high = (rounded(share * axis.swing.period_s) for share in PERIOD_RANGE)
@@ -143,7 +156,7 @@ def _switches(machine: FirstMachine) -> Iterator[str]:
     yield ""
 
 
-def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
+def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> Iterator[str]:
     counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
     valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
     yield f"  {axis.name}:"
@@ -169,11 +182,10 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
         speeds = f"full_speed_rad_s: {slewing.full_speed_rad_s:g}"
         yield f"    slewing: {{ {speeds}, largest_radius_m: {slewing.largest_radius_m:g} }}"
     guess = " Assumed: no one has measured it." if swing.ten_swings_s == TEN_SWINGS_S else ""
-    swings = f"Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
-    yield f"    # {swings}{guess}"
+    ten_s = f"Ten swings in {swing.ten_swings_s:g} s"
+    yield f"    # {ten_s}, from {swing.first:g} to {swing.last:g}.{guess}"
     sway = swing.sway
-    shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
-    yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
+    yield f"    {_sway(swing)}"
     if sensor := axis.sensor:
         fusion = "" if sensor.fusion_s is None else f", fusion_s: {sensor.fusion_s:g}"
         keys = f"message: {sensor.message}, signal: {sensor.signal}, kind: {sensor.kind}{fusion}"
@@ -182,16 +194,46 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
         timeout = f"timeout_ms: {sensor.timeout_ms}"
         timeout += f", node: {sensor.node}" if sensor.node else ""
         yield f"    sway_sensor: {{ bus: crane, {keys}, use: watch, {timeout} }}"
-    poles = ", ".join(f"{pole:g}" for pole in swing.filter.parameters()["poles_rad_s"])
     yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."
-    yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
+    yield f"    {_filter(swing)}"
+    if load and load.message:
+        yield from _schedule(swing, load, load.ten_swings_s[axis.name])
     yield "    # First motion at reduced speed: raise max_pct when all is well."
     speed = axis.slewing.full_speed_m_s if axis.slewing else swing.full_speed_m_s
-    distance = stop_distance_m(speed, sway.mode().period_s, joystick_timeout_ms, axis.timeout_ms)
+    # One response for a range of pendulums runs on a third longer.
+    longest_s = load.ten_swings_s[axis.name] / 7.5 if load else sway.mode().period_s
+    distance = stop_distance_m(speed, longest_s, joystick_timeout_ms, axis.timeout_ms)
     yield "    # stop_distance_m: write how far the tip may travel when it stops from full speed."
     yield "    # It is a limit, here a guess; `canshaper check` shows what the filter needs."
     tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
     yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
+
+
+def _schedule(swing: Stopwatch, load: FirstLoad, ten_swings_s: float) -> Iterator[str]:
+    """The swing and filter of an empty grapple and of a log."""
+    yield f"    gain_schedule: # with a log ten swings in {ten_swings_s:g} s"
+    with_log = replace(swing, ten_swings_s=ten_swings_s)
+    for value, one in sorted([(load.empty, swing), (load.log, with_log)], key=lambda pair: pair[0]):
+        yield f"      - breakpoint: {value:g}"
+        yield f"        {_sway(one)}"
+        yield f"        {_filter(one)}"
+
+
+def _sway(swing: Stopwatch) -> str:
+    sway = swing.sway
+    shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
+    return f"sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
+
+
+def _filter(swing: Stopwatch) -> str:
+    poles = ", ".join(f"{pole:g}" for pole in swing.filter.parameters()["poles_rad_s"])
+    return f"filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
+
+
+def _load(load: FirstLoad) -> Iterator[str]:
+    yield "# What the grapple holds; silent for so long, and the axes' own filters hold."
+    keys = f"message: {load.message}, signal: {load.signal}, timeout_ms: {load.timeout_ms}"
+    yield f"load_state: {{ bus: crane, {keys}{_codes(load.codes)} }}"
 
 
 def _scaling(scaling: FirstScaling) -> str:

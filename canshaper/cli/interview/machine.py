@@ -17,6 +17,7 @@ from canshaper.cli.interview.answers import (
     whole,
 )
 from canshaper.cli.interview.axes import add_axes
+from canshaper.cli.interview.load import load_of
 from canshaper.cli.interview.nodes import Nodes, uses_of
 from canshaper.cli.interview.swing import motion_of
 from canshaper.errors import UsageError
@@ -24,7 +25,7 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from cantools.database.can import Message, Signal
 
-    from canshaper.cli.interview.first import FirstAxis, FirstJoystick, FirstMachine
+    from canshaper.cli.interview.first import FirstAxis, FirstJoystick, FirstMachine, FirstMotion
 
 FEWEST_CYCLES = 5  # of a joystick's message in its timeout
 FIRST_DATA_BITRATE = 2_000_000  # of most buses of CAN FD
@@ -71,6 +72,9 @@ def machine_of(
     if not axes:
         raise UsageError("no axis was named; nothing is written")
     motion = motion_of(axes, others)
+    valves = {axis.valve for axis in axes}
+    left = [message for message in messages if message.name not in valves]
+    load = load_of(axes, left, _meanings([joystick for joystick, _ in joysticks], axes, motion))
     status, identity = suggest.service_status(messages), suggest.identity(messages)
     machine = FirstMachine(
         channel_name,
@@ -82,12 +86,29 @@ def machine_of(
         identity.name if identity else None,
         motion,
         interface,
+        load=load,
     )
     uses = uses_of(machine, messages)
     machine = replace(machine, data_bitrate=_data_bitrate(messages, uses, bitrate))
     if not nodes.named:
         return machine
     return replace(machine, canopen=nodes.canopen(uses))
+
+
+def _meanings(
+    joysticks: "Sequence[FirstJoystick]",
+    axes: "Sequence[FirstAxis]",
+    motion: "FirstMotion | None",
+) -> set[str]:
+    """MESSAGE.SIGNAL of what was given a meaning."""
+    used = {f"{one.switch or one.message}.{one.enable}" for one in joysticks}
+    used |= {
+        f"{one.message}.{name}" for one in joysticks for name in (one.reset, one.anti_sway_off)
+    }
+    messages = {one.name: one.message for one in joysticks}
+    used |= {f"{messages[axis.joystick]}.{axis.command_signal}" for axis in axes}
+    used |= {f"{axis.sensor.message}.{axis.sensor.signal}" for axis in axes if axis.sensor}
+    return used | ({motion.radius} if motion and motion.radius else set())
 
 
 def _data_bitrate(messages: "list[Message]", uses: Collection[str], bitrate: int) -> int | None:

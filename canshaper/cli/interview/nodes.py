@@ -189,6 +189,8 @@ def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str
             add(axis.cia408.message, axis.cia408.timeout_ms)
         if axis.sensor:
             add(axis.sensor.message, axis.sensor.timeout_ms)
+    if machine.load:
+        add(machine.load.message, machine.load.timeout_ms)
     return uses
 
 

@@ -1,5 +1,6 @@
 """``canshaper init``: a first deployment, by a few questions."""
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,12 +15,13 @@ from canshaper.cli.interview.answers import accepted, answered_by, confirmed
 from canshaper.cli.interview.machine import machine_of
 from canshaper.cli.interview.nodes import Nodes, uses_of
 from canshaper.errors import CanshaperError, ConfigError, UsageError
+from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
-    from canshaper.cli.interview.first import FirstMachine
+    from canshaper.cli.interview.first import FirstAxis, FirstLoad, FirstMachine
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.config.bus import Bus
 
@@ -48,7 +50,9 @@ def init(
     Looks through the DBC files for joysticks, valves and switches, and shows the whole machine as
     it would be; where that is not right, or something is missing, it asks. Enter then takes what
     stands in brackets, "-" leaves a thing out. What the DBC does not say is asked: full deflection,
-    value in the middle, direction by flags or by a second signal. Written with reduced
+    value in the middle, direction by flags or by a second signal. What says that a log is gripped
+    gives filters for an empty grapple and for a log; where nothing does, one response may hold for
+    both. Written with reduced
     speed, and as we recommend: a robust shaper for each axis that swings (without SciPy a G_FF to
     begin with), slew and near-far as one motion, which is off until the step motion of commission
     is done. What is a guess of its own stands under assumed. A switch may be one bit of a signal,
@@ -113,7 +117,9 @@ def init(
         echo(f"  {note}")
     if writes:
         _set_by_sdo(machine, nodes, parameters)
-    left = [axis.name for axis in machine.axes if axis.swing and not _designed(file, axis.name)]
+    left = [
+        axis.name for axis in machine.axes if axis.swing and not _designed(file, axis, machine.load)
+    ]
     echo("What comes next:")
     echo(f"  canshaper check {file}")
     for axis in left:
@@ -150,21 +156,31 @@ def _write_dbc(path: Path, nodes: Nodes) -> None:
     path.write_text(dbc(nodes.messages), encoding="utf-8", newline="\n")
 
 
-def _designed(file: Path, axis: str) -> bool:
-    """Whether a robust shaper was designed for an axis and written; otherwise says why not."""
+def _designed(file: Path, axis: "FirstAxis", load: "FirstLoad | None") -> bool:
+    """Whether robust shapers were designed for an axis and written; otherwise says why not."""
+    name, lengths_m = axis.name, None
+    if load and axis.swing:
+        times_s = axis.swing.ten_swings_s, load.ten_swings_s[name]
+        low_m, high_m = (round(GRAVITY_M_S2 * (0.1 * t / math.tau) ** 2, 2) for t in times_s)
+        lengths_m = low_m, high_m
     try:
+        from canshaper.commissioning.loads import design_loads
         from canshaper.commissioning.robust import design_robust, summary_line, write_design
 
         deployment = loader(str(file))()
-        one = design_robust(deployment, axis)
+        if load and load.message:
+            designs = design_loads(deployment, name, duration_s=None)
+            write_design(deployment, *designs)
+            deployment = loader(str(file))()
+        one = design_robust(deployment, name, lengths_m=lengths_m)
         write_design(deployment, one)
     except ModuleNotFoundError as error:
         missing = (error.name or "").partition(".")[0]
         if missing not in EXTRAS:
             raise
-        echo(f"axis {axis}: no robust shaper yet, {missing} is missing: {install_line(missing)}")
+        echo(f"axis {name}: no robust shaper yet, {missing} is missing: {install_line(missing)}")
     except CanshaperError as error:
-        echo(f"axis {axis}: no robust shaper yet: {error}")
+        echo(f"axis {name}: no robust shaper yet: {error}")
     else:
         echo(summary_line(one))
         return True

@@ -1,32 +1,52 @@
 """``canshaper profiles``: what each profile of a deployment does."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import echo, loader
+from canshaper.cli.common import PROCESSES, echo, engine, loader
 from canshaper.errors import DesignError, UsageError
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from canshaper.machine.deployment import Deployment
+
 GROUP = "measure"
+
+_ALMOST = 0.95  # the response is taken to be over at 5 %
 
 
 def profiles(
     file: str = typer.Argument(
-        "j1939-profiles.yaml", help="Deployment file; by default a shipped one."
+        "forwarder-load.yaml", help="Deployment file; by default a shipped one."
     ),
+    work: bool = typer.Option(True, "--work/--no-work", help="Seconds a move too: minutes."),
+    seeds: int = typer.Option(6, "--seeds", min=2, help="Working cycles with each profile."),
+    processes: int | None = PROCESSES,
     as_json: bool = typer.Option(False, "--json", help="Print the figures as JSON, no table."),
 ) -> None:
-    """Measure what each profile of a deployment does with a full press of 3 s.
+    """Measure what each profile of a deployment does, and which is the right one for a tolerance.
 
-    On the simulated crane, with the file's limits: how long the grapple swings after release (until
-    still_deg of the file), how long and far the axis runs on, the
-    largest swing, and what is left of it with the right pendulum length and with one that is 15 %
-    longer or shorter. "normal" is the axis' own filter.
+    A full press of 3 s on the simulated crane, with the file's limits: how long the grapple swings
+    after release (until still_deg of the file), how long and far the axis runs on, the largest
+    swing, and what is left of it with the right pendulum length and with one that is 15 % longer or
+    shorter. "normal" is the axis' own filter, "off" anti-sway switched off.
+
+    Then the seconds a move, empty grapple / log, of the model operator of canshaper work: one who
+    waits at 30 cm and 2 degrees, one who catches the swing at 30 cm and 6 degrees, at 60 cm and 20
+    degrees, and where only the tip counts. Bold: what profiles of the names precise, loading (or
+    the own filter) and rough are for. Red: slower than off; a response shorter than half a swing.
 
     Examples:
 
       canshaper profiles
+
+      canshaper profiles machine.yaml --no-work
 
       canshaper profiles machine.yaml --json
     """
@@ -38,8 +58,13 @@ def profiles(
         results = list(figures(deployment))
     except DesignError as error:
         raise UsageError(f"{deployment.path}: {error}") from None
+    faults, data = [*_too_short(deployment)], dict[str, Any]()
+    if work:
+        data, at_work, slower = _work(deployment, seeds, processes)
+        faults += slower
     if as_json:
-        echo(json.dumps([asdict(one) for one in results], indent=2))
+        presses = [asdict(one) for one in results]
+        echo(json.dumps({"presses": presses, "work": data, "faults": faults}, indent=2))
         return
     heads = ("still, s", "run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
     table = new_table("axis, profile", *heads)
@@ -53,4 +78,49 @@ def profiles(
             f"{one.residual_deg:.2f}",
             f"{one.residual_wrong_deg:.1f}",
         )
-    SafeConsole().print(table)
+    console = SafeConsole()
+    console.print(table)
+    if work:
+        console.print(at_work)
+    for fault in faults:
+        console.print(fault, style="red")
+
+
+def _too_short(deployment: "Deployment") -> Iterator[str]:
+    """Yield what is wrong with filters that answer in less than half a swing: swing stays."""
+    from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
+    from canshaper.machine.filters import every_filter
+    from canshaper.shaping.registry import KINDS
+
+    for axis, bound in deployment.axes.items():
+        tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
+        for place, chosen, sway in every_filter((axis,), bound.config):
+            if sway is None or not KINDS[chosen.kind].needs_sway:
+                continue
+            mode, machine = sway.mode(), Machine.of(bound)
+            shaper_for = shaper_of(chosen, tick_s, bound.config.limits.slowest_per_s)
+            lasts_s = evaluate(mode, tick_s, shaper_for, machine, (0,)).run_on_s
+            half_s = 0.5 * mode.period_s
+            if lasts_s < _ALMOST * half_s:
+                name = ".".join(map(str, place))
+                expected = f"expected half a swing, {half_s:.2f} s, or longer"
+                yield f"{name}: {expected}, got {lasts_s:.2f} s"
+
+
+def _work(
+    deployment: "Deployment", seeds: int, processes: int | None
+) -> "tuple[dict[str, Any], Table, list[str]]":
+    """Seconds a move, by task and profile: data, table, and where a profile is slower than off."""
+    from canshaper.campaign.run import Source
+    from canshaper.campaign.work import SetUp
+    from canshaper.campaign.work_results import OFF, TASKS, as_data, choice, do_all, moves_of
+    from canshaper.inputs.value import profile_names
+    from canshaper.report.console import progress_bar
+
+    source = Source.of(deployment, deployment.config.uncertainty)
+    set_ups = [OFF, *map(SetUp, profile_names(deployment.config))]
+    with progress_bar("operators at work") as on_progress:
+        do = partial(do_all, engine(processes, None), source, on_progress)
+        moves = {name: moves_of(source, set_ups, task, do, seeds) for name, task in TASKS.items()}
+    table, slower = choice("seconds a move", TASKS, moves)
+    return as_data(moves), table, slower

@@ -1,7 +1,7 @@
 """``canshaper work``: seconds a move that anti-sway gains a model of an operator."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 
@@ -49,6 +49,7 @@ def work(
       canshaper work --set pump_flow=1.2 --operator novice.reaction_s=0.4
     """
     from canshaper.campaign.run import Source
+    from canshaper.campaign.work import SetUp
     from canshaper.campaign.work_results import do_all, figure, practised, table
     from canshaper.cli.results import Results
     from canshaper.report.console import progress_bar
@@ -65,13 +66,15 @@ def work(
     results = Results("Seconds a move", deployment, report, picture)
     source = Source.of(deployment, deployment.config.uncertainty, changes or [])
     within = tolerance[0] / 100.0, tolerance[1] if tolerance[1] < _DEG[1] else math.inf
+    set_ups = [SetUp(bypass=bypass) for bypass in (True, False)]
+    by_name = {one.name: getattr(people, one.name) for one in fields(people)}
     with progress_bar("practice") as on_progress:
         do = partial(do_all, engine(processes, None), source, on_progress)
-        plans = practised(source, people, within, do)
+        plans = practised(source, set_ups, by_name, within, do)
         on_progress(0.0, "work")
         done = do([replace(one, seed=str(seed)) for seed in range(seeds) for one in plans])
     results.print(table(done))
-    shown = [next(one for one in done if one.bypass == bypass) for bypass in (True, False)]
+    shown = [next(one for one in done if one.set_up == set_up) for set_up in set_ups]
     if path := results.picture(None, lambda: figure(source, shown)):
         results.picture_line(path)
     results.write()
