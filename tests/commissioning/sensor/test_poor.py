@@ -155,5 +155,5 @@ def test_no_commands() -> None:
 
 
 def test_one_stroke_is_too_little() -> None:
-    once = Script("once", (Stroke("near_far", 2.0, 0.3, 0.3),), 12.0)
+    once = Script("once", (Stroke("near_far", 2.0, 0.2, 0.3),), 12.0)
     refused(Drive(machine(), script=once).series(), "expected near_far driven alone for 2 s")
