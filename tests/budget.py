@@ -38,7 +38,7 @@ LISTED: Mapping[str, str] = {
     "tests/closed_loop/test_motion.py::test_a_motion_moves_no_axis_back": "both axes as one motion",
     "tests/closed_loop/test_sway_sensor_slewing.py::test_a_slew_is_damped": "with a sensor",
     "tests/closed_loop/test_twin.py::test_both_axes_at_fourteen": "a crane that shares no code",
-    "tests/commissioning/calibration/test_together_driven.py::test_the_pump_of_the_simulated": "the verb",
+    "tests/commissioning/calibration/test_together_driven.py::test_the_pump_of_the": "the verb",
     "tests/commissioning/identification/test_identify_command.py::test_empty_and_loaded": "swings",
     f"{KILLED}[calibrated": "never half a file",
     "tests/commissioning/procedure/test_commission.py::test_answers_come_from_a_file": "the whole",
