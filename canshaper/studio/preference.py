@@ -149,6 +149,7 @@ class Preference:
         self._path = path
         self._file = path.read_text("utf-8")
         self._lock = threading.Lock()
+        self._started = self._stopped = False
         self._process: subprocess.Popen[str] | None = None
         self._found: dict[str, Any] | None = None
 
@@ -159,14 +160,25 @@ class Preference:
                 command = [sys.executable, "-m", "canshaper.studio.preference", str(self._path)]
                 with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
                     self._process = process
+                    if self._stopped:
+                        process.kill()
                     text = process.communicate()[0]
                 self._found = json.loads(text) if process.returncode == 0 else {}
             return self._found
 
+    def ready(self) -> dict[str, Any] | None:
+        """Settings of each axis; None while they are computed. Nobody waits for them here."""
+        if not self._started:
+            self._started = True
+            threading.Thread(target=self.found, daemon=True).start()
+        return self._found
+
     def stop(self) -> None:
         """End the process, where it still runs."""
+        self._stopped = True
         if self._process:
-            self._process.terminate()
+            self._process.kill()
+            self._process.wait()
 
     def write(self, position: float) -> Deployment:
         """Write the settings at a position of the slider into the copy.

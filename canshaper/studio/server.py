@@ -131,8 +131,7 @@ def build_app(
         return JSONResponse(residuals(stage.deployment, stage.in_force()))
 
     async def settings(_request: HTTPConnection) -> Response:
-        found = await asyncio.to_thread(stage.preference.found) if stage.preference else {}
-        return JSONResponse(found)
+        return JSONResponse(stage.preference.ready() if stage.preference else {})
 
     routes = [WebSocketRoute("/ws", connection), Route("/residuals.json", left)]
     routes.append(Route("/preference.json", settings))

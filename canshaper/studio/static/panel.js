@@ -6,6 +6,7 @@ const MOST_EVENTS = 300;
 const OLD_S = 0.5;
 const SHOW_MS = 150; // no one reads faster
 const FILE = -1; // position of the slider of settings at which they are those of the file
+const ASK_MS = 1000; // for settings of the filters, which take seconds
 const URGENT = ["bad", "stop", "wait", "move", "ready"]; // levels of states, the first is said first
 
 const make = (tag, attributes = {}, ...children) => {
@@ -129,7 +130,10 @@ export class Panel {
     const back = make("button", { className: "back", title: text("slider.back"), disabled: true, onclick: () => slide("preference", FILE) }, text("preference.file"));
     back.setAttribute("aria-label", `${title}: ${text("preference.file")}`);
     const one = { input, back, at: FILE, load: async () => {
-      one.settings = await (await fetch("/preference.json")).json();
+      while (!one.settings) {
+        one.settings = await fetch("/preference.json").then((answer) => answer.json()).catch(() => null);
+        if (!one.settings) await new Promise((done) => setTimeout(done, ASK_MS));
+      }
       one.words(one.at);
     }, words: (at) => {
       set(value, at === FILE ? text("preference.file") : at.toFixed(1));

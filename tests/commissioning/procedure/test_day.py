@@ -46,12 +46,13 @@ def test_from_init_to_the_report(machine: Path, length_m: float) -> None:
     assert 0.0 < steps["drive"]["numbers"]["crane"]["residual_left_pct"] < MOST_LEFT_PCT
     assert steps["dry"]["numbers"]["valve_frames"] == 0
     assert steps["motion"]["numbers"]["enable_to_neutral_s"] <= 0.04
+    print(steps["filter"]["numbers"])
     axes = load_deployment(Path("machine.rehearsal.yaml")).config.axes
     for name in ("slew", "near_far"):
         sway, limits, designed = axes[name].sway, axes[name].limits, axes[name].filter
         origins = [sway and sway.origin, limits.curve_origin]
         assert [one and one.source for one in origins] == ["simulated"] * 2
-        assert designed.kind == "robust"
+        assert designed.kind == steps["filter"]["numbers"]["recommended"]
         assert limits.curve_command_pct
     report = (FOLDER / "report.html").read_text(encoding="utf-8")
     assert len(report) < MOST_REPORT_BYTES
