@@ -66,6 +66,7 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
     assert "slewing: of one that slews" not in "".join(lines)
 
 
+@pytest.mark.slow
 def test_check_says_for_which_pendulums_the_filters_of_each_load_hold(tmp_path: Path) -> None:
     """Those that a filter was designed for, else those that a campaign draws."""
     load = ROBUST.with_name("forwarder-load.yaml")
