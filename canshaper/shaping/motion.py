@@ -199,7 +199,7 @@ def range_with_added(
     own: float,
     largest: float,
     *,
-    maximum: float = 1.0,
+    maximum: float,
     no_run_on: bool = False,
 ) -> tuple[float, float]:
     """Range of an axis' own velocity and the added one together, up to ``maximum``.

@@ -37,7 +37,7 @@ def test_the_range_of_both_parts(
     """Asked: now, and most within the tail to either side."""
     command, forth, back = (sign * value for value in commands)
     low, high = min(forth, back, 0.0), max(forth, back, 0.0)
-    bounds = range_with_added(command, low, high, sign * own, 0.25)
+    bounds = range_with_added(command, low, high, sign * own, 0.25, maximum=1.0)
     assert bounds == (expected if sign > 0.0 else (-expected[1], -expected[0]))
 
 

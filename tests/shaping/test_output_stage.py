@@ -4,8 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from canshaper.shaping.axis import UNATTENDED_TICKS, ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.output import OutputStage
+from canshaper.shaping.states import CommandInput
+from canshaper.shaping.transfer import Off
 
 TICK_S, TAIL = 0.02, 5
 LIMITS = OutputLimits(tail_s=TAIL * TICK_S, rise_per_s=20.0, fall_per_s=100.0)
@@ -85,3 +88,37 @@ def test_nothing_is_added_against_a_joystick_that_is_held_without_a_demand(sign:
     for _ in range(5):
         one.drive(0.0, 0.0, 0.0, -0.2 * sign, 0.0, sensor_damps=False)
     assert one.output.steps * sign < 0
+
+
+def test_how_much_faster_than_asked_it_is_counts_the_own_part_and_all_of_it() -> None:
+    one = stage()
+    one.largest_added = 0.5
+    one._own_ramp, one.output.setpoint = 0.5, 0.3  # what is added goes the other way
+    assert one._beyond(0.0) == 0.5
+    assert one._beyond(0.2) == pytest.approx(0.3)
+
+
+def test_a_joystick_that_is_held_against_a_stop_ends_what_was_commanded() -> None:
+    one = OutputStage(replace(LIMITS, reversal_s=0.0), 125, TICK_S, spreads=False)
+    for _ in range(20):
+        one.drive(1.0, 1.0, 1.0, 0.0, 0.0, sensor_damps=False)
+    one.stop_against(-1.0)
+    assert not one.output.commanded
+    assert (one._recent.low, one._recent.high) == (0.0, 0.0)
+
+
+def test_a_rest_forgets_what_was_commanded() -> None:
+    one = stage()
+    one.drive(1.0, 1.0, 1.0, 0.0, 0.0, sensor_damps=False)
+    one.rest()
+    assert (one._recent.low, one._recent.high) == (0.0, 0.0)
+
+
+def test_missed_ticks_make_an_axis_unattended_as_others_do() -> None:
+    axis = ShapedAxis(TICK_S, LIMITS, sway=None, shaper=Off(), stop_s=5.0)
+    axis.tick(CommandInput())
+    axis._rested = axis._stage.tail + UNATTENDED_TICKS - 3
+    axis.hold(3)
+    assert not axis.unattended
+    axis.hold(1)
+    assert axis.unattended
