@@ -58,7 +58,7 @@ def by_mcap(path: Path) -> Iterator[object]:
 
 
 def by_mcap_in_order(path: Path) -> Iterator[object]:
-    """The same in the order of the file."""
+    """Frames in the order of the file."""
     with path.open("rb") as file:
         yield from StreamReader(file).records
 

@@ -37,7 +37,7 @@ _STANDS = 0.01  # of the speed before
 
 @dataclass(frozen=True)
 class SetUp:
-    """What stands between joysticks and crane.
+    """Filters and state between joysticks and crane.
 
     Attributes:
         name: of it; where it is no candidate the profile that is chosen, "" for the own filters.

@@ -152,7 +152,7 @@ def choice(
 
 
 def set_up_name(one: SetUp) -> str:
-    """What a table calls it."""
+    """Name in a table."""
     return one.name or OWN
 
 

@@ -1,4 +1,4 @@
-"""State of a daemon as metrics of Prometheus: every scrape asks the control socket anew."""
+"""State of a daemon as metrics of Prometheus: every scrape asks the control socket again."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping

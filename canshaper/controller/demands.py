@@ -1,4 +1,4 @@
-"""What bounds or scales the demands of axes before they act: end stops, the oil of one pump."""
+"""End stops and the oil of one pump bound the demands of axes before they act."""
 
 from collections.abc import Iterator, Mapping
 

@@ -1,4 +1,4 @@
-"""What the clients of the control socket may ask of a running machine, and who asked for what."""
+"""Requests of clients of the control socket: which are allowed, and who asked for what."""
 
 import logging
 import re

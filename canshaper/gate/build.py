@@ -107,7 +107,7 @@ def _group(can_id: int) -> int:
 
 
 def protection_of(section: Any, message: Any, can_id: int) -> Protection:
-    """What protects a message, by its section of the file."""
+    """Protection of a message, by its section of the file."""
     if one := section.e2e:
         counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
         check = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)

@@ -16,7 +16,7 @@ Key = tuple[str, int, bool]
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """What protects a message.
+    """Protection of a message.
 
     Attributes:
         check: of its content; None for nothing, or for what is not ``known``.

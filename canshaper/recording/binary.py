@@ -44,7 +44,7 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _handed_over(pipe: IO[bytes], place: Place) -> Iterator[TimedFrame]:
-    """What the other process has read."""
+    """Frames that the other process has read."""
     while True:
         try:
             part = marshal.load(pipe)

@@ -1,4 +1,4 @@
-"""What is exported of a drive, for MCAP and MF4 alike: one form, and a writer for each suffix.
+"""Export of a drive to MCAP and MF4: one form, and a writer for each suffix.
 
 Frames as they are, signals of the DBC files with units, axes with states and reasons, the pose of
 the crane, events. Nothing of it is imported by the daemon.
@@ -96,7 +96,7 @@ class Export:
         self._last_ns = 0
 
     def frame(self, frame: ReceivedFrame) -> None:
-        """Take a frame of a bus: states, reasons and pose are those that its frames tell."""
+        """Take a frame of a bus: states, reasons and pose are those that its frames report."""
         decoded = self._take(frame, sent=False)
         if frame.kind:
             return
@@ -183,10 +183,10 @@ class _Decoder:
         name = self._names.get((frame.can_id, frame.extended))
         if name is None and frame.extended:  # of J1939, from any address
             name = self._names.get((with_source(frame.can_id, NULL), True))
-        found = self._messages.find(name) if name else ""
-        if isinstance(found, str):
+        entry = self._messages.find(name) if name else ""
+        if isinstance(entry, str):
             return None
-        message = found[1]
+        message = entry[1]
         return message, {one.name: one for one in message.signals}, _decoding(message)
 
 
@@ -198,7 +198,7 @@ def _channel(signal: Signal) -> Channel:
 
 
 def _decoding(message: Message) -> Callable[[bytes], dict[str, float]]:
-    """What gives the values of a frame, in the units of the DBC."""
+    """Return the function that decodes a frame into values in the units of the DBC."""
     if message.is_multiplexed() or layout_fault(message):
         return lambda data: message.decode(data, decode_choices=False)  # type: ignore[return-value]
     decode = Layout(message).decode

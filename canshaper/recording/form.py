@@ -70,5 +70,5 @@ POSE = (
 
 
 def install(extra: str) -> str:
-    """What to type where an extra is missing."""
+    """Command that installs an extra that is missing."""
     return f"which is missing: pip install 'canshaper[{extra}]'"

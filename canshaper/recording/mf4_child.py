@@ -1,4 +1,4 @@
-"""What asammdf reads of an MF4 log, in a process of its own: a damaged file may end it.
+"""Reader of MF4 logs by asammdf, in a process of its own: a damaged file may end it.
 
 It prints what it does not understand, too. Frames go to the standard output, in parts of
 ``marshal``; nothing else of canshaper is loaded here.

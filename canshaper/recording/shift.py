@@ -1,7 +1,7 @@
 """The work in logs: figures by shift, profile and anti-sway, from a replay of each log.
 
 A replay gives joysticks, states and profiles. Valve frames in a log say what the valves really got,
-whoever sent them; without any, it is what the deployment would have sent. The swing is that of the
+from any sender; without any, it is what the deployment would have sent. The swing is that of the
 axis' model behind these commands, corrected by what a sway sensor shows.
 """
 
@@ -136,7 +136,7 @@ class Shifts:
 
 
 class _Axis:
-    """What one axis does in a log, tick by tick; ``foreign``: no canshaper drives it."""
+    """Motion of one axis in a log, tick by tick; ``foreign``: no canshaper drives it."""
 
     def __init__(self, bound: BoundAxis, tick_s: float) -> None:
         config = bound.config

@@ -32,7 +32,7 @@ FIGURES = {
     "measured_pct": "part of the driven time in which a sway sensor shows the swing; else it is"
     " that of the model, driven by the commands of the valves",
 }
-"""What each column is."""
+"""Definition of each column."""
 
 
 @dataclass

@@ -19,7 +19,7 @@ USED = {"JoystickLeft.Enable", "JoystickLeft.Slew"}
 
 
 def asked(folder: Path, text: str, swings: Sequence[str] = ("slew",)) -> FirstLoad | None:
-    """What is known of the load after these answers; ``swings``: axes that make it swing."""
+    """Load that the interview knows after these answers; ``swings``: axes that make it swing."""
     messages = []
     for dbc in (DBC, LOAD_DBC):
         file, _ = load_dbc(dbc)

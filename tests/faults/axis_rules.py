@@ -144,7 +144,7 @@ class AxisRules:
             self._oil.popleft()
 
     def reloaded(self) -> None:
-        """What was commanded before is forgotten: its partner may move it all the same."""
+        """An axis forgets what was commanded before: its partner may move it all the same."""
         self._commands = deque((at_ns, command, False) for at_ns, command, _ in self._commands)
 
     def silenced(self) -> None:

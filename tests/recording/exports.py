@@ -35,7 +35,7 @@ def frames(count: int = 400) -> list[ReceivedFrame]:
 
 
 def others(time_ns: int) -> list[ReceivedFrame]:
-    """What is no data frame."""
+    """Frames that carry no data."""
     error = ReceivedFrame(time_ns, "crane", "", ERR_FLAG | 4, True, bytes(8), "error")
     remote = ReceivedFrame(time_ns, "crane", "", 0x123, False, b"", "remote", None)
     return [error, remote, remote]
@@ -63,7 +63,7 @@ def exported_drive(path: Path) -> list[tuple[Tick, Result]]:
 
 
 def frames_of(ticks: list[tuple[Tick, Result]]) -> list[TimedFrame]:
-    """What went over the buses in these ticks, in order."""
+    """Frames on the buses in these ticks, in order."""
     seen = []
     for tick, result in ticks:
         for time_ns, (bus, *rest) in tick.received:

@@ -1,4 +1,4 @@
-"""What is exported of frames and ticks, whatever the format; and the options of the verbs."""
+"""Export of frames and ticks in any format, and the options of the verbs."""
 
 import json
 import os

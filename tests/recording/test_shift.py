@@ -224,7 +224,7 @@ def test_each_profile_has_its_row(tmp_path: Path) -> None:
 
 
 def test_a_break_is_no_waiting() -> None:
-    """Of a pause in which the grapple swings for long, a minute counts."""
+    """A minute counts of a pause in which the grapple swings for long."""
     counter, figures = WorkCounter("slew", 2.0), Figures()
     for joystick, seconds in ((1.0, 1.0), (0.0, 300.0), (1.0, 1.0), (0.0, 10.0)):
         for _ in range(round(10 * seconds)):
@@ -240,7 +240,7 @@ def test_a_break_is_no_waiting() -> None:
 def test_the_simulators_operator_is_counted_as_it_counted(
     tmp_path: Path, file: str, *, bypass: bool
 ) -> None:
-    """Of its taps each one; the way of the tip, the swing and the waits by its own record."""
+    """Each tap counts; the way of the tip, the swing and the waits by its own record."""
     deployment = loader(file)()
     known = learn(deployment, CraneParameters(), bypass=bypass)
     work = Work(bypass, "catching", Skill(), known, ((0.6, 1.0),) * 2, (0.3, 6.0), "0")

@@ -1,4 +1,4 @@
-"""What a person needs at once is on the first screen and true, also after a stop."""
+"""The first screen shows what a person needs at once, and it is true after a stop too."""
 
 from collections.abc import Callable
 

@@ -43,7 +43,7 @@ def shift(
 
     Cycles, metres of the tip, time waited for the grapple to calm, taps, reversals, largest swing.
     No sensor is needed: without one the swing is that of the model, and the table says so. Valve
-    frames in a log count, whoever sent them. docs/monitor.md says what each number is. Of a folder
+    frames in a log count, of any sender. docs/monitor.md says what each number is. Of a folder
     every log in it and below counts; a folder in it is a machine.
 
     Exit code 0; 1 when one of several logs cannot be used; 2 when all, or the deployment, are

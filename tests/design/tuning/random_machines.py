@@ -214,7 +214,7 @@ def swing_left(
 
 @dataclass(frozen=True)
 class Judged:
-    """What the verdict says, what the drive shows."""
+    """Word of the verdict, and swing left in the drive."""
 
     seed: int
     machine: Drawn

@@ -152,7 +152,7 @@ def _table(axis: str, by_kind: dict[str, Offer]) -> Table:
 
 
 def _show(deployment: Deployment, design: Design, outcome: Outcome) -> None:
-    """What follows from a choice."""
+    """Print and draw the design that was chosen."""
     name = design.bound.name
     if isinstance(design, RobustDesign):
         robust.print_design(deployment, design, outcome.sheet)
