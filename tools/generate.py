@@ -19,7 +19,7 @@ from canshaper.codec.frame import FrameFault
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.commissioning.procedure.state import FILE
 from canshaper.commissioning.procedure.steps import STEPS
-from canshaper.config.protection import PROFILES
+from canshaper.config.inputs import PROFILES
 from canshaper.config.section import Section
 from canshaper.config.uncertainty import MEASURES
 from canshaper.controller.valve_messages import Counters

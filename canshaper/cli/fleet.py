@@ -105,8 +105,7 @@ def _one(work: Callable[[Path], list[Row]], log: tuple[str, Path]) -> Log:
 def replayed(configs: tuple[str, ...], channels: Mapping[str, str], path: Path) -> list[Row]:
     """Drive each deployment with a log; return a row for each axis that moved."""
     from canshaper.recording.replay import Replay, look
-    from canshaper.recording.report import Replayed
-    from canshaper.recording.trace import Trace
+    from canshaper.recording.report import Replayed, Trace
 
     rows: list[Row] = []
     for config in configs:

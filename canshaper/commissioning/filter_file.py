@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisSection
+from canshaper.config.section import note, written_by
 from canshaper.config.source import Place
 from canshaper.edit.edit import Change, FileValue, change, of_limits
 from canshaper.machine.deployment import Deployment

@@ -9,8 +9,7 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.limits import Sway
-from canshaper.config.origin import Origin
-from canshaper.config.section import RUN, Section, expanded, number
+from canshaper.config.section import RUN, Origin, Section, expanded, number
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 from canshaper.shaping.sway import SwayMode

@@ -12,8 +12,7 @@ from pathlib import Path
 from cantools.database.can import Message, Signal
 
 from canshaper.bus.packet import FDF
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import NULL, with_source
+from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.layout import CLASSICAL_BYTES, Layout, layout_fault
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment

@@ -113,7 +113,7 @@ def shift(
 def _opened(
     machine: str, path: Path, config: str | None, channel: list[str], folder: str
 ) -> "LogOfWork":
-    from canshaper.recording.bundle import unpack
+    from canshaper.recording.record import unpack
     from canshaper.recording.replay import look
     from canshaper.recording.shift import LogOfWork, first_ns
 

@@ -16,9 +16,9 @@ from canshaper.bus.packet import (
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.verdict import Finding, Level, summary
-from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper.recording.channels import InputFinder
 
 LOOK_S = 0.2
 

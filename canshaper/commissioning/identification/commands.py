@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
-from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.series import (
     Array,
     Command,
@@ -22,6 +21,7 @@ from canshaper.commissioning.identification.series import (
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis
+from canshaper.recording.channels import InputFinder
 
 # Commands, part of full speed, below which an axis stands.
 STANDS = 0.01

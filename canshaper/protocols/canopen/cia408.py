@@ -6,8 +6,7 @@ because the axis is neutral until then. A fault is reset by an edge of the ready
 tripped until the operator resets it.
 """
 
-from canshaper.codec.frame import FrameFault
-from canshaper.codec.identifier import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
+from canshaper.codec.frame import READY_BIT, RESET_FAULT, STATE_BITS, FrameFault, ValveState
 from canshaper.codec.message import Sender
 from canshaper.config.schema import StatusWord
 from canshaper.inputs.input import GOOD, Input, Raw

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import service_of
+from canshaper.codec.frame import Frame, FrameFault, service_of
 from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput

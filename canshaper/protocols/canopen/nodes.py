@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     EMERGENCY,
     GENERIC_ERROR,
     HEARTBEAT,
@@ -13,6 +12,8 @@ from canshaper.codec.identifier import (
     NO_EMERGENCY,
     START,
     STATE_MASK,
+    Frame,
+    FrameFault,
     NodeState,
 )
 from canshaper.config.bus import Canopen, CanopenNode

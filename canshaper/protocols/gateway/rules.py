@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from canshaper.codec.frame import EFF_FLAG
-from canshaper.codec.identifier import NULL, WITHOUT_PRIORITY, group_mask, group_of
+from canshaper.codec.frame import EFF_FLAG, NULL, WITHOUT_PRIORITY, group_mask, group_of
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.rewrite import RewrittenMessage, kernel_check
 from canshaper.machine.deployment import Deployment

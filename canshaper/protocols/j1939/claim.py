@@ -8,14 +8,15 @@ from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import Self
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     ACKNOWLEDGE,
     CLAIMED,
     DM1,
     GLOBAL,
     NULL,
     REQUEST,
+    Frame,
+    FrameFault,
     group_of,
     identifier,
     name_bytes,

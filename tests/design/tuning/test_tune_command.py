@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
 from canshaper.config.load import load_config
-from canshaper.config.origin import written_by
+from canshaper.config.section import written_by
 from canshaper.design.tuning.deploy import deployed, setting
 from canshaper.design.tuning.evaluate import Machine
 from canshaper.design.tuning.optimal import Tuning, manual
