@@ -8,8 +8,8 @@ from canshaper.commissioning.assumed import assumptions
 from canshaper.config.source import Place, Source
 from canshaper.design.tuning.verdict import verdicts
 from canshaper.errors import Problem
-from canshaper.machine.axes import unfit
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import unfit
 from canshaper.machine.stopping import rehearsed, unstated
 from canshaper.machine.valves import BoundAxis
 

@@ -9,7 +9,7 @@ from canshaper.config.adjust import Key, adjusted, value
 from canshaper.config.schema import AxisSection
 from canshaper.controller.controller import Controller
 from canshaper.controller.runner import AxisControl
-from canshaper.machine.axes import filter_fault
+from canshaper.machine.filters import filter_fault
 from canshaper.machine.stopping import stop_fault
 
 # In one request: each axis that changes costs the loop some 40 us.

@@ -8,7 +8,7 @@ from canshaper.config.filters import Profile
 from canshaper.config.schema import AxisSection
 from canshaper.controller.events import ValueEvent
 from canshaper.inputs.value import ProfileChoice, ValueInput
-from canshaper.machine.axes import parameter_sets
+from canshaper.machine.filters import parameter_sets
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import (

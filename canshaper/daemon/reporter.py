@@ -10,7 +10,7 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.daemon.notify import ServiceManager
 from canshaper.gate.loop import boottime_ns
-from canshaper.machine.axes import unfit
+from canshaper.machine.filters import unfit
 from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")

@@ -27,9 +27,10 @@ from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Diagnostics, Place
 from canshaper.errors import ConfigError
-from canshaper.machine.axes import bind_axes, check_control, check_profiles
+from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment, bind_motions
+from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, bind_status, filter_lines
 from canshaper.machine.inputs import (
     BoundJoystick,

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.errors import ConfigError
-from canshaper.machine.axes import filter_fault, unfit
+from canshaper.machine.filters import filter_fault, unfit
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.transfer import Off

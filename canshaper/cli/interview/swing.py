@@ -117,7 +117,7 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
     """
     from canshaper.cli.interview.first import PERIOD_RANGE, Stopwatch, ten_swings_s
     from canshaper.config.limits import Limits
-    from canshaper.machine.axes import filter_fault
+    from canshaper.machine.filters import filter_fault
 
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s

@@ -89,7 +89,7 @@ def profiles(
 def _too_short(deployment: "Deployment") -> Iterator[str]:
     """Yield what is wrong with filters that answer in less than half a swing: swing stays."""
     from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
-    from canshaper.machine.axes import every_filter
+    from canshaper.machine.filters import every_filter
     from canshaper.shaping.registry import KINDS
 
     for axis, bound in deployment.axes.items():

@@ -14,8 +14,8 @@ from canshaper.config.limits import Sway
 from canshaper.config.source import Place
 from canshaper.design.tuning.evaluate import Machine, ShaperFor, evaluate, shaper_of
 from canshaper.design.tuning.formulation import MOST_DAMPED
-from canshaper.machine.axes import every_filter
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import every_filter
 from canshaper.machine.stopping import output_limits, when
 from canshaper.shaping.sway import SwayMode
 

@@ -1,0 +1,165 @@
+"""Filters of a deployment against the period of the valve that they drive."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from canshaper.config.adjust import Key, adjusted, faults
+from canshaper.config.filters import Breakpoint, Filter, Profile
+from canshaper.config.limits import Sway
+from canshaper.config.schema import AxisSection, DeploymentConfig
+from canshaper.config.source import Diagnostics, Place
+from canshaper.machine.lookup import Lookup
+from canshaper.shaping.registry import KINDS, STEPS_BETWEEN, ParameterSet, at_position, build_shaper
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+
+def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
+    """Check that every filter that the axis may get runs at the period of its valve."""
+    add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
+    parts, filters = _parts(place, axis), every_filter(place, axis)
+    for at, part in parts:
+        if part.gain_schedule and not lookup.config.load_state:
+            add((*at, "gain_schedule"), "expected load_state, which chooses them, got none")
+    wrong = {at: filter_fault(chosen, sway, period_s, rate) for at, chosen, sway in filters}
+    for at, fault in wrong.items():
+        if fault:
+            add(at, fault)
+    for at, part in () if any(wrong.values()) else parts:
+        if fault := _fault_between(part.gain_schedule, period_s, rate):
+            add((*at, "gain_schedule"), fault)
+    if not any(wrong.values()):
+        _check_ends(lookup, axis, str(place[-1]), period_s)
+    if len(filters) > 1 and axis.sway is None:
+        add(place, "expected sway data of its own with profiles or a gain schedule, got none")
+    codes = lookup.config.profile.codes if lookup.config.profile else {}
+    buttons = any(one.next_profile for one in lookup.config.joysticks.values())
+    for name in axis.profiles:
+        if name not in codes and not buttons:
+            names = ", ".join(codes) or "none: there is no profile at the top level"
+            add((*place, "profiles", name), f"expected a profile, got {name!r}; there are {names}")
+
+
+def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -> None:
+    """Check that the filter runs, scaled to each end of an adjustable number of the swing."""
+    control, rate = lookup.config.control, axis.limits.slowest_per_s
+    for text, ends in (control.adjustable if control else {}).items():
+        key = Key.parsed(text)
+        if key is None or (key.axis, key.section) != (name, "sway") or [*faults(key, axis, *ends)]:
+            continue
+        for end in ends:
+            try:
+                then = adjusted(axis, {key: end}, axis)
+                fault = filter_fault(then.filter, then.sway, period_s, rate)
+            except ValueError as error:
+                # Whether two numbers of the swing go together is known when both are changed.
+                fault = str(error) if str(error).startswith("filter") else None
+            if fault:
+                place = ("control", "adjustable", text)
+                lookup.diagnostics.add(place, f"at {end:g}: {fault}")
+
+
+def _parts(place: Place, axis: AxisSection) -> list[tuple[Place, AxisSection | Profile]]:
+    """The axis and its profiles, by their places."""
+    profiles = axis.profiles.items()
+    return [(place, axis), *(((*place, "profiles", name), one) for name, one in profiles)]
+
+
+def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway | None]]:
+    """Every filter that the axis may get, by its place, with the sway data that it runs with."""
+    filters: list[tuple[Place, Filter, Sway | None]] = []
+    for at, part in _parts(place, axis):
+        filters.append(((*at, "filter"), part.filter, axis.sway))
+        for i, one in enumerate(part.gain_schedule):
+            filters.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
+    return filters
+
+
+def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
+    """Yield filters that were designed for another swing or valve than the file has: where, why."""
+    for name, axis in config.axes.items():
+        for place, chosen, sway in every_filter(("axes", name), axis):
+            design = chosen.design()
+            if design and sway:
+                rate = axis.limits.slowest_per_s
+                for key, fault in design.faults(sway.mode(), rate, axis.limits.tail_s):
+                    again = f"design it again: canshaper {KINDS[chosen.kind].designed_by}"
+                    cure = "lengthen it" if key == "duration_s" else again
+                    yield (*place, "designed_for", key), f"{fault}; {cure}"
+
+
+def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
+    """Check that a button for the next profile has profiles, and no switch that chooses them."""
+    for name, joystick in config.joysticks.items():
+        if joystick.next_profile:
+            place = ("joysticks", name, "next_profile")
+            if config.profile:
+                text = "expected one of profile and next_profile, got both"
+                diagnostics.add(place, text)
+            if not any(axis.profiles for axis in config.axes.values()):
+                diagnostics.add(place, "expected an axis with profiles, got none")
+
+
+def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
+    """Check that every adjustable number can be changed in motion."""
+    add, adjustable = diagnostics.add, config.control.adjustable if config.control else {}
+    for text, (low, high) in adjustable.items():
+        place = ("control", "adjustable", text)
+        key = Key.parsed(text)
+        if key is None:
+            add(place, "expected axes.AXIS.SECTION.NAME, got no key of an axis")
+        elif diagnostics.check_axis(place, key.axis, config.axes):
+            for fault in faults(key, config.axes[key.axis], low, high):
+                add(place, fault)
+
+
+def filter_fault(
+    chosen: Filter, sway: Sway | None, period_s: float, valve_rate_per_s: float
+) -> str | None:
+    """Why a filter cannot run, or None.
+
+    Args:
+        chosen: the filter.
+        sway: sway data that it runs with.
+        period_s: time between two commands to the valve.
+        valve_rate_per_s: rate of the valve, full speeds per second.
+    """
+    mode = sway.mode() if sway else None
+    return _fault(chosen.kind, chosen.parameters(), mode, period_s, valve_rate_per_s)
+
+
+def parameter_sets(sets: Sequence[Breakpoint]) -> list[ParameterSet]:
+    """Sets of an axis or of a profile as they run."""
+    return [
+        ParameterSet(one.breakpoint, one.sway.mode(), one.filter.kind, one.filter.parameters())
+        for one in sets
+    ]
+
+
+def _fault_between(
+    sets: Sequence[Breakpoint], period_s: float, valve_rate_per_s: float
+) -> str | None:
+    """Why a filter between two breakpoints cannot run, or None.
+
+    Each that the load may ask for is built here, so that none is refused in motion.
+    """
+    running = parameter_sets(sets)
+    for steps in range((len(running) - 1) * STEPS_BETWEEN):
+        one = at_position(running, steps)
+        if fault := _fault(one.kind, one.parameters, one.mode, period_s, valve_rate_per_s):
+            return f"at {one.at:g}, between two breakpoints: {fault}"
+    return None
+
+
+def _fault(
+    kind: str,
+    parameters: dict[str, Any],
+    mode: SwayMode | None,
+    period_s: float,
+    valve_rate_per_s: float,
+) -> str | None:
+    try:
+        model = SwayModel(mode, period_s) if mode else None
+        build_shaper(kind, period_s, model, valve_rate_per_s=valve_rate_per_s, **parameters)
+    except ValueError as error:
+        return str(error)
+    return None
