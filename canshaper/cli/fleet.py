@@ -17,8 +17,7 @@ from canshaper.cli.common import loader
 from canshaper.errors import CanshaperError, UsageError
 from canshaper.recording.log import READERS, LogFile
 from canshaper.recording.shift import day_of
-from canshaper.report.console import SafeConsole, new_table
-from canshaper.report.table import NOTHING
+from canshaper.report.console import NOTHING, SafeConsole, new_table
 
 EXIT_NOT_READ = 1
 _HEADS = ("min", "raw deg", "left deg", "dip %", "stops", "trips")

@@ -13,9 +13,8 @@ from rich.text import Text
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.replay import Replay
 from canshaper.recording.ticks import Difference, Result, Tick
-from canshaper.report.console import WholeTable
+from canshaper.report.console import NOTHING, WholeTable, axis_title
 from canshaper.report.metrics import AxisMetrics, axis_metrics
-from canshaper.report.table import NOTHING, axis_title
 from canshaper.shaping.sway import SwayModel
 from canshaper_sim.recording import AxisTrace, Recording
 

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from canshaper.report.console import NOTHING, axis_title, change_text
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,
@@ -40,7 +41,6 @@ from canshaper.report.style import (
     titled,
     zero_line,
 )
-from canshaper.report.table import NOTHING, axis_title, change_text
 from canshaper_sim.recording import Recording
 
 WINDOW_COLOUR = "#FBE5A6"

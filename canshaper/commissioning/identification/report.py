@@ -15,7 +15,7 @@ from canshaper.edit.edit import Change, FileValue, change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
-from canshaper.report.table import axis_title
+from canshaper.report.console import axis_title
 
 # Difference of pendulum lengths, +- %, up to which one value in the middle is what we recommend
 # without a signal of the grapple; the robust shaper covers it.

@@ -13,8 +13,7 @@ from canshaper.config.section import note, written_by
 from canshaper.edit.edit import Change, FileValue, change
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
-from canshaper.report.console import new_table
-from canshaper.report.table import axis_title
+from canshaper.report.console import axis_title, new_table
 
 
 def heading(finding: Finding) -> str:

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.config.bus import CanopenNode
-from canshaper.protocols.canopen.nodes import NodeGate, RemoteNode
+from canshaper.protocols.canopen.network import NodeGate
+from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import Reason
 from tests.rigs.canopen import (
     BOOT_UP,

@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.machine.binding import load_deployment
-from canshaper.protocols.canopen.cia408 import ValveControl
+from canshaper.protocols.canopen.network import ValveControl
 from canshaper.shaping.states import Reason
 from tests.rigs.canopen import ACTIVE, DISABLED, FILE, HOLD, INIT, RESET, ROOT
 

@@ -19,11 +19,10 @@ from canshaper.commissioning.procedure.traffic import (
     read_traffic,
     simulated_recording,
 )
-from canshaper.report.console import new_table
+from canshaper.report.console import new_table, print_report
 from canshaper.report.metrics import MIN_RAW_DEG, report_dict
 from canshaper.report.plot import figure
 from canshaper.report.strokes import RESIDUAL_DWELL_S, RESIDUAL_WINDOW_MIN_S
-from canshaper.report.table import print_report
 from canshaper_sim.axes import ALL_AXES
 from canshaper_sim.operator import script_named
 from canshaper_sim.recording import Recording
