@@ -36,10 +36,7 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
                 shutil.copyfileobj(file, copy)
         command = [sys.executable, "-m", "canshaper.recording.mf4_child", str(path)]
         with subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         ) as process:
             try:
                 assert process.stdout is not None

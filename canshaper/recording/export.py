@@ -32,9 +32,7 @@ MOST_CODE_BITS = 8  # of a signal whose values are names
 
 @contextmanager
 def exporting(
-    path: Path | None,
-    deployment: Deployment,
-    parameters: CraneParameters | None = None,
+    path: Path | None, deployment: Deployment, parameters: CraneParameters | None = None
 ) -> Iterator["Export | None"]:
     """Write a drive into a file of one of ``EXTRAS``; without a path there is none.
 

@@ -171,10 +171,7 @@ class Recording:
         return f"{text}, {self.lost} LOST by the kernel" if self.lost else text
 
     def run(
-        self,
-        path: Path,
-        seconds: float | None,
-        on_progress: Callable[["Recording"], bool],
+        self, path: Path, seconds: float | None, on_progress: Callable[["Recording"], bool]
     ) -> None:
         """Record until the time is over, or ``on_progress`` says that it is enough.
 

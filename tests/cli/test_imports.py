@@ -110,9 +110,7 @@ def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_without_the_tools_a_first_deployment_has_the_filters_to_begin_with(
-    tmp_path: Path,
-) -> None:
+def test_without_the_tools_a_first_deployment_has_the_filters_to_begin_with(tmp_path: Path) -> None:
     (tmp_path / "answers.txt").touch()
     gone = ("canopen", "casadi", "matplotlib", "numpy", "scipy")
     done = without(gone, tmp_path, "init", "machine.yaml", "--answers", "answers.txt")

@@ -95,9 +95,7 @@ def machine_of(
 
 
 def _meanings(
-    joysticks: "Sequence[FirstJoystick]",
-    axes: "Sequence[FirstAxis]",
-    motion: "FirstMotion | None",
+    joysticks: "Sequence[FirstJoystick]", axes: "Sequence[FirstAxis]", motion: "FirstMotion | None"
 ) -> set[str]:
     """MESSAGE.SIGNAL of what was given a meaning."""
     used = {f"{one.switch or one.message}.{one.enable}" for one in joysticks}

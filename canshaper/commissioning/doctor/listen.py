@@ -6,13 +6,7 @@ import time
 from collections.abc import Callable
 from itertools import pairwise
 
-from canshaper.bus.packet import (
-    ANCILLARY_BYTES,
-    FD_SIZE,
-    SO_TIMESTAMPNS,
-    frame_of,
-    stamp_ns,
-)
+from canshaper.bus.packet import ANCILLARY_BYTES, FD_SIZE, SO_TIMESTAMPNS, frame_of, stamp_ns
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.verdict import Finding, Level, summary

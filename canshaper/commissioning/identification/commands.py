@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
-from canshaper.commissioning.identification.series import (
-    Array,
-    Command,
-    Span,
-    common,
-    runs,
-)
+from canshaper.commissioning.identification.series import Array, Command, Span, common, runs
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis

@@ -251,7 +251,5 @@ class Procedure:
 
 def _new_state(bench: Bench, origin: Path | None) -> State:
     return State(
-        simulated=bench.simulated,
-        changes=bench.changes,
-        origin=hash_of(origin) if origin else "",
+        simulated=bench.simulated, changes=bench.changes, origin=hash_of(origin) if origin else ""
     )

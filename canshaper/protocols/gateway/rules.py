@@ -108,7 +108,4 @@ def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
     """Changes that make a frame of a joystick one with all its axes in neutral."""
     length = message.fields.message.length
     checks, clear = kernel_check(message.protection, length)
-    return (
-        *changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length),
-        *checks,
-    )
+    return (*changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length), *checks)

@@ -209,12 +209,7 @@ class Node:
     """
 
     def __init__(
-        self,
-        bus: str,
-        config: J1939,
-        cyclic: frozenset[int] = frozenset(),
-        *,
-        guest: bool = False,
+        self, bus: str, config: J1939, cyclic: frozenset[int] = frozenset(), *, guest: bool = False
     ) -> None:
         answered = frozenset(() if guest else (DM1,))
         self._claim = AddressClaim(bus, config, answered, cyclic, guest=guest)

@@ -71,11 +71,7 @@ def valve() -> Valve:
             id="a state that is not reached is waited for two seconds",
         ),
         pytest.param(
-            [
-                (0, NOT_READY, INIT),
-                (2000 * MS, NOT_READY, INIT),
-                (2000 * MS + 1, NOT_READY, RESET),
-            ],
+            [(0, NOT_READY, INIT), (2000 * MS, NOT_READY, INIT), (2000 * MS + 1, NOT_READY, RESET)],
             id="a valve that is not ready boots for two seconds, then it has a fault",
         ),
         pytest.param(

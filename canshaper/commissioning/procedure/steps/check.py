@@ -17,13 +17,7 @@ from canshaper.report.console import axis_title
 
 FIRST_PCT = 40.0  # of full speed, for the first motion; what `canshaper init` writes too
 MOTION = "motion"  # the step of that name
-EVENTS = (
-    "joystick released",
-    "joystick reversed",
-    "joystick lost",
-    "enable lost",
-    "limits allow",
-)
+EVENTS = ("joystick released", "joystick reversed", "joystick lost", "enable lost", "limits allow")
 
 
 def run(context: Context) -> Outcome:
