@@ -3,10 +3,10 @@
 import ast
 import inspect
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from datetime import UTC, date, datetime
+from collections.abc import Iterable, Iterator
+from datetime import date
 from functools import cache
-from itertools import groupby, pairwise
+from itertools import pairwise
 from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
@@ -14,8 +14,6 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from canshaper.config.source import Place
-from canshaper.errors import printable
-from canshaper.shipped import version
 
 VERSION = 1
 """Version of the file's format."""
@@ -105,15 +103,6 @@ _RUN = re.compile(RUN)
 _MOST = 10_000  # far above any list's own limit: what a few runs could make is not made
 
 
-def shortened(numbers: Sequence[float]) -> list[float | str]:
-    """The list as it is written; ``expanded`` gives the same numbers back, to the last bit."""
-    runs: list[float | str] = []
-    for number, equal in groupby(numbers):
-        count = len([*equal])
-        runs.append(number if count == 1 else f"{count} x {number!r}".removesuffix(".0"))
-    return runs
-
-
 def expanded(entries: Any) -> Any:
     """The list as it is meant; what is no run of a number stays for others to judge."""
     if not isinstance(entries, list):
@@ -148,28 +137,6 @@ class Origin(Section):
         except ValueError:
             raise ValueError(f"date: expected one such as 2026-11-23, got {self.date!r}") from None
         return self
-
-
-def written_by(verb: str, *, simulated: bool | None, log: str | None = None) -> dict[str, Any]:
-    """Origin of numbers that are written now, by key.
-
-    Args:
-        verb: that writes them.
-        simulated: whether they were measured on a simulated crane; None where it is not known.
-        log: name of the log they were computed from.
-    """
-    values: dict[str, Any] = {"date": f"{datetime.now(UTC).date()}"}
-    if log is not None:
-        values["log"] = printable(log)
-    values["by"] = f"canshaper {verb} {version()}"
-    if simulated is not None:
-        values["source"] = "simulated" if simulated else "machine"
-    return values
-
-
-def note(verb: str) -> str:
-    """Return the comment that replaces those on numbers that a verb has written."""
-    return f"Written by canshaper {verb}."
 
 
 def simulated(part: Any, place: Place = ()) -> Iterator[Place]:

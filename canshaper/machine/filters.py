@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from canshaper.config.adjust import Key, adjusted, faults
 from canshaper.config.filters import Breakpoint, Filter, Profile
 from canshaper.config.limits import Sway
 from canshaper.config.schema import AxisSection, DeploymentConfig
@@ -42,7 +41,11 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: flo
 def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -> None:
     """Check that the filter runs, scaled to each end of an adjustable number of the swing."""
     control, rate = lookup.config.control, axis.limits.slowest_per_s
-    for text, ends in (control.adjustable if control else {}).items():
+    if control is None:
+        return
+    from canshaper.config.adjust import Key, adjusted, faults
+
+    for text, ends in control.adjustable.items():
         key = Key.parsed(text)
         if key is None or (key.axis, key.section) != (name, "sway") or [*faults(key, axis, *ends)]:
             continue
@@ -101,8 +104,12 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
     """Check that every adjustable number can be changed in motion."""
-    add, adjustable = diagnostics.add, config.control.adjustable if config.control else {}
-    for text, (low, high) in adjustable.items():
+    if config.control is None:
+        return
+    from canshaper.config.adjust import Key, faults
+
+    add = diagnostics.add
+    for text, (low, high) in config.control.adjustable.items():
         place = ("control", "adjustable", text)
         key = Key.parsed(text)
         if key is None:

@@ -15,7 +15,7 @@ from canshaper.commissioning.identification.segments import find_free
 from canshaper.commissioning.identification.series import Array, Series, Value, ordered
 from canshaper.commissioning.identification.table import Table, is_table, read_table
 from canshaper.commissioning.identification.verdict import Finding, identify
-from canshaper.config.section import written_by
+from canshaper.edit.edit import written_by
 from canshaper.errors import ConfigError, IdentificationError, UsageError
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment

@@ -10,8 +10,7 @@ from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.identification.series import Value
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.config.limits import Sway
-from canshaper.config.section import note
-from canshaper.edit.edit import Change, FileValue, change
+from canshaper.edit.edit import Change, FileValue, change, note
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
