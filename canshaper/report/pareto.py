@@ -93,11 +93,11 @@ def _limits(axes: Axes, limits: Limits) -> None:
         axes.plot(x, y, color=LIMIT_COLOUR, linestyle="--", linewidth=1.2)
         axes.annotate(
             "limit of every shaper\nwithin the valve's rate,\nnear-far alone",
-            (x[3], y[3]),
-            xytext=(-6, -4),
+            (x[1], y[1]),
+            xytext=(6, 0),
             textcoords="offset points",
-            va="top",
-            ha="right",
+            va="bottom",
+            ha="left",
             color=LIMIT_COLOUR,
             fontsize=style.TEXT_PT,
         )

@@ -52,7 +52,7 @@ BUDGET = {
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
-    "docs/tuning.md": 754,
+    "docs/tuning.md": 780,
     "docs/work.md": 435,
     "studies/README.md": 760,
 }
@@ -64,8 +64,8 @@ LINES = {
         4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_258, "a new ability takes the room of an old one"),
-    "tests": (95_772, "one level for each behaviour"),
+    "canshaper": (61_128, "a new ability takes the room of an old one"),
+    "tests": (95_594, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (332, "one that only hands on is joined to its reader")}
