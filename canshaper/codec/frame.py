@@ -1,9 +1,10 @@
 """A CAN frame as the pure part of canshaper sees it; identifiers as CANopen and J1939 use them."""
 
 from enum import Enum, IntEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from canshaper.config.bus import J1939Name
+if TYPE_CHECKING:
+    from canshaper.config.bus import J1939Name
 
 
 class Frame(NamedTuple):
@@ -224,7 +225,7 @@ def sent_by(address: int) -> list[int]:
     ]
 
 
-def name_bytes(name: J1939Name) -> bytes:
+def name_bytes(name: "J1939Name") -> bytes:
     """The NAME as it is sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
 
     The bit for a node that may choose another address stays 0: our address is the one that
