@@ -3,12 +3,11 @@
 import json
 from collections.abc import Iterator
 from dataclasses import asdict
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import PROCESSES, echo, engine, loader
+from canshaper.cli.common import PROCESSES, echo, end_interrupted, engine, loader
 from canshaper.errors import DesignError, UsageError
 
 if TYPE_CHECKING:
@@ -58,13 +57,14 @@ def profiles(
         results = list(figures(deployment))
     except DesignError as error:
         raise UsageError(f"{deployment.path}: {error}") from None
-    faults, data = [*_too_short(deployment)], dict[str, Any]()
+    faults, data, interrupted = [*_too_short(deployment)], dict[str, Any](), ""
     if work:
-        data, at_work, slower = _work(deployment, seeds, processes)
+        data, at_work, slower, interrupted = _work(deployment, seeds, processes)
         faults += slower
     if as_json:
         presses = [asdict(one) for one in results]
         echo(json.dumps({"presses": presses, "work": data, "faults": faults}, indent=2))
+        end_interrupted(interrupted)
         return
     heads = ("still, s", "run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
     table = new_table("axis, profile", *heads)
@@ -80,10 +80,11 @@ def profiles(
         )
     console = SafeConsole()
     console.print(table)
-    if work:
+    if data:
         console.print(at_work)
     for fault in faults:
         console.print(fault, style="red")
+    end_interrupted(interrupted)
 
 
 def _too_short(deployment: "Deployment") -> Iterator[str]:
@@ -109,18 +110,17 @@ def _too_short(deployment: "Deployment") -> Iterator[str]:
 
 def _work(
     deployment: "Deployment", seeds: int, processes: int | None
-) -> "tuple[dict[str, Any], Table, list[str]]":
-    """Seconds a move, by task and profile: data, table, and where a profile is slower than off."""
+) -> "tuple[dict[str, Any], Table, list[str], str]":
+    """Seconds a move by task and profile: data, table, what is slower than off, interrupted at."""
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp
-    from canshaper.campaign.work_results import OFF, TASKS, as_data, choice, do_all, moves_of
+    from canshaper.campaign.work_results import OFF, TASKS, as_data, at_work, choice
     from canshaper.inputs.value import profile_names
     from canshaper.report.console import progress_bar
 
     source = Source.of(deployment, deployment.config.uncertainty)
     set_ups = [OFF, *map(SetUp, profile_names(deployment.config))]
     with progress_bar("operators at work") as on_progress:
-        do = partial(do_all, engine(processes, None), source, on_progress)
-        moves = {name: moves_of(source, set_ups, task, do, seeds) for name, task in TASKS.items()}
-    table, slower = choice("seconds a move", TASKS, moves)
-    return as_data(moves), table, slower
+        workers = engine(processes, None)
+        moves, interrupted = at_work(workers, source, set_ups, TASKS, on_progress, seeds=seeds)
+    return as_data(moves), *choice("seconds a move", TASKS, moves), interrupted
