@@ -43,7 +43,7 @@ def compare(
     out: Path = typer.Option(Path("out/compare"), "--out", help="Directory for picture and data."),
     as_json: bool = typer.Option(False, "--json", help="Print the rows as JSON, no table."),
     work: bool = typer.Option(
-        False, "--work", help="Seconds a move of a model operator too: half an hour."
+        False, "--work", help="Seconds a move of a model operator too: minutes."
     ),
     seeds: int = typer.Option(6, "--seeds", min=1, help="Working cycles with each filter."),
     processes: int | None = typer.Option(

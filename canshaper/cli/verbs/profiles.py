@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import PROCESSES, echo, end_interrupted, engine, loader
+from canshaper.cli.common import PROCESSES, SET, echo, end_interrupted, engine, loader
 from canshaper.errors import DesignError, UsageError
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def profiles(
     work: bool = typer.Option(True, "--work/--no-work", help="Seconds a move too: minutes."),
     seeds: int = typer.Option(6, "--seeds", min=2, help="Working cycles with each profile."),
     processes: int | None = PROCESSES,
+    changes: list[str] | None = SET,
     as_json: bool = typer.Option(False, "--json", help="Print the figures as JSON, no table."),
 ) -> None:
     """Measure what each profile of a deployment does, and which is the right one for a tolerance.
@@ -47,19 +48,23 @@ def profiles(
 
       canshaper profiles machine.yaml --no-work
 
+      canshaper profiles --set grapple.l2_m=1.4  # 0.2 m longer than the file says
+
       canshaper profiles machine.yaml --json
     """
     from canshaper.design.profiles import figures
     from canshaper.report.console import SafeConsole, new_table
+    from canshaper_sim.parameters import changed_parameters
 
+    crane = changed_parameters(changes or [])  # wrong ones are named before anything is driven
     deployment = loader(file)()
     try:
-        results = list(figures(deployment))
+        results = list(figures(deployment, crane))
     except DesignError as error:
         raise UsageError(f"{deployment.path}: {error}") from None
     faults, data, interrupted = [*_too_short(deployment)], dict[str, Any](), ""
     if work:
-        data, at_work, slower, interrupted = _work(deployment, seeds, processes)
+        data, at_work, slower, interrupted = _work(deployment, changes or [], seeds, processes)
         faults += slower
     if as_json:
         presses = [asdict(one) for one in results]
@@ -109,7 +114,7 @@ def _too_short(deployment: "Deployment") -> Iterator[str]:
 
 
 def _work(
-    deployment: "Deployment", seeds: int, processes: int | None
+    deployment: "Deployment", changes: list[str], seeds: int, processes: int | None
 ) -> "tuple[dict[str, Any], Table, list[str], str]":
     """Seconds a move by task and profile: data, table, what is slower than off, interrupted at."""
     from canshaper.campaign.run import Source
@@ -118,7 +123,7 @@ def _work(
     from canshaper.inputs.value import profile_names
     from canshaper.report.console import progress_bar
 
-    source = Source.of(deployment, deployment.config.uncertainty)
+    source = Source.of(deployment, deployment.config.uncertainty, changes)
     set_ups = [OFF, *map(SetUp, profile_names(deployment.config))]
     with progress_bar("operators at work") as on_progress:
         workers = engine(processes, None)
