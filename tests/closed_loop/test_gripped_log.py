@@ -54,7 +54,7 @@ def to_and_fro(time_s: float) -> float:
         ("log", late, (1.2, 2.3), (1.0, 2.3)),
         ("empty", silent, (0.6, 1.1), (1.2, 3.0)),
         ("log", silent, (1.1, 1.7), (2.9, 5.0)),
-        ("log", lost, (0.7, 2.0), (2.9, 5.0)),
+        ("log", lost, (0.7, 2.0), (2.9, 6.2)),
         ("log", to_and_fro, (1.1, 1.7), (2.9, 5.0)),
     ],
     ids=["empty", "log", "late", "empty unknown", "log unknown", "lost", "to and fro"],

@@ -73,7 +73,8 @@ def test_the_crane_is_the_one_of_set(figures: dict[tuple[str, str], dict[str, fl
     status, output = run("j1939-profiles.yaml", "--json", "--no-work", "--set", "grapple.l2_m=1.4")
     assert status == 0, output
     for one in json.loads(output)["presses"]:
-        assert one["residual_deg"] > 1.5 * figures[one["axis"], one["profile"]]["residual_deg"]
+        if one["profile"] == "normal":
+            assert one["residual_deg"] > 2.0 * figures[one["axis"], "normal"]["residual_deg"]
 
 
 def short(folder: Path) -> Path:
