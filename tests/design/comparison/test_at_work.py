@@ -12,7 +12,7 @@ from canshaper.campaign import work_results
 from canshaper.cli.app import app
 from canshaper.cli.verbs import compare
 from canshaper.config.filters import filter_of
-from canshaper.design.comparison.candidates import AXES, Candidate
+from canshaper.design.comparison.manoeuvres import AXES, Candidate
 from canshaper.machine.deployment import Deployment
 from tests.design.comparison.candidates import FILE, ROBUST
 from tests.design.comparison.test_tables import made
@@ -27,7 +27,7 @@ def run(monkeypatch: pytest.MonkeyPatch, deployment: Deployment, tmp_path: Path)
     filters.append(Candidate(ROBUST, robust, ours=True))
     outcomes = [one for each in filters for one in made(each.name, 2.0, 1.0)]
     comparison = "canshaper.design.comparison"
-    monkeypatch.setattr(f"{comparison}.candidates.candidates", lambda _: filters)
+    monkeypatch.setattr(f"{comparison}.manoeuvres.candidates", lambda _: filters)
     monkeypatch.setattr(f"{comparison}.measure.measure_all", lambda *_, **_options: outcomes)
     monkeypatch.setattr(f"{comparison}.limits.least", lambda _: [])
     monkeypatch.setattr("canshaper.cli.results.Results.picture", lambda *_: None)
