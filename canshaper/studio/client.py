@@ -121,7 +121,7 @@ class Client:
             self._stage.with_cab(lambda cab, _: cab.switch_anti_sway(number, on))
         elif "numbers" in message and self._numbers:
             self._numbers.receive(message)
-        else:
+        elif not self._stage.other(number, message):
             name, factor = message.get("slide"), message.get("to")
             known = isinstance(name, str) and name in self._stage.positions
             if not known or not is_number(factor):
