@@ -115,11 +115,7 @@ def build_app(
     def left(_request: HTTPConnection) -> Response:
         return JSONResponse(residuals(stage.deployment, stage.in_force()))
 
-    async def settings(_request: HTTPConnection) -> Response:
-        return JSONResponse(stage.preference.ready() if stage.preference else {})
-
     routes = [pages_of(stage, hello_of(stage, parameters)), Route("/residuals.json", left)]
-    routes.append(Route("/preference.json", settings))
     routes += commission.routes()
     return page_app(routes, "main.js", access)
 

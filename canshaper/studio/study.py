@@ -11,20 +11,13 @@ from typing import Any, NamedTuple
 
 from canshaper.studio.study_files import BROKEN, HIT, MISS, Table
 
-DISTANCES_M, WIDTHS_M = (1.0, 2.0, 4.0), (0.3, 0.6, 1.2)
-"""Of the grapple's way to the target, and diameters of the target: .9 to 3.8 bits."""
+# Ways of the grapple to the target, and diameters of the target: .9 to 3.8 bits.
+TARGETS_M = [(distance, width) for distance in (1.0, 2.0, 4.0) for width in (0.3, 0.6, 1.2)]
+# Two Latin squares: each setting follows each other one as often (Williams 1949).
 ORDERS = ("ABC", "BCA", "CAB", "CBA", "ACB", "BAC")
-"""Two Latin squares: each setting follows each other one as often (Williams 1949)."""
-REACH_M = (2.5, 7.5)
-"""Where a target may be, from the pillar."""
-AHEAD = 0.3
-"""Part of that distance that it is ahead of the pillar, at least: it is in the picture."""
-SHOWN_S = 1.5
-"""So long is said whether a grip has hit."""
-LIMIT_S = 60.0
-"""A placement that takes longer is broken off."""
-HELD_UP_S = 0.3
-"""So is one during which this program stood still for so long."""
+REACH_M, AHEAD = (2.5, 7.5), 0.3  # where a target may be, from the pillar; part of it straight on
+SHOWN_S = 1.5  # so long is said whether a grip has hit
+LIMIT_S, HELD_UP_S = 60.0, 0.3  # longest placement, and standstill of this program in it
 
 
 class Placement(NamedTuple):
@@ -59,14 +52,13 @@ def plan(task: Task, order: str, seed: str) -> dict[Placement, tuple[float, floa
 
     Rounds of all nine targets, each in random order.
     """
-    targets = [(distance, width) for distance in DISTANCES_M for width in WIDTHS_M]
     planned = {}
     for part, letter in enumerate(order, 1):
         source, number = random.Random(f"{seed} {part}"), 0
         for practice, count in ((1, task.practice), (0, task.placements)):
             drawn: list[tuple[float, float]] = []
             while len(drawn) < count:
-                drawn += source.sample(targets, len(targets))
+                drawn += source.sample(TARGETS_M, len(TARGETS_M))
             for distance_m, width_m in drawn[:count]:
                 number += 1
                 one = Placement(part, letter, number, practice, distance_m, width_m)
@@ -81,14 +73,6 @@ def _place(source: random.Random, start_m: float, distance_m: float) -> tuple[fl
         x, y = start_m + distance_m * math.cos(angle), distance_m * math.sin(angle)
         if REACH_M[0] <= math.hypot(x, y) <= REACH_M[1] and x > AHEAD * math.hypot(x, y):
             return x, y
-
-
-class Seen(NamedTuple):
-    """What the crane does: level of its axes as for a page, place and swing of the grapple."""
-
-    level: str
-    place: tuple[float, float] | None
-    swing_deg: float | None
 
 
 class Session:
@@ -119,7 +103,8 @@ class Session:
         self._result: tuple[str, float] | None = None
         self._last = [*planned][-1]
         self._since_s = self._until_s = self._reaction_s = self._seen_s = 0.0
-        self._seen = Seen("wait", None, None)
+        self._place: tuple[float, float] | None = None
+        self._swing_deg = 0.0
 
     def begin(self, now_s: float) -> None:
         """End a pause, where it has lasted long enough."""
@@ -130,11 +115,13 @@ class Session:
         self.phase, self._why, self._result, self._since_s = "ready", "", None, now_s
         self._fresh(self._todo[0].setting)
 
-    def see(self, seen: Seen, now_s: float) -> None:
-        """See the crane, each tick."""
+    def see(
+        self, level: str, place: tuple[float, float] | None, swing_deg: float | None, now_s: float
+    ) -> None:
+        """See the level of its axes as a page has it, and the grapple, each tick."""
         held_up, self._seen_s = now_s - self._seen_s > HELD_UP_S, now_s
-        self._seen, lasts_s = seen, now_s - self._since_s
-        if self.phase == "ready" and seen.level == "move":
+        self._place, self._swing_deg, lasts_s = place, swing_deg or 0.0, now_s - self._since_s
+        if self.phase == "ready" and level == "move":
             self.phase, self._reaction_s, self._since_s = "moving", lasts_s, now_s
         elif self.phase == "shown" and lasts_s > SHOWN_S:
             if self._todo and self._todo[0].part == self._last.part:
@@ -142,22 +129,21 @@ class Session:
             else:
                 self.phase = "pause" if self._todo else "done"
                 self._until_s = now_s + self._break_s
-        elif self.phase == "moving" and seen.level not in ("move", "ready"):
+        elif self.phase == "moving" and level not in ("move", "ready"):
             self.break_off("stopped", now_s)
         elif self.phase == "moving" and (held_up or lasts_s > LIMIT_S):
             self.break_off("held" if held_up else "long", now_s)
 
     def grip(self, by: str, now_s: float) -> None:
         """Close the grapple where it is: that ends the placement."""
-        if self.phase != "moving" or self._seen.place is None:
+        if self.phase != "moving" or self._place is None:
             return
         one = self._last = self._todo.pop(0)
-        error_m = math.dist(self._seen.place, self._planned[one])
+        error_m = math.dist(self._place, self._planned[one])
         self._result = (HIT if error_m <= one.width_m / 2.0 else MISS), error_m
-        seconds, swing_deg = now_s - self._since_s, self._seen.swing_deg or 0.0
         self._table.add(
-            **one._asdict(), input=by, reaction_s=self._reaction_s, seconds=seconds,
-            error_m=error_m, swing_deg=swing_deg, outcome=self._result[0],
+            **one._asdict(), input=by, reaction_s=self._reaction_s, seconds=now_s - self._since_s,
+            error_m=error_m, swing_deg=self._swing_deg, outcome=self._result[0],
         )  # fmt: skip
         self.phase, self._since_s = "shown", now_s
 

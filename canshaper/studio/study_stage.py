@@ -26,7 +26,7 @@ from canshaper.studio.in_process import HeldHand, InProcessCrane
 from canshaper.studio.server import hello_of, page_app, pages_of
 from canshaper.studio.session import CraneSession
 from canshaper.studio.stage import Stage
-from canshaper.studio.study import Placement, Seen, Session
+from canshaper.studio.study import Placement, Session
 from canshaper.studio.study_files import Table
 from canshaper.studio.view import CraneView
 from canshaper.studio.words import Events
@@ -34,8 +34,7 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.realtime import open_ports
 
 CRANE = "crane"
-INPUTS = ("keyboard", "gamepad", "pointer")
-"""With what a page says that it was gripped."""
+INPUTS = ("keyboard", "gamepad", "pointer")  # of a page
 CAN = "CAN"
 _SHOWN = {"pose", "joints", "sway", "measured", "simulated", "daemon", "crane", "axes"}
 # What a crane without anti-sway does not have.
@@ -89,7 +88,7 @@ class RealJoysticks(HeldHand):
         inputs: list[BoundInput] = [*deployment.joysticks.values(), *deployment.switches]
         self._finder = InputFinder(deployment.config.buses, [*inputs, *([stop] if stop else [])])
         self._button = _button(deployment, grip) if grip else None
-        self._down = True  # pressed from the begin on it does nothing
+        self._down = False
         self.gripped = False
         self.ports = open_ports(deployment)
 
@@ -109,10 +108,8 @@ class RealJoysticks(HeldHand):
         if self._button is None:
             return
         message, signal = self._button
-        can_id = (
-            with_source(frame.can_id, NULL) if message.frame_id & 0xFF == NULL else frame.can_id
-        )
-        if (can_id, frame.extended) == (message.frame_id, message.is_extended_frame):
+        ids = {frame.can_id, with_source(frame.can_id, NULL) if frame.extended else frame.can_id}
+        if message.frame_id in ids and message.is_extended_frame == frame.extended:
             values: Any = message.decode(frame.data, decode_choices=False, allow_truncated=True)
             down = bool(values.get(signal))
             self.gripped |= down and not self._down
@@ -213,20 +210,20 @@ class StudyStage(Stage):
             if self.joysticks and self.joysticks.gripped:
                 self.joysticks.gripped = False
                 self.study.grip(CAN, now_s)
-            self.study.see(self._seen(now_s), now_s)
+            self._see(now_s)
         if self.study.phase == "done" and not self._over:
             self._over = True
             self._done()
         return goes_on
 
-    def _seen(self, now_s: float) -> Seen:
+    def _see(self, now_s: float) -> None:
         values, place = self.cranes[CRANE].view.values(now_s), None
         if values["pose"] and values["measured"]:
             slewed, radius_m, _ = values["pose"]
             out_m, side_m = self._grapple.offset_m(*map(math.radians, values["sway"]))
             turn = cmath.rect(1.0, math.radians(slewed)) * complex(radius_m + out_m, side_m)
             place = turn.real, turn.imag
-        return Seen(_urgent(values["axes"])[0], place, values["swing"])
+        self.study.see(_urgent(values["axes"])[0], place, values["swing"], now_s)
 
 
 def _urgent(axes: Mapping[str, Mapping[str, Any]]) -> tuple[str, str]:
@@ -241,14 +238,7 @@ def _urgent(axes: Mapping[str, Mapping[str, Any]]) -> tuple[str, str]:
 def study_app(
     stage: StudyStage, parameters: CraneParameters, result: Path, access: Access
 ) -> ASGIApp:
-    """The page of a study.
-
-    Args:
-        stage: what is driven.
-        parameters: the crane that is drawn.
-        result: page of what the person did, once it is written.
-        access: who may.
-    """
+    """The page of a study; ``result`` is that of what the person did, once it is written."""
 
     async def shown(_request: HTTPConnection) -> Response:
         return FileResponse(result) if result.exists() else PlainTextResponse("not yet\n", 404)

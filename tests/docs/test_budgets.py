@@ -49,6 +49,7 @@ BUDGET = {
     "docs/service.md": 790,
     "docs/states.md": 300,
     "docs/studio.md": 717,
+    "docs/study.md": 333,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,

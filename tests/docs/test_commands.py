@@ -36,6 +36,7 @@ NOT_PASTED = {
     "replay.md": "logs of a machine; tests/recording",
     "sensor.md": "a machine",
     "studio.md": "serves until it is stopped; tests/studio/test_playback.py opens drives",
+    "study.md": "serves until it is stopped; tests/studio/test_browser_study.py",
     "work.md": "minutes of drives; tests/campaign/test_work.py",
     "service.md": "installs the package; tests/systemd, and tools/image.sh tries the image",
 }

@@ -104,6 +104,13 @@ def test_the_colours_of_states_are_explained(shared: Studio, tab: Callable[..., 
     assert len(set(colours)) == 5
 
 
+def test_a_picture_that_is_drawn_coarser_says_so(shared: Studio, tab: Callable[..., Page]) -> None:
+    """The browser of the tests has no graphics card."""
+    page = tab(shared)
+    expect(page.locator("#coarse")).to_contain_text("drawn coarser: no graphics card")
+    assert page.locator("#scene").evaluate("(one) => one.width < one.clientWidth")
+
+
 def test_a_page_that_stood_still_at_rest_says_so_in_a_line(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:

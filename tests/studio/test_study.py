@@ -12,12 +12,13 @@ from typer.testing import CliRunner
 
 from canshaper.bus.port import open_port
 from canshaper.cli.app import app
+from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.shipped import deployment_path
 from canshaper.studio.in_process import InProcessCrane
-from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Seen, Session, Task, plan
+from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, Task, plan
 from canshaper.studio.study_files import KEY, Key, Table, read_key, rows_of
 from canshaper.studio.study_stage import CRANE, RealJoysticks, StudyStage, setting
 from canshaper.studio.view import CraneView
@@ -68,7 +69,7 @@ class Person:
         self, level: str, place: tuple[float, float] = (5.0, 0.0), after_s: float = 0.1
     ) -> None:
         self.now_s += after_s
-        self.work.see(Seen(level, place, 3.0), self.now_s)
+        self.work.see(level, place, 3.0, self.now_s)
 
     def shown(self) -> dict[str, Any]:
         return self.work.shown(self.now_s)
@@ -221,18 +222,23 @@ def test_a_raw_setting_is_the_crane_with_anti_sway_off(name: str, tmp_path: Path
     assert swing(shaped, anti_sway=False) == swing(shaped, anti_sway=True) < 0.7 * off
 
 
-@pytest.fixture
-def stage(tmp_path: Path) -> StudyStage:
+def stage_of(folder: Path, joysticks: RealJoysticks | None = None) -> StudyStage:
+    robust = deployment_path("forwarder-robust.yaml")
     settings = {
-        "A": setting(deployment_path("forwarder-robust.yaml"), tmp_path, raw=True),
-        "B": setting(deployment_path("forwarder-robust.yaml"), tmp_path),
-        "C": setting(deployment_path("forwarder-gff.yaml"), tmp_path),
+        "A": setting(robust, folder, raw=True),
+        "B": setting(robust, folder),
+        "C": setting(deployment_path("forwarder-gff.yaml"), folder),
     }
-    table = Table(tmp_path / "P01.csv", dict(COMMON))
+    table = Table(folder / "P01.csv", dict(COMMON))
     return StudyStage(
         settings, plan(TASK, "ABC", "1 P01"), 1.0, table, parameters=changed_parameters(START),
-        changes=START, joysticks=None, done=lambda: None,
+        changes=START, joysticks=joysticks, done=lambda: None,
     )  # fmt: skip
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> StudyStage:
+    return stage_of(tmp_path)
 
 
 def test_nothing_that_a_page_gets_depends_on_the_setting(stage: StudyStage) -> None:
@@ -265,30 +271,33 @@ def test_only_the_page_that_drives_begins_and_grips(stage: StudyStage) -> None:
     assert not stage.other(1, {"study": "grip", "by": "P. Smith"})
 
 
-def test_real_joysticks_drive_and_grip_and_nothing_is_sent() -> None:
-    group = free_groups()[0]
-    bus = Bus(interface="udp_multicast", channel=group)
+def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> None:
+    """What a real crane sends on their bus is not heard."""
+    bus = Bus(interface="udp_multicast", channel=free_groups()[0])
     deployment = load_deployment(deployment_path("forwarder-robust.yaml"))
     deployment.config.buses["crane"] = bus
     joysticks = RealJoysticks(deployment, "JoystickRight.Reset")
-    sender, hand, listener = (
-        open_port("crane", bus, lambda _: None),
-        Hand(deployment),
-        Listener(group),
-    )
+    sender, listener = open_port("crane", bus, lambda _: None), Listener(bus.channel)
     try:
-        crane = InProcessCrane(deployment, joysticks=joysticks)
-        view, sent = CraneView(deployment, lambda _text, _level: None), 0
+        stage, hand, sent = stage_of(tmp_path, joysticks), Hand(deployment), 0
+        stage.with_cab(lambda cab, now_s: cab.take(1, now_s))
+        stage.other(1, {"study": "begin"})
+        found = deployment.messages.find("TipPosition")
+        assert not isinstance(found, str)
+        pose = Frame("crane", found[1].frame_id, found[1].is_extended_frame, bytes(8))
         for k in range(60):
-            held = Held({"slew": 1.0 if k > 20 else 0.0}, enable=True, reset=k > 50)
-            for frame in hand.frames(0, held):
+            held = Held({"slew": 1.0 if k > 30 else 0.0}, enable=True, reset=k > 50)
+            for frame in (*hand.frames(0, held), pose):
                 sender.send(frame)
                 sent += 1
-            for frame in crane.frames(Held(), 20):
-                view.receive(frame, k * 0.02)
-        assert view.pose is not None and view.pose[0] > 5.0
-        assert joysticks.gripped
-        assert len(listener.frames()) == sent  # nobody but the hand
+            stage._tick(0, 0, 0)
+        (row,) = stage.study._table.rows
+        assert (row["input"], row["setting"]) == ("CAN", "A")
+        assert len(listener.frames()) == sent  # nobody but the hand, and that crane
+        for frame in (*hand.frames(0, Held()), pose):
+            sender.send(frame)
+        heard = {frame.can_id for frame in joysticks.frames_of_tick(0, 20)}
+        assert heard == {frame.can_id for frame in hand.frames(0, Held())}
     finally:
         for port in (joysticks, sender, listener.port):
             port.close()
@@ -308,6 +317,7 @@ def test_what_a_grip_is_has_to_be_a_signal() -> None:
         ("--person P01 --unseal", "--unseal: expected without --person"),
         ("--person P01 --grip A.B", "with --bus"),
         ("--person P01 --with forwarder-robust.yaml", "--with: expected another file"),
+        ("--person P01 --set start_radius_m=1.9", "expected 2 .. 8 m, got 1.9"),
         ("--person P01 --with j1939-forwarder.yaml", "--with: expected axes and joysticks of"),
     ],
 )

@@ -25,6 +25,7 @@ GROUP = "design"
 _RAW = "raw"
 # The grapple near the ground, in the middle of the reach.
 _START = ("start_radius_m=5", "start_height_m=2.2")
+_REACH_M = 2.0, 8.0  # from there every target is in reach
 _LEAST = 3  # persons of a bootstrap
 _CODE = re.compile(r"[A-Za-z0-9_-]{1,12}")
 
@@ -91,7 +92,9 @@ def study(
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
         all_changes = [*_START, *(changes or [])]
         parameters = changed_parameters(all_changes)
-        task = Task(placements, practice, pause_s, parameters.start_radius_m)
+        if not _REACH_M[0] <= (start_m := parameters.start_radius_m) <= _REACH_M[1]:
+            raise UsageError(f"--set start_radius_m: expected 2 .. 8 m, got {start_m:g}")
+        task = Task(placements, practice, pause_s, start_m)
         key = _key(folder, file, other, {**task._asdict(), "crane": all_changes})
         copies = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         settings = _settings(key, file, other, copies)

@@ -36,6 +36,7 @@ function begin(found) {
   byId("hands").hidden = !hello.drives;
   byId("profile").hidden = !hello.profiles;
   taken = false;
+  if (hello.preference) link.send({ settings: true }); // they come when they are computed
   if (same) {
     byId("events").replaceChildren(); // all of them come again
     shell.charts.events = [];

@@ -84,6 +84,7 @@ export class Shell {
   draw(now) {
     if (this.other === "plan") this.plan.draw(now);
     else if (this.other === null) this.scene?.draw(now);
+    byId("coarse").hidden = !this.scene?.coarse;
     this.charts.draw(now);
   }
 
