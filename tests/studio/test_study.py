@@ -281,18 +281,19 @@ def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> No
     try:
         stage, hand, sent = stage_of(tmp_path, joysticks), Hand(deployment), 0
         stage.with_cab(lambda cab, now_s: cab.take(1, now_s))
-        stage.other(1, {"study": "begin"})
         found = deployment.messages.find("TipPosition")
         assert not isinstance(found, str)
         pose = Frame("crane", found[1].frame_id, found[1].is_extended_frame, bytes(8))
-        for k in range(60):
-            held = Held({"slew": 1.0 if k > 30 else 0.0}, enable=True, reset=k > 50)
-            for frame in (*hand.frames(0, held), pose):
-                sender.send(frame)
-                sent += 1
-            stage._tick(0, 0, 0)
-        (row,) = stage.study._table.rows
-        assert (row["input"], row["setting"]) == ("CAN", "A")
+        while stage.study.phase == "pause":  # on a busy machine a tick comes too late: once more
+            stage.other(1, {"study": "begin"})
+            for k in range(60):
+                held = Held({"slew": 1.0 if k > 30 else 0.0}, enable=True, reset=k > 50)
+                for frame in (*hand.frames(0, held), pose):
+                    sender.send(frame)
+                    sent += 1
+                stage._tick(0, 0, 0)
+        row = stage.study._table.rows[-1]
+        assert (row["input"], row["setting"], row["outcome"]) == ("CAN", "A", "miss")
         assert len(listener.frames()) == sent  # nobody but the hand, and that crane
         for frame in (*hand.frames(0, Held()), pose):
             sender.send(frame)
