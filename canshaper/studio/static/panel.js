@@ -25,6 +25,8 @@ const set = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
 };
 
+const sizeOf = (list) => `${list.scrollHeight} ${list.clientHeight}`;
+
 export class Panel {
   constructor(hello, slide) {
     this.hello = hello;
@@ -61,7 +63,10 @@ export class Panel {
     list.replaceChildren();
     // The newest event stays in sight, also where the list gets another size, until a person scrolls up.
     this.follows = true;
-    list.onscroll = () => { this.follows = list.scrollHeight - list.scrollTop - list.clientHeight < 30; };
+    list.onscroll = () => {
+      if (sizeOf(list) !== this.size) this.follow(); // it was laid out anew, no person has scrolled
+      else this.follows = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
+    };
     this.sized?.disconnect();
     this.sized = new ResizeObserver(() => this.follow());
     this.sized.observe(list);
@@ -70,6 +75,7 @@ export class Panel {
   follow() {
     const list = document.getElementById("events");
     if (this.follows) list.scrollTop = list.scrollHeight;
+    this.size = sizeOf(list);
   }
 
   buildSliders(slide) {
