@@ -31,38 +31,29 @@ class Placement(NamedTuple):
     width_m: float
 
 
-class Task(NamedTuple):
-    """What everyone of a study does.
-
-    Attributes:
-        placements: that count, of each setting.
-        practice: before them.
-        break_s: between two parts, at least.
-        start_m: of the grapple from the pillar when a placement begins.
-    """
-
-    placements: int
-    practice: int
-    break_s: float
-    start_m: float
-
-
-def plan(task: Task, order: str, seed: str) -> dict[Placement, tuple[float, float]]:
+def plan(
+    counts: tuple[int, int], start_m: float, order: str, seed: str
+) -> dict[Placement, tuple[float, float]]:
     """Every placement of a person and its place, in m ahead of the pillar and to its left.
 
-    Rounds of all nine targets, each in random order.
+    Args:
+        counts: of practice, and of placements that count, of each setting: rounds of all nine
+            targets, each in random order.
+        start_m: of the grapple from the pillar.
+        order: letters of the settings.
+        seed: of the order.
     """
     planned = {}
     for part, letter in enumerate(order, 1):
         source, number = random.Random(f"{seed} {part}"), 0
-        for practice, count in ((1, task.practice), (0, task.placements)):
+        for practice, count in zip((1, 0), counts, strict=True):
             drawn: list[tuple[float, float]] = []
             while len(drawn) < count:
                 drawn += source.sample(TARGETS_M, len(TARGETS_M))
             for distance_m, width_m in drawn[:count]:
                 number += 1
                 one = Placement(part, letter, number, practice, distance_m, width_m)
-                planned[one] = _place(source, task.start_m, distance_m)
+                planned[one] = _place(source, start_m, distance_m)
     return planned
 
 

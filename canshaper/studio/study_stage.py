@@ -35,6 +35,7 @@ from canshaper_sim.realtime import open_ports
 
 CRANE = "crane"
 INPUTS = ("keyboard", "gamepad", "pointer")  # of a page
+WHY = ("unplugged", "picture")  # a page breaks off
 CAN = "CAN"
 _SHOWN = {"pose", "joints", "sway", "measured", "simulated", "daemon", "crane", "axes"}
 # What a crane without anti-sway does not have.
@@ -171,8 +172,9 @@ class StudyStage(Stage):
 
     def other(self, page: int, message: Mapping[str, Any]) -> bool:
         """Take what a page of a study sends."""
-        word, by = message.get("study"), message.get("by")
-        if word not in ("begin", "grip", "unplugged") or (word == "grip" and by not in INPUTS):
+        word, by, why = (message.get(name) for name in ("study", "by", "why"))
+        known = {"begin": True, "grip": by in INPUTS, "broken": why in WHY}
+        if not isinstance(word, str) or not known.get(word):
             return False
 
         def act(cab: Cab, now_s: float) -> None:
@@ -183,7 +185,7 @@ class StudyStage(Stage):
             elif word == "grip":
                 self.study.grip(CAN if self.joysticks else str(by), now_s)
             else:
-                self.study.break_off("unplugged", now_s)
+                self.study.break_off(str(why), now_s)
 
         self.with_cab(act)
         return True

@@ -14,7 +14,7 @@ from tests.studio.languages import ENGLISH, OTHERS, texts
 from tests.studio.page import Page as Watcher
 from tests.studio.reader import in_language, is_good
 from tests.studio.second_program import figures, of_page
-from tests.studio.test_browser_truth import NO_WEBGL
+from tests.studio.test_browser_truth import LOSE_WEBGL, NO_WEBGL
 
 # Of the simulated crane: a response of a filter travels as far as the hand has asked for.
 SLEW_RAD_S, NEAR_FAR_M_S = 0.5, 1.0
@@ -185,6 +185,20 @@ def test_a_second_browser_says_that_another_drives(
     expect(first.locator("#told")).to_contain_text("the page was gone", timeout=SOON_MS)
     first.keyboard.up("a")
     assert (one.folder / "P01.csv").read_text().count(",broken,page") == 1
+
+
+def test_a_picture_that_is_lost_breaks_a_placement_off(
+    study: Callable[..., Study], tab: Callable[..., Page]
+) -> None:
+    one = study()
+    page = tab(one)
+    begun(page)
+    moving(page)
+    page.evaluate(LOSE_WEBGL)
+    expect(page.locator("#task")).to_have_text(texts(ENGLISH)["study.nowebgl"])
+    page.keyboard.up("a")
+    expect(page.locator("#begin")).to_be_disabled()
+    assert (one.folder / "P01.csv").read_text().endswith(",broken,picture\n")
 
 
 def test_without_webgl_there_is_no_study_and_it_says_so(

@@ -18,7 +18,7 @@ from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.shipped import deployment_path
 from canshaper.studio.in_process import InProcessCrane
-from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, Task, plan
+from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, plan
 from canshaper.studio.study_files import KEY, Key, Table, read_key, rows_of
 from canshaper.studio.study_stage import CRANE, RealJoysticks, StudyStage, setting
 from canshaper.studio.view import CraneView
@@ -26,7 +26,7 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.parameters import changed_parameters
 from tests.studio.conftest import Listener, free_groups
 
-TASK = Task(placements=18, practice=2, break_s=10.0, start_m=5.0)
+COUNTS, BREAK_S = (2, 18), 10.0
 COMMON = {"study": "0123abcd", "person": "P01", "order": "ABC"}
 START = ["start_radius_m=5", "start_height_m=2.2"]
 
@@ -39,7 +39,7 @@ def test_orders_are_latin_squares_in_which_each_follows_each() -> None:
 
 
 def test_a_plan_has_each_target_as_often_in_reach_and_in_random_order() -> None:
-    planned = plan(TASK, "BCA", "1 P01")
+    planned = plan(COUNTS, 5.0, "BCA", "1 P01")
     assert [one.setting for one in planned] == ["B"] * 20 + ["C"] * 20 + ["A"] * 20
     assert [one.practice for one in planned][:20] == [1, 1] + [0] * 18
     targets = Counter(
@@ -49,8 +49,8 @@ def test_a_plan_has_each_target_as_often_in_reach_and_in_random_order() -> None:
     for one, place in planned.items():
         assert math.dist(place, (5.0, 0.0)) == pytest.approx(one.distance_m)
         assert 2.5 <= math.hypot(*place) <= 7.5 and place[0] > 0.7
-    assert plan(TASK, "BCA", "1 P01") == planned
-    orders = [[one[4:] for one in plan(TASK, "BCA", f"1 {who}")] for who in ("P01", "P02")]
+    assert plan(COUNTS, 5.0, "BCA", "1 P01") == planned
+    orders = [[one[4:] for one in plan(COUNTS, 5.0, "BCA", f"1 {who}")] for who in ("P01", "P02")]
     assert orders[0] != orders[1]
     assert orders[0][2:11] != orders[0][11:20]
 
@@ -58,11 +58,11 @@ def test_a_plan_has_each_target_as_often_in_reach_and_in_random_order() -> None:
 class Person:
     """A person at work, without a crane."""
 
-    def __init__(self, folder: Path, task: Task = TASK) -> None:
+    def __init__(self, folder: Path) -> None:
         self.now_s, self.settings = 100.0, list[str]()
-        self.planned = plan(task, "ABC", "1 P01")
+        self.planned = plan(COUNTS, 5.0, "ABC", "1 P01")
         self.table = Table(folder / "P01.csv", dict(COMMON))
-        self.work = Session(self.planned, task.break_s, self.table, self.settings.append)
+        self.work = Session(self.planned, BREAK_S, self.table, self.settings.append)
         self.see("ready")
 
     def see(
@@ -179,7 +179,7 @@ def test_a_row_that_was_cut_off_is_taken_away(tmp_path: Path) -> None:
 
 
 def test_the_key_is_sealed_and_that_of_one_study(tmp_path: Path) -> None:
-    settings, task = {"raw": "1", "a.yaml": "1", "b.yaml": "2"}, TASK._asdict()
+    settings, task = {"raw": "1", "a.yaml": "1", "b.yaml": "2"}, {"practice": 2}
     key = Key(tmp_path / KEY, settings, task)
     assert set(key.letters) == set("ABC") and set(key.letters.values()) == set(settings)
     again = Key(tmp_path / KEY, settings, task)
@@ -230,9 +230,10 @@ def stage_of(folder: Path, joysticks: RealJoysticks | None = None) -> StudyStage
         "C": setting(deployment_path("forwarder-gff.yaml"), folder),
     }
     table = Table(folder / "P01.csv", dict(COMMON))
+    planned = plan(COUNTS, 5.0, "ABC", "1 P01")
     return StudyStage(
-        settings, plan(TASK, "ABC", "1 P01"), 1.0, table, parameters=changed_parameters(START),
-        changes=START, joysticks=joysticks, done=lambda: None,
+        settings, planned, 1.0, table, parameters=changed_parameters(START), changes=START,
+        joysticks=joysticks, done=lambda: None,
     )  # fmt: skip
 
 
@@ -266,9 +267,8 @@ def test_only_the_page_that_drives_begins_and_grips(stage: StudyStage) -> None:
     stage.with_cab(lambda cab, now_s: cab.take(1, now_s))
     assert stage.other(2, {"study": "begin"}) and stage.study.phase == "pause"
     assert stage.other(1, {"study": "begin"}) and stage.study.phase == "ready"
-    for nonsense in ({"study": 7}, {"study": "unseal"}, {"study": "grip"}, {"grip": "keyboard"}):
-        assert not stage.other(1, nonsense)
-    assert not stage.other(1, {"study": "grip", "by": "P. Smith"})
+    for word in (7, "unseal", "grip", "broken"):
+        assert not stage.other(1, {"study": word, "by": "P. Smith", "why": []})
 
 
 def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def study(
     if unseal or ((grip or interface or channel) and not bus):
         raise UsageError("--unseal: expected without --person; --grip and channels: with --bus")
     from canshaper.cli.verbs.studio import interrupt, serve
-    from canshaper.studio.study import Task, plan
+    from canshaper.studio.study import plan
     from canshaper.studio.study_results import person_page
     from canshaper.studio.study_stage import RealJoysticks, StudyStage, study_app
     from canshaper_sim.parameters import changed_parameters
@@ -94,8 +94,8 @@ def study(
         parameters = changed_parameters(all_changes)
         if not _REACH_M[0] <= (start_m := parameters.start_radius_m) <= _REACH_M[1]:
             raise UsageError(f"--set start_radius_m: expected 2 .. 8 m, got {start_m:g}")
-        task = Task(placements, practice, pause_s, start_m)
-        key = _key(folder, file, other, {**task._asdict(), "crane": all_changes})
+        task = {"placements": placements, "practice": practice, "break": pause_s}
+        key = _key(folder, file, other, task | {"crane": all_changes})
         copies = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         settings = _settings(key, file, other, copies)
         table, result = _table(folder, person, key), folder / f"{person}.html"
@@ -107,7 +107,8 @@ def study(
             result.write_text(person_page(person, table.rows), encoding="utf-8")
 
         stack.callback(write)
-        planned = plan(task, table.common["order"], f"{key.seed} {person}")
+        counts, seed = (practice, placements), f"{key.seed} {person}"
+        planned = plan(counts, start_m, table.common["order"], seed)
         stage = StudyStage(
             settings, planned, pause_s, table, parameters=parameters, changes=all_changes,
             joysticks=joysticks, done=write,

@@ -41,6 +41,8 @@ export class Shell {
     this.scene?.dispose();
     try {
       this.scene = new Scene(byId("scene"), hello);
+      // Else the last picture would stand there as if it were new.
+      byId("scene").addEventListener("webglcontextlost", () => this.flat(text("page.lostwebgl")), { once: true });
     } catch (error) {
       this.flat(error.message);
     }

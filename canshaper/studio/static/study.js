@@ -22,7 +22,7 @@ export class Study {
     byId("hands").hidden = byId("controls").hidden = hello.study.can;
     for (const code of OTHERS) delete actions[code];
     gamepad.on = { enable: gamepad.on.enable, release: gamepad.on.release, grip: () => this.grip("gamepad") };
-    gamepad.lost = () => send({ study: "unplugged" });
+    gamepad.lost = () => send({ study: "broken", why: "unplugged" });
     actions.KeyG = () => this.grip("keyboard");
     actions.Enter = () => send({ study: "begin" });
     byId("grip").onclick = () => this.grip("pointer");
@@ -65,6 +65,7 @@ export class Study {
     byId("grip").hidden = study.phase === "pause" || study.phase === "done";
     byId("grip").disabled = !mine || study.phase !== "moving";
     byId("result").hidden = study.phase !== "done";
+    if (!drawn && mine && study.phase === "moving") this.send({ study: "broken", why: "picture" });
     if (!drawn) return;
     this.target.visible = Boolean(study.target);
     if (study.target) {
