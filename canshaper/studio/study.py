@@ -139,12 +139,11 @@ class Session:
         self.phase, self._since_s = "shown", now_s
 
     def break_off(self, why: str, now_s: float) -> None:
-        """Count a placement under way as not done; a pause follows, whatever was under way."""
+        """Count a placement under way as not done; a pause follows."""
         if self.phase == "moving":
             one, seconds = self._todo.pop(0), now_s - self._since_s
             self._table.add(**one._asdict(), seconds=seconds, outcome=BROKEN, why=why)
             self._todo.insert(sum(other.part == one.part for other in self._todo), one)
-        if self.phase in ("moving", "ready"):
             self.phase, self._why, self._until_s = "pause", why, now_s
 
     def shown(self, now_s: float) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 import csv
 import math
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 
@@ -39,32 +38,11 @@ def middle(values: list[float]) -> float:
     return ordered[half] if len(values) % 2 else (ordered[half - 1] + ordered[half]) / 2
 
 
-class _Cells(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.rows: list[list[str]] = []
-        self._inside = False
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag == "tr":
-            self.rows.append([])
-        self._inside = tag in ("td", "th")
-        if self._inside:
-            self.rows[-1].append("")
-
-    def handle_data(self, data: str) -> None:
-        if self._inside:
-            self.rows[-1][-1] += data
-
-    def handle_endtag(self, tag: str) -> None:
-        self._inside = False
-
-
 def of_page(page: str) -> dict[str, dict[str, str]]:
     """The same figures, as they stand in a page of a person."""
-    table = re.search(r'<table class="figures">.*?</table>', page, re.S)
-    assert table
-    cells = _Cells()
-    cells.feed(table[0])
-    heads = [" ".join(head.split()) for head in cells.rows[0]]
-    return {row[0]: dict(zip(heads[1:], row[1:], strict=True)) for row in cells.rows[1:]}
+    table = page.partition('<table class="figures">')[2].partition("</table>")[0]
+    rows = [
+        [" ".join(cell.split()) for cell in re.findall(r"<t[dh].*?>(.*?)</t[dh]>", row, re.S)]
+        for row in re.findall(r"<tr>(.*?)</tr>", table, re.S)
+    ]
+    return {row[0]: dict(zip(rows[0][1:], row[1:], strict=True)) for row in rows[1:]}
