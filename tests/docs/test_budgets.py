@@ -62,7 +62,7 @@ BUDGET = {
 LINES = {
     "canshaper/gate": (2_291, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_673,
+        4_671,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
     "canshaper": (62_068, "a new ability takes the room of an old one"),
