@@ -184,8 +184,8 @@ class TestSources:
     def test_a_command_to_us_or_to_all(self, to: int, ours: bool) -> None:
         """The message has a destination."""
         gate = Gate(record_of(load("j1939-forwarder")))
-        valve, axes = gate.valves.pop(gate.axes["slew"].of.valve)
-        gate.valves["crane", 0x0CEF2080, True] = replace(valve, group=0x03FF0000), axes
+        valve = gate.valves["crane", 0x0CEF2080, True] = gate.valves.pop(gate.axes["slew"].of.valve)
+        valve.of = replace(valve.of, group=0x03FF0000)
         gate.receive(("crane", 0x0CEF0021 | to << 8, True), bytes(8), 5)
         assert (gate.axes["slew"].foreign_ns == 5) is ours
 
