@@ -65,6 +65,12 @@ class AxisState(AxisInput):
     ``passed`` and ``ticks`` count periods of the valve.
     """
 
+    __slots__ = (
+        "alone", "armed", "asked", "asked_now", "back", "cause", "due", "flips", "forth", "held",
+        "joystick", "last", "latched", "least", "most", "now", "partner", "ramp", "ran", "sent_at",
+        "stop_left", "ticks", "top", "way", "way_back", "why", "zero_at",
+    )  # fmt: skip
+
     def __init__(self, axis: Axis, joystick: JoystickState) -> None:
         super().__init__(axis)
         self.joystick = joystick

@@ -22,6 +22,8 @@ class AxisInput:
         lost: its joystick was another one meanwhile.
     """
 
+    __slots__ = ("changed_ns", "demand", "foreign_ns", "hard", "latches", "lost", "of")
+
     def __init__(self, axis: Axis) -> None:
         self.of = axis
         self.demand: float | None = None

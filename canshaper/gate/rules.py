@@ -110,12 +110,12 @@ def distance(axis: AxisState, velocity: float) -> str:
     Where nothing was asked within the tail a partner moves it: limits are its path and its time.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
-    beyond = abs(velocity) - axis.held_at(velocity) - of.added
-    if axis.ran > of.run_on and beyond > EPSILON:
+    size = abs(velocity)
+    if axis.ran > of.run_on and size - axis.held_at(velocity) - of.added > EPSILON:
         return f"limit=stop_distance_m allowed={of.run_on:.3f}"
     if asked.most:
         ahead = asked.remaining + of.slack + of.path
-        if abs(velocity) * of.period_s > ahead:
+        if size * of.period_s > ahead:
             return f"limit=distance allowed={ahead:.3f}"
     elif of.added:
         if axis.alone > of.most_periods + 1:
