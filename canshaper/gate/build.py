@@ -110,14 +110,13 @@ def protection_of(section: Any, message: Any, can_id: int) -> Protection:
     """Protection of a message, by its section of the file."""
     if one := section.e2e:
         counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
-        check = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
-        return Protection(check, counts=counts)
+        e2e = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
+        return Protection(e2e, counts=counts)
     counter = field_of(message, section.alive_counter) if section.alive_counter else None
     counts = counter.mask + 1 if counter else 0
-    if section.checksum is None:
-        return Protection(None, True, counter, counts)
-    checksum = _checksum(section.checksum, message, can_id)
-    return Protection(checksum, checksum is not None, counter, counts)
+    of = section.checksum
+    check = _checksum(of, message, can_id) if of else None
+    return Protection(check, of is None or check is not None, counter, counts)
 
 
 def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:

@@ -141,6 +141,10 @@ class World:
 
     def put(self, frame: Frame) -> None:
         """A frame is on its bus."""
+        self._put(frame, self.now_ns)
+
+    def _put_input(self, frame: Frame) -> None:
+        """Put a frame on its bus by whose age the daemon stops in the same tick."""
         self._put(frame, later.stamp(self.now_ns, self.active()))
 
     def _joystick(self, joystick: Joystick) -> None:
@@ -151,14 +155,14 @@ class World:
         raw = sender.counted(later.hand(joystick, self._hand(joystick), self.active()))
         sent = joystick_frames(joystick, [raw], self.active())
         for data in sender.passed(later.beside(joystick, sent, self.active())):
-            self.put(Frame(*joystick.key, data))
+            self._put_input(Frame(*joystick.key, data))
 
     def _switches(self, sender: Sender) -> None:
         switches = sender.source
         raw = sender.counted(dict(switches.codes))
         sent = inject.input_frames(switches, raw, self.active(), inject.SWITCHES)
         for data in sender.passed(sent):
-            self.put(Frame(*switches.key, data))
+            self._put_input(Frame(*switches.key, data))
 
     def _stop(self, sender: Sender) -> None:
         raw = sender.counted({self.machine.stop_field.name: 0})
