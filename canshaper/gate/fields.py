@@ -67,9 +67,7 @@ class Part:
         value = (raw * self.scale + self.offset) / self.full
         if not self.low <= value <= self.high:  # nor is what is no number
             return None
-        if -1.0 <= value <= 1.0:
-            return value
-        return -1.0 if value < 0.0 else 1.0
+        return -1.0 if value < -1.0 else 1.0 if value > 1.0 else value
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +95,7 @@ class Stick:
             sign, largest = _FLAGS.get(flags, (0, -1.0))
             if value < -EPSILON or value > largest:
                 return None
-            return sign * value if value > EPSILON else 0.0
+            return sign * value
         return value
 
 

@@ -113,6 +113,13 @@ class Gateway:
         self.gate.tick(self.number * 20_000_000, 0)
 
 
+def test_only_a_frame_that_counts_is_passed_on() -> None:
+    one = Gateway()
+    data = one.receives().data
+    one.gate = Gate(record_of(one.deployment))
+    assert one.gate.leaving(one.key, data, data) == "limit=one frame a tick"
+
+
 def test_a_frame_is_made_from_one_of_its_length() -> None:
     one = Gateway()
     data = one.receives().data
