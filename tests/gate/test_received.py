@@ -152,6 +152,16 @@ def test_a_switch_is_off_until_it_says_otherwise() -> None:
     assert (one.axis.why, one.axis.armed) == ("enable", False)
 
 
+def test_a_joystick_stops_with_the_one_whose_switch_enables_it() -> None:
+    one = Bench(load("ecu-forwarder"), "lift")
+    one.rests()
+    assert one.axis.armed
+    silent = one.deployment.joysticks["left"].key
+    one.change = lambda frame: None if frame[:3] == silent else frame
+    one.rests(10)
+    assert (one.axis.why, one.axis.armed) == ("enable", False)
+
+
 def test_what_was_never_seen_released_is_not_pressed() -> None:
     one = bench()
     one.gate.receive(one.key, bytes(2), 0)
