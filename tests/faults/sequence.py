@@ -28,6 +28,7 @@ MOVES_WITHIN_S = 1.6
 HOLDS = ("asleep", "between reading and sending", "between two frames", "in a reload")
 
 Act = Callable[["Sequence", Fault], None]
+Trace = Callable[[str], None] | None
 
 
 def _hold(where: str) -> Act:
@@ -139,14 +140,7 @@ def kinds_for(machine: Machine) -> list[str]:
 class Sequence:
     """One sequence of faults, from a seed."""
 
-    def __init__(
-        self,
-        name: str,
-        seed: int,
-        trace: Callable[[str], None] | None = None,
-        *,
-        later_kinds: bool = True,
-    ) -> None:
+    def __init__(self, name: str, seed: int, trace: Trace = None, *, newer: bool = True) -> None:
         self.name, self.seed = name, seed
         self.shipped = shipped(name)
         self.machine = machine = self.shipped.machine
@@ -155,7 +149,7 @@ class Sequence:
         self._first = 80 if machine.nodes else 20 if machine.addresses else 3
         self.ticks = self._first + rng.randint(*(SENSOR_TICKS if machine.sensors else BODY_TICKS))
         self.faults = self._plan()
-        if later_kinds:
+        if newer:
             own = random.Random(f"canshaper later kinds {name} {seed}")
             self.faults += later.plan(machine, own, self.faults, self._first, self.ticks)
         self.world = World(machine, rng, self.ticks, self.faults, self._put)

@@ -50,7 +50,7 @@ def test_no_sequence_makes_a_wrong_move(name: str) -> None:
     ],
 )
 def test_what_was_wrong_once_is_right(name: str, seed: int) -> None:
-    Sequence(name, seed, later_kinds=False).run()
+    Sequence(name, seed, newer=False).run()
 
 
 @pytest.mark.slow
