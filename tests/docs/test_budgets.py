@@ -64,8 +64,8 @@ LINES = {
         4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_187, "a new ability takes the room of an old one"),
-    "tests": (95_736, "one level for each behaviour"),
+    "canshaper": (60_993, "a new ability takes the room of an old one"),
+    "tests": (95_986, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (331, "one that only hands on is joined to its reader")}
