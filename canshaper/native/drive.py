@@ -27,12 +27,14 @@ class Tick:
         missed: ticks that were left out before it.
         frames: what arrived, in order, each ``READ_NS`` before the tick.
         stalled: the loop stood still before it.
+        failed: number of the valve whose frame of the tick before did not leave, or None.
     """
 
     now_ns: int
     missed: int
     frames: list[Frame]
     stalled: bool = False
+    failed: int | None = None
 
 
 @dataclass
@@ -42,6 +44,7 @@ class _Hand:
     wanted: dict[str, float]
     held: dict[str, float] = field(default_factory=dict)
     silent: int = 0  # messages that are still left out
+    resting: int = 0  # ticks in neutral after a tap
     count: int = 0
     enable: int = 1
     reset: int = 0
@@ -63,7 +66,10 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
         for name, bound in deployment.joysticks.items()
     }
     radii = [one.radius for one in deployment.motions.values() if one.radius]
-    middles = {one.key: 0.5 * ((one.signal.minimum or 0) + (one.signal.maximum or 0)) for one in radii}
+    middles = {
+        one.key: 0.5 * ((one.signal.minimum or 0) + (one.signal.maximum or 0)) for one in radii
+    }
+    valves = len({axis.valve.message.key for axis in deployment.axes.values()})
     now_ns, late = BEGIN_NS, 0
     for _ in range(ticks):
         late = 60 if source.random() < 0.001 else max(late - 1, 0)
@@ -81,7 +87,8 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
                 frames.append(_frame(radius, {radius.signal.name: code}))
         frames += _strange_frames(source, deployment)
         source.shuffle(frames)
-        yield Tick(now_ns, missed, frames, source.random() < 0.0002)
+        failed = source.randrange(valves) if source.random() < 0.0003 else None
+        yield Tick(now_ns, missed, frames, source.random() < 0.0002, failed)
 
 
 def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -> list[Frame]:
@@ -90,18 +97,15 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
     if hand.silent > 0:
         hand.silent -= 1
         return []
-    if source.random() < 0.001:
-        hand.silent = source.randint(1, 15)
-        return []
-    for name in hand.wanted:
-        if source.random() < 0.03:
-            some = source.choice((source.uniform(-1.0, 1.0), source.uniform(-0.1, 0.1)))
-            hand.wanted[name] = source.choice((0.0, 0.0, 1.0, -1.0, some, some))
-        before = hand.held.get(name, 0.0)
-        hand.held[name] = before + max(-0.2, min(0.2, hand.wanted[name] - before))
     hand.count += 1
+    if source.random() < 0.001:  # what the switches do meanwhile is not seen
+        hand.silent, hand.enable = source.randint(1, 15), source.choice((0, 1, 1))
+        hand.count += source.randint(0, 9)
+        return []
+    _move(source, hand)
     if source.random() < 0.003:
         hand.count += source.choice((-1, 1, 2, 3, 7, 100))
+        hand.enable = source.choice((0, 1, 1, 1))
     if source.random() < 0.002:
         hand.enable = source.choice((0, 1, 1, 2, 3))
     elif hand.enable != 1 and source.random() < 0.1:
@@ -125,6 +129,22 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
     if source.random() < 0.002:
         frame = frame._replace(data=frame.data[: source.randint(0, 7)])
     return [frame] * (2 if source.random() < 0.002 else 1)
+
+
+def _move(source: random.Random, hand: _Hand) -> None:
+    """Move a joystick as an operator does: strokes, taps with a pause behind them, a jerk."""
+    hand.resting = max(0, hand.resting - 1)
+    if source.random() < 0.004:
+        hand.resting = source.randint(20, 150)
+    for name, wanted in hand.wanted.items():
+        if not hand.resting and source.random() < 0.03:
+            some = source.choice((source.uniform(-1.0, 1.0), source.uniform(-0.1, 0.1)))
+            hand.wanted[name] = source.choice((0.0, 0.0, 1.0, -1.0, some, some))
+        elif hand.resting:
+            tap = source.random() < 0.02
+            hand.wanted[name] = source.uniform(-0.5, 0.5) if tap else 0.0
+        before = hand.held.get(name, 0.0)
+        hand.held[name] = before + max(-0.2, min(0.2, wanted - before))
 
 
 def _frame(bound: BoundInput, raw: dict[str, Any]) -> Frame:

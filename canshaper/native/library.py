@@ -77,8 +77,8 @@ class _CFrame(ctypes.Structure):
     )
 
 
-class NativeController:
-    """The controller in C, with the interface of ``Controller`` as far as it has it.
+class NativeLibrary:
+    """The C with the tables of a deployment, compiled and loaded.
 
     Args:
         deployment: the machine.
@@ -92,22 +92,30 @@ class NativeController:
 
     def __init__(self, deployment: Deployment, *more: str, sources: Path = C_FILES) -> None:
         numbers = tables(deployment)
-        self._buses = list(deployment.config.buses)
-        self._axes, self._motions = len(numbers["axis"]), len(numbers["motion"])
+        self.buses = list(deployment.config.buses)
+        self.axes, self.valves = len(numbers["axis"]), len(numbers["valve"])
+        self.motions = len(numbers["motion"])
+        self.real = ctypes.c_float if "-DCS_FLOAT" in more else ctypes.c_double
         with tempfile.TemporaryDirectory() as folder:
-            self._c = ctypes.CDLL(str(build(numbers, Path(folder), *more, sources=sources)))
-        c = self._c
-        c.cs_arithmetic.restype = ctypes.c_bool
-        if not c.cs_arithmetic():
+            self.c = ctypes.CDLL(str(build(numbers, Path(folder), *more, sources=sources)))
+        self.c.cs_arithmetic.restype = ctypes.c_bool
+        if not self.c.cs_arithmetic():
             text = "expected arithmetic as Python's, got another one"
-            raise NativeError(f"{text}: -ffast-math, x87, or another mathematical library")
-        self._tables = ctypes.byref(ctypes.c_char.in_dll(c, "cs_tables"))
-        self._state = ctypes.create_string_buffer(c.cs_inspect_size())
-        self._out = (_CFrame * len(numbers["valve"]))()
-        real = ctypes.c_float if "-DCS_FLOAT" in more else ctypes.c_double
-        self._row = (real * len(NAMES))()
-        self._motion_row = (real * MOTION_ROW)()
-        c.cs_init(self._state, self._tables)
+            raise NativeError(f"{text}: -ffast-math, contraction, x87, or another libm")
+
+
+class NativeController:
+    """The controller in C, with the interface of ``Controller`` as far as it has it."""
+
+    def __init__(self, library: NativeLibrary) -> None:
+        self._c, self._buses = library.c, library.buses
+        self._axes, self._motions = library.axes, library.motions
+        self._tables = ctypes.byref(ctypes.c_char.in_dll(self._c, "cs_tables"))
+        self._state = ctypes.create_string_buffer(self._c.cs_inspect_size())
+        self._out = (_CFrame * library.valves)()
+        self._row = (library.real * len(NAMES))()
+        self._motion_row = (library.real * MOTION_ROW)()
+        self._c.cs_init(self._state, self._tables)
 
     def receive(self, frame: Frame, arrived_ns: int) -> None:
         """Take a frame that was received."""

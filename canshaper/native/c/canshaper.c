@@ -93,7 +93,7 @@ static void invalidate_all(cs_controller *s, const cs_config *c)
 /* Count late ticks against punctual ones; whether too many were late. */
 static bool overrun(cs_controller *s, bool late)
 {
-    int32_t most = (s->late + LATE_WEIGHT > LATE_LIMIT) ? LATE_LIMIT : (s->late + LATE_WEIGHT);
+    int32_t most = ((s->late + LATE_WEIGHT) > LATE_LIMIT) ? LATE_LIMIT : (s->late + LATE_WEIGHT);
     int32_t least = (s->late > 0) ? (s->late - 1) : 0;
     s->late = late ? most : least;
     s->overrun = (s->overrun || (s->late == LATE_LIMIT)) && (s->late > 0);

@@ -37,7 +37,7 @@ static void entered(cs_axis *a, const cs_axis_config *c, int32_t old)
 }
 
 /* Trip for a filter that gave no number; the model starts again, it may be spoilt too. */
-static void invalidate(cs_axis *a, const cs_axis_config *c)
+static void fail(cs_axis *a, const cs_axis_config *c)
 {
     if (a->state != CS_TRIPPED) {
         a->state = CS_TRIPPED;
@@ -83,7 +83,7 @@ void cs_axis_act(cs_axis *a, const cs_axis_config *c, const cs_input *in)
             a->offset = 0;
         }
     }
-    if (!ok) { invalidate(a, c); }
+    if (!ok) { fail(a, c); }
 }
 
 /* Let the sway model swing with the output of cs_axis_act. */

@@ -11,10 +11,12 @@
 #define CS_FUNCTION(name) name##f
 #define CS_INFINITY HUGE_VALF
 #define CS_DIGITS 24
+#define CS_SPLIT 4097 /* 2^12 + 1 */
 #else
 #define CS_FUNCTION(name) name
 #define CS_INFINITY HUGE_VAL
 #define CS_DIGITS 53
+#define CS_SPLIT 134217729 /* 2^27 + 1 */
 #endif
 #define CS_ABS(x) (CS_FUNCTION(fabs)(x))
 #define CS_SQRT(x) (CS_FUNCTION(sqrt)(x))

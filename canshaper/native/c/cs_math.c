@@ -73,7 +73,7 @@ cs_real cs_sum_of_products(const cs_real *taps, const cs_real *history, int32_t 
 /* a * a as high + low, without an error (Dekker 1971). */
 static cs_real square(cs_real a, cs_real *low)
 {
-    cs_real t = a * CS_R((1 << ((CS_DIGITS + 1) / 2)) + 1);
+    cs_real t = a * CS_R(CS_SPLIT);
     cs_real ah = t - (t - a);
     cs_real al = a - ah;
     cs_real high = a * a;
