@@ -11,7 +11,6 @@ from typing import Any
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
-from canshaper.shaping.states import Reason
 
 # A thousandth of a tick: a frame is read a little later than it arrives.
 READ_NS = 1_000

@@ -57,7 +57,8 @@ def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -
     (folder / "cs_sizes.h").write_text(sizes_source(numbers), encoding="ascii")
     (folder / "cs_tables.c").write_text(tables_source(numbers), encoding="ascii")
     library = folder / "canshaper.so"
-    files = [*sorted(map(str, sources.glob("*.c"))), str(folder / "cs_tables.c")]
+    files = [*sorted(map(str, sources.glob("*.c"))), str(sources / "test/cs_inspect.c")]
+    files.append(str(folder / "cs_tables.c"))
     command = [*compiler(), *FLAGS, *more, "-shared", "-fPIC", f"-I{folder}", f"-I{sources}"]
     done = subprocess.run(
         [*command, *files, "-o", str(library), "-lm"], capture_output=True, text=True, check=False
