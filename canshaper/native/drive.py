@@ -4,13 +4,15 @@ It needs no simulated crane. The same seed gives the same drive.
 """
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from canshaper.codec.frame import Frame
+from canshaper.codec.velocity import VelocitySignal
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.protocols.interface import MessageKey
 
 # A thousandth of a tick: a frame is read a little later than it arrives.
 READ_NS = 1_000
@@ -26,14 +28,14 @@ class Tick:
         missed: ticks that were left out before it.
         frames: what arrived, in order, each ``READ_NS`` before the tick.
         stalled: the loop stood still before it.
-        failed: number of the valve whose frame of the tick before did not leave, or None.
+        failed: frame of a valve that did not leave in the tick before, or None.
     """
 
     now_ns: int
     missed: int
     frames: list[Frame]
     stalled: bool = False
-    failed: int | None = None
+    failed: Frame | None = None
 
 
 @dataclass
@@ -48,6 +50,38 @@ class _Hand:
     enable: int = 1
     reset: int = 0
     off: int = 0
+
+
+class Driven(Protocol):
+    """A controller, in whatever language."""
+
+    def stalled(self) -> None:
+        """Take note that the loop stood still."""
+
+    def send_failed(self, frame: Frame, /) -> None:
+        """Take note that a frame of a valve did not leave."""
+
+    def receive(self, frame: Frame, now_ns: int, /) -> object:
+        """Take a frame that was received."""
+
+    def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]:
+        """Return the frames to send now."""
+
+
+def play(tick: Tick, controller: Driven) -> list[Frame]:
+    """Give a tick of a drive to a controller, and return the frames that leave."""
+    if tick.stalled:
+        controller.stalled()
+    if tick.failed is not None:
+        controller.send_failed(tick.failed)
+    for frame in tick.frames:
+        controller.receive(frame, tick.now_ns - READ_NS)
+    return list(controller.tick(tick.now_ns, tick.missed))
+
+
+def valve_keys(deployment: Deployment) -> list[MessageKey]:
+    """Bus and id of each valve message, in the order of their axes."""
+    return list(dict.fromkeys(axis.valve.message.key for axis in deployment.axes.values()))
 
 
 def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick]:
@@ -68,7 +102,7 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
     middles = {
         one.key: 0.5 * ((one.signal.minimum or 0) + (one.signal.maximum or 0)) for one in radii
     }
-    valves = len({axis.valve.message.key for axis in deployment.axes.values()})
+    valves = valve_keys(deployment)
     now_ns, late = BEGIN_NS, 0
     for _ in range(ticks):
         late = 60 if source.random() < 0.001 else max(late - 1, 0)
@@ -86,7 +120,7 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
                 frames.append(_frame(radius, {radius.signal.name: code}))
         frames += _strange_frames(source, deployment)
         source.shuffle(frames)
-        failed = source.randrange(valves) if source.random() < 0.0003 else None
+        failed = Frame(*source.choice(valves), b"") if source.random() < 0.0003 else None
         yield Tick(now_ns, missed, frames, source.random() < 0.0002, failed)
 
 
@@ -113,6 +147,7 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
     hand.reset ^= source.random() < 0.01
     raw: dict[str, Any] = {}
     for one in bound.velocities:
+        assert isinstance(one, VelocitySignal)  # no other one is exported
         signal = bound.message.get_signal_by_name(one.name)
         raw[one.name] = round((hand.held[one.name] * one.full - one.offset) / one.scale)
         if source.random() < 0.001:

@@ -15,6 +15,7 @@ from pathlib import Path
 from canshaper.codec.frame import Frame
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
+from canshaper.native.drive import valve_keys
 from canshaper.native.source import sizes_source, tables_source
 from canshaper.native.states import NAMES
 from canshaper.native.tables import Numbers, tables
@@ -57,11 +58,13 @@ def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -
     (folder / "cs_sizes.h").write_text(sizes_source(numbers), encoding="ascii")
     (folder / "cs_tables.c").write_text(tables_source(numbers), encoding="ascii")
     library = folder / "canshaper.so"
-    files = [*sorted(map(str, sources.glob("*.c"))), str(sources / "test/cs_inspect.c")]
-    files.append(str(folder / "cs_tables.c"))
-    command = [*compiler(), *FLAGS, *more, "-shared", "-fPIC", f"-I{folder}", f"-I{sources}"]
+    files = [*sources.glob("src/*.c"), sources / "test/cs_inspect.c", folder / "cs_tables.c"]
+    command = [*compiler(), *FLAGS, *more, "-shared", "-fPIC", f"-I{folder}", f"-I{sources}/src"]
     done = subprocess.run(
-        [*command, *files, "-o", str(library), "-lm"], capture_output=True, text=True, check=False
+        [*command, *map(str, files), "-o", str(library), "-lm"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if done.returncode:
         raise NativeError(f"{command[0]} failed: {' '.join(done.stderr.split())[:500]}")
@@ -94,8 +97,8 @@ class NativeLibrary:
     def __init__(self, deployment: Deployment, *more: str, sources: Path = C_FILES) -> None:
         numbers = tables(deployment)
         self.buses = list(deployment.config.buses)
-        self.axes, self.valves = len(numbers["axis"]), len(numbers["valve"])
-        self.motions = len(numbers["motion"])
+        self.axes, self.motions = len(numbers["axis"]), len(numbers["motion"])
+        self.valves = valve_keys(deployment)
         self.real = ctypes.c_float if "-DCS_FLOAT" in more else ctypes.c_double
         with tempfile.TemporaryDirectory() as folder:
             self.c = ctypes.CDLL(str(build(numbers, Path(folder), *more, sources=sources)))
@@ -110,10 +113,10 @@ class NativeController:
 
     def __init__(self, library: NativeLibrary) -> None:
         self._c, self._buses = library.c, library.buses
-        self._axes, self._motions = library.axes, library.motions
+        self._axes, self._motions, self._valves = library.axes, library.motions, library.valves
         self._tables = ctypes.byref(ctypes.c_char.in_dll(self._c, "cs_tables"))
         self._state = ctypes.create_string_buffer(self._c.cs_inspect_size())
-        self._out = (_CFrame * library.valves)()
+        self._out = (_CFrame * len(library.valves))()
         self._row = (library.real * len(NAMES))()
         self._motion_row = (library.real * MOTION_ROW)()
         self._c.cs_init(self._state, self._tables)
@@ -140,9 +143,9 @@ class NativeController:
         """Distrust every input: the loop stood still."""
         self._c.cs_stalled(self._state, self._tables)
 
-    def send_failed(self, valve: int) -> None:
+    def send_failed(self, frame: Frame) -> None:
         """Take note that the frame of a valve did not leave."""
-        self._c.cs_send_failed(self._state, self._tables, valve)
+        self._c.cs_send_failed(self._state, self._tables, self._valves.index(frame[:3]))
 
     def rows(self) -> list[list[float]]:
         """Inner state: a row for each axis, then one for each motion; see ``states.py``."""

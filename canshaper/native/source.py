@@ -1,5 +1,6 @@
 """Constant tables as C source, exact to the last bit, and the sizes of what changes."""
 
+import math
 from typing import Any
 
 from canshaper.native.tables import Numbers
@@ -87,6 +88,11 @@ def _value(one: Any, name: str) -> str:
         return f"{{{', '.join(_value(value, f'{name}_{k}') for k, value in enumerate(one))}}}"
     if isinstance(one, bool):
         return "true" if one else "false"
-    if isinstance(one, float):
-        return "HUGE_VAL" if one == float("inf") else f"R({one.hex()})"
-    return str(one)
+    return real(one) if isinstance(one, float) else str(one)
+
+
+def real(value: float) -> str:
+    """A number of the C, exact; ``R`` makes it one of its precision."""
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
+    return f"R({value.hex()})"

@@ -1,23 +1,31 @@
 """The inner state of the controller as rows of numbers, in the order of ``c/cs_inspect.c``."""
 
+from canshaper.controller.controller import Controller
 from canshaper.controller.motion import MotionRunner
 from canshaper.controller.runner import AxisControl
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 
+# fmt: off
 NAMES = (
-    "state reason stopping was_enabled was_reset angle rate twin_angle twin_rate unlimited value"
-    " slope offset joins bypassed steps setpoint path applied commanded command ramp own_ramp carry"
-    " dropped_at ran side due left no_run_on crossed added_left rested asked unattended recent_low"
-    " recent_high demanded_low demanded_high added"
-).split()
+    "state", "reason", "stopping", "was_enabled", "was_reset", "angle", "rate", "twin_angle",
+    "twin_rate", "unlimited", "value", "slope", "offset", "joins", "bypassed", "steps", "setpoint",
+    "path", "applied", "commanded", "command", "ramp", "own_ramp", "carry", "dropped_at", "ran",
+    "side", "due", "left", "no_run_on", "crossed", "added_left", "rested", "asked", "unattended",
+    "recent_low", "recent_high", "demanded_low", "demanded_high", "added",
+)
+# fmt: on
 # The C counts ticks no further, so that a machine may rest for years.
 MOST_TICKS = 1_000_000_000
 
 
-def axis_row(runner: AxisControl) -> list[float]:
-    """Return the state of one axis."""
+def rows(controller: Controller) -> list[list[float]]:
+    """Return a row for each axis, then one for each motion."""
+    return [*map(_axis_row, controller.axes.values()), *map(_motion_row, controller.motions)]
+
+
+def _axis_row(runner: AxisControl) -> list[float]:
     axis = runner.axis
     states, transfer, stage = axis._states, axis._transfer, axis._stage
     shaper, sway, output, small = transfer._shaper, axis.sway, axis.output, stage._small
@@ -70,8 +78,7 @@ def axis_row(runner: AxisControl) -> list[float]:
     return [float(one) for one in row]
 
 
-def motion_row(runner: MotionRunner) -> list[float]:
-    """Return the state of a motion of two axes."""
+def _motion_row(runner: MotionRunner) -> list[float]:
     motion = runner._motion
     radius = motion._radius_m
     row = [motion._weight, -1.0 if radius is None else radius]

@@ -36,6 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2210,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
+    "docs/export.md": 300,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,

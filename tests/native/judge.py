@@ -1,4 +1,4 @@
-"""The C against the controller: every valve frame and every number of the inner state, bit by bit."""
+"""The C against the controller: every valve frame and number of the inner state, bit by bit."""
 
 import struct
 from functools import cache
@@ -6,14 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
-from canshaper.native.drive import READ_NS, random_drive
+from canshaper.native.drive import play, random_drive
 from canshaper.native.library import C_FILES, NativeController, NativeLibrary, compiler
-from canshaper.native.states import NAMES, axis_row, motion_row
+from canshaper.native.states import NAMES, rows
 from tests.rigs.files import CONFIG, read
 
 SeenStates = set[tuple[str, str]]
@@ -54,26 +53,13 @@ def difference(
     """
     controller = Controller(deployment.unreported)
     python = Guarded(controller) if guarded else controller
-    valves = list({runner.valve.key: 0 for runner in controller.axes.values()})
     seen: SeenStates = set()
     for number, tick in enumerate(random_drive(deployment, seed, ticks)):
-        if tick.stalled:
-            python.stalled()
-            c.stalled()
-        if tick.failed is not None:
-            python.send_failed(Frame(*valves[tick.failed], b""))
-            c.send_failed(tick.failed)
-        for frame in tick.frames:
-            python.receive(frame, tick.now_ns - READ_NS)
-            c.receive(frame, tick.now_ns - READ_NS)
-        ours = list(python.tick(tick.now_ns, tick.missed))
-        theirs = c.tick(tick.now_ns, tick.missed)
+        ours, theirs = play(tick, python), play(tick, c)
         controller.events.clear()
         if ours != theirs:
             return f"tick {number}: frames {ours}, C {theirs}", seen
-        rows = [axis_row(runner) for runner in controller.axes.values()]
-        rows += [motion_row(motion) for motion in controller.motions]
-        if wrong := _of_rows(rows, c.rows()):
+        if wrong := _of_rows(rows(controller), c.rows()):
             return f"tick {number}: {wrong}", seen
         for runner in controller.axes.values():
             seen.add((runner.axis.state.name, runner.axis.reason.name))

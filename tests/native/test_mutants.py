@@ -14,7 +14,8 @@ MUTANTS = {
     "a sum in the order of the ring": (
         "cs_math.c",
         "return rounded(parts, parts_n);",
-        "x = 0; for (int k = 0; k < n; k++) { x += taps[k] * history[(newest + k) % n]; } return x;",
+        "at = 0; cs_real x = 0;"
+        " while (at < n) { x += taps[at] * history[(newest + at) % n]; at++; } return x;",
         "unlimited",
     ),
     "a sum that is rounded twice": ("cs_math.c", "high = next;", "high = high;", "unlimited"),
@@ -95,9 +96,10 @@ def test_a_small_change_is_noticed(name: str, tmp_path: Path) -> None:
     file, old, new, shows = MUTANTS[name]
     sources = tmp_path / "c"
     shutil.copytree(C_FILES, sources)
-    text = (sources / file).read_text(encoding="ascii")
+    path = sources / "src" / file
+    text = path.read_text(encoding="ascii")
     assert text.count(old) == 1, old
-    (sources / file).write_text(text.replace(old, new.replace("x = 0;", "cs_real x = 0;")))
+    path.write_text(text.replace(old, new))
     deployment = read(CONFIG / "forwarder-robust.yaml")
     c = native(deployment, "-O0", sources=sources)
     wrong, _ = difference(deployment, c, "first", TICKS)

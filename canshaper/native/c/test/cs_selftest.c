@@ -12,7 +12,7 @@
 static bool same_library(void)
 {
     bool same = true;
-    for (int32_t i = 0; i < cs_golden_motion_n; i++) {
+    for (int32_t i = 0; i < cs_golden_atan2_n; i++) {
         const cs_real *one = cs_golden_atan2[i];
         volatile cs_real angle = (sizeof(cs_real) == sizeof(float)) ? (cs_real)atan2f((float)one[0], (float)one[1])
                                                                     : (cs_real)atan2((double)one[0], (double)one[1]);

@@ -10,7 +10,7 @@ typedef struct { int64_t now_ns; int32_t missed, in_n, out_n, failed; bool stall
 extern const cs_golden_tick cs_golden_ticks[];
 extern const cs_frame cs_golden_in[], cs_golden_out[];
 extern const cs_real cs_golden_rows[]; /* of all axes, then of all motions, after every so many ticks */
-extern const int32_t cs_golden_n, cs_golden_every, cs_golden_motion_n;
+extern const int32_t cs_golden_n, cs_golden_every, cs_golden_atan2_n;
 extern const cs_real cs_golden_atan2[][3]; /* y, x, and what the library of the desk gave */
 
 /* Replay the golden drive. Returns CS_NONE, or the number of the first tick that gives something else. Where atan2 of
