@@ -161,7 +161,7 @@ static bool run(cs_controller *s, const cs_config *c, int32_t axis, int64_t now_
 int32_t cs_tick(cs_controller *s, const cs_config *c, int64_t now_ns, int32_t missed, cs_frame *out)
 {
     int64_t last = s->last;
-    int64_t now = (last + 1) + missed;
+    int64_t now = (last + 1) + ((missed > 0) ? missed : 0);
     int32_t frames = 0;
     bool late;
     s->last = now;

@@ -1,5 +1,7 @@
-/* The inner state as a row of numbers, for tests only: canshaper/native/states.py has the same row. */
-#include "cs_inspect.h"
+/* The inner state as a row of numbers, for tests only. */
+#include "cs_selftest.h"
+
+#define CS_N(x) ((cs_real)(x))
 
 int32_t cs_inspect_size(void)
 {

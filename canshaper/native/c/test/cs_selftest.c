@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "cs_inspect.h"
 #include "cs_selftest.h"
 
 #define AGE_NS 1000 /* of a frame when it is read */

@@ -4,6 +4,11 @@
 
 #include "canshaper.h"
 
+/* The inner state as a row of numbers, in the order of canshaper/native/states.py. Returns how many there are. */
+int32_t cs_inspect_size(void); /* bytes of cs_controller */
+int32_t cs_inspect_axis(const cs_controller *s, int32_t axis, cs_real *out);
+int32_t cs_inspect_motion(const cs_controller *s, int32_t motion, cs_real *out);
+
 /* A tick: how many frames came before it and leave with it; failed: a valve whose frame did not leave, or CS_NONE. */
 typedef struct { int64_t now_ns; int32_t missed, in_n, out_n, failed; bool stalled; } cs_golden_tick;
 
