@@ -147,10 +147,7 @@ static bool run(cs_controller *s, const cs_config *c, int32_t axis, int64_t now_
             v->count = (v->count + 1) % vc->counts;
             cs_field_write(&vc->counter, v->data, v->count);
         }
-        out->bus = vc->bus;
-        out->id = vc->id;
-        out->extended = vc->extended;
-        out->length = vc->length;
+        *out = (cs_frame){vc->id, vc->bus, vc->length, vc->extended, {0}};
         (void)memcpy(out->data, v->data, CS_BYTES);
     }
     cs_axis_advance(a, ac);
@@ -163,13 +160,12 @@ int32_t cs_tick(cs_controller *s, const cs_config *c, int64_t now_ns, int32_t mi
     int64_t last = s->last;
     int64_t now = (last + 1) + ((missed > 0) ? missed : 0);
     int32_t frames = 0;
-    bool late;
     s->last = now;
     if (s->stood_still) {
         s->stood_still = false;
         invalidate_all(s, c);
     }
-    late = overrun(s, missed > 0);
+    bool late = overrun(s, missed > 0);
     for (int32_t i = 0; (i < c->axes_n) && (missed > 0); i++) {
         int32_t period = c->axis[i].period_ticks;
         int64_t passed = cs_periods(now, period) - cs_periods(last, period);

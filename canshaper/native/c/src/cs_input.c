@@ -45,10 +45,7 @@ bool cs_fresh(int64_t since_ns, int64_t now_ns, int64_t timeout_ns)
     return (since_ns != CS_NEVER) && ((now_ns - since_ns) <= timeout_ns);
 }
 
-void cs_message_init(cs_message *m)
-{
-    *m = (cs_message){CS_NEVER, CS_NEVER, CS_NEVER, CS_NONE, 0, true, false};
-}
+void cs_message_init(cs_message *m) { *m = (cs_message){CS_NEVER, CS_NEVER, CS_NEVER, CS_NONE, 0, true, false}; }
 
 bool cs_message_is(const cs_message_config *c, int32_t bus, uint32_t id, bool extended, int32_t length)
 {

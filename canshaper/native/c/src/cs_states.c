@@ -1,5 +1,5 @@
-/* The state machine of an axis: a table of rows, and the lines that follow it. The first row of the
-   state whose conditions all hold gives the next state and the reason. */
+/* The state machine of an axis: a table, and the lines that follow it. The first row of the state whose conditions all
+   hold gives the next state and the reason. */
 #include <stddef.h>
 
 #include "cs_internal.h"
@@ -10,8 +10,7 @@ enum {
     UNSHAPED = 0x080, ADDED = 0x100, NOT_ADDED = 0x200, AT_REST = 0x400, STOP_OVER = 0x800
 };
 
-/* In place of a reason: the cause that the input names, if it is one of these; any other one is a
-   mistake in the program, and trips. */
+/* In place of a reason: the cause that the input names, if it is one of these; any other one is a mistake, and trips. */
 enum { ANY = -1, STOPS = -2, STOPS_IN_BYPASS = -3, WAITS = -4, TRIPS = -5, TRIPS_AT_REST = -6 };
 
 typedef struct { int32_t state; uint32_t when; int32_t new_state, why; } row;

@@ -3,10 +3,7 @@
 
 #define CS_N(x) ((cs_real)(x))
 
-int32_t cs_inspect_size(void)
-{
-    return (int32_t)sizeof(cs_controller);
-}
+int32_t cs_inspect_size(void) { return (int32_t)sizeof(cs_controller); }
 
 int32_t cs_inspect_axis(const cs_controller *s, int32_t axis, cs_real *out)
 {
