@@ -113,7 +113,8 @@ def _refused(deployment: Deployment, controller: Controller) -> Iterator[tuple[P
         at = ("axes", name, "valve")
         yield from _unreadable(at, axis.valve_message, [axis.config.valve.signal])
         shaper = controller.axes[name].axis._transfer._shaper
-        if type(shaper) not in KINDS:
+        inner = shaper._shaper if isinstance(shaper, LimitAware) else shaper
+        if type(shaper) not in KINDS or type(inner) not in KINDS:
             text = f"expected a filter that C has, got {axis.config.filter.kind}"
             yield ("axes", name, "filter", "kind"), text
     for name, motion in deployment.motions.items():

@@ -65,8 +65,8 @@ LINES = {
         4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (62_272, "a new ability takes the room of an old one"),
-    "tests": (96_282, "one level for each behaviour"),
+    "canshaper": (62_273, "a new ability takes the room of an old one"),
+    "tests": (96_289, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (339, "one that only hands on is joined to its reader")}

@@ -1,5 +1,6 @@
 """What C has no part for is refused by its key; numbers are exact to the last bit."""
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,7 +13,8 @@ from canshaper.errors import ConfigError
 from canshaper.native.source import sizes_source, tables_source
 from canshaper.native.tables import NOT_EXPORTED, tables
 from canshaper.shaping.registry import KINDS
-from canshaper.shaping.shapers.kind import ShaperKind
+from canshaper.shaping.shapers.kind import Shaper, ShaperKind
+from canshaper.shaping.shapers.limit_aware import LimitAware
 from tests.native.machines import SHIPPED
 from tests.rigs.files import CONFIG, Machine, read
 
@@ -80,13 +82,17 @@ def test_what_is_refused_is_named_with_its_line(machine: Machine) -> None:
     assert problems(machine) == [f":{line + 1}: {text}"]
 
 
-def test_a_filter_of_another_class_is_refused(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Other(Fir):
-        pass
+class Other(Fir):
+    pass
 
-    kind = ShaperKind("other", "Another.", lambda _: Other([1.0]), lambda *_: {"other": {}})
+
+@pytest.mark.parametrize(
+    "build", [lambda _: Other([1.0]), lambda sway: LimitAware(sway, Other([1.0]))]
+)
+def test_a_filter_of_another_class_is_refused(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, build: Callable[[Any], Shaper]
+) -> None:
+    kind = ShaperKind("zv", "Another.", build, lambda *_: {"other": {}}, needs_sway=True)
     monkeypatch.setitem(KINDS, "zv", kind)
     machine.in_yaml("filter: { kind: gff, a1: 0.708, a2: 0.12 }", "filter: { kind: zv }")
     (text,) = problems(machine)
