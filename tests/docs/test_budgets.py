@@ -36,6 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2210,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
+    "docs/export.md": 300,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
@@ -65,11 +66,11 @@ LINES = {
         4_671,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_874, "a new ability takes the room of an old one"),
-    "tests": (96_764, "one level for each behaviour"),
+    "canshaper": (63_015, "a new ability takes the room of an old one"),
+    "tests": (97_457, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (336, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (344, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

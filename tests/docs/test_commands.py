@@ -31,6 +31,7 @@ NOT_PASTED = {
     "campaign.md": "hours of drives, or a cluster",
     "commission.md": "tests/commissioning/procedure/test_day.py goes its way",
     "doctor.md": "examines this PC for a minute, as root; tests/hil/test_doctor.py",
+    "export.md": "needs a compiler; tests/native/test_export.py",
     "guide.md": "tests/docs/test_guide.py goes its way in lock-step",
     "monitor.md": "a daemon, logs of a machine; tests/commissioning/monitor, tests/recording",
     "replay.md": "logs of a machine; tests/recording",
