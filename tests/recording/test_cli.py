@@ -78,11 +78,21 @@ def test_part_of_a_drive(tmp_path: Path) -> None:
     assert data["ticks"] == pytest.approx(900, abs=2)  # of which 50 are drawn
 
 
-def test_a_log_that_cannot_be_used_is_reported(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        ("(1.0) vcan0 7FF#00\n(2.0) vcan0 7FF#00\n", "none of its joystick messages (JoystickLeft"),
+        (
+            "(1.0) can3 110#00\n(2.0) can4 110#00\n",
+            "bus crane: expected the channel 'vcan0', got 'can3', 'can4'",
+        ),
+    ],
+)
+def test_a_log_that_cannot_be_used_is_reported(tmp_path: Path, rows: str, text: str) -> None:
     log = tmp_path / "x.log"
-    log.write_text("(1.0) can3 110#00\n(2.0) can4 110#00\n")
-    said = called(log, "--config", "forwarder.yaml", "--out", tmp_path / "out", code=2)
-    assert "bus crane: expected the channel 'vcan0', got 'can3', 'can4'" in said.replace("\n", " ")
+    log.write_text(rows)
+    arguments = [log, "--config", "forwarder.yaml", "--out", tmp_path / "out"]
+    assert text in called(*arguments, code=2).replace("\n", " ")
 
 
 def test_options_that_cannot_be(tmp_path: Path) -> None:
