@@ -233,8 +233,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.slow) if n == "conflict" else n for n in BAD],
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "conflict" else n for n in BAD]
 )
 def test_errors_leave_the_file_alone(file: Path, name: str) -> None:
     before = file.read_bytes()
