@@ -64,11 +64,11 @@ LINES = {
         4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_132, "a new ability takes the room of an old one"),
+    "canshaper": (61_135, "a new ability takes the room of an old one"),
     "tests": (95_455, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (331, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (332, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:
