@@ -45,7 +45,7 @@ BUDGET = {
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
     "docs/safety.md": 2300,
-    "docs/sensor.md": 1170,
+    "docs/sensor.md": 1180,
     "docs/service.md": 790,
     "docs/states.md": 300,
     "docs/studio.md": 717,
@@ -53,7 +53,7 @@ BUDGET = {
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
     "docs/tuning.md": 780,
-    "docs/work.md": 435,
+    "docs/work.md": 501,
     "studies/README.md": 760,
 }
 
@@ -64,8 +64,8 @@ LINES = {
         4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_135, "a new ability takes the room of an old one"),
-    "tests": (95_455, "one level for each behaviour"),
+    "canshaper": (61_190, "a new ability takes the room of an old one"),
+    "tests": (95_595, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (332, "one that only hands on is joined to its reader")}
