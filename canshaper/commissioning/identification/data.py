@@ -141,9 +141,9 @@ def stopwatch(
     """
     if not swings >= 3:
         raise IdentificationError(f"--swings: expected 3 or more, better 10, got {swings:g}")
-    if not 0.15 <= seconds / swings <= 12.0:
+    if not 0.15 <= seconds / swings <= 25.0:
         text = f"{seconds / swings:g} s, of {seconds:g} s for {swings:g} swings"
-        raise IdentificationError(f"--seconds: expected 0.15 to 12 s a swing, got {text}")
+        raise IdentificationError(f"--seconds: expected 0.15 to 25 s a swing, got {text}")
     if not 0.0 < last_deg <= first_deg <= 60.0:
         raise IdentificationError(
             "--first, --last: expected up to 60 degrees, the last one above 0 and not larger than"

@@ -125,7 +125,7 @@ def test_of_a_range_with_a_residual_the_shortest_is_taken(file: Path) -> None:
     ("lengths", "expected"),
     [
         ("1.6:1.2", "expected LOW of 0.05 to 1.2 m, up to HIGH, got 1.6:1.2"),
-        ("1.2:40", "expected LOW of 0.05 to 30 m, up to HIGH, got 1.2:40"),
+        ("1.2:151", "expected LOW of 0.05 to 150 m, up to HIGH, got 1.2:151"),
         ("1.2", "expected LOW:HIGH in m, such as 1.2:1.6, got 1.2"),
         ("nan:1", "expected LOW of 0.05 to 1 m, up to HIGH, got nan:1"),
     ],
