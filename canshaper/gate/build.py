@@ -197,11 +197,9 @@ def slack_of(config: Any) -> float:
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
     one = not (config.gain_schedule or config.profiles or config.sway_sensor)
-    if one and config.filter.kind in SPREADING:
-        return SLACK
-    swings = (config.sway.mode(), *config.sway.ends()) if config.sway else ()
-    slack: float = max([SWING_SLACK, *(0.5 * one.period_s for one in swings)])
-    return slack
+    swings = [config.sway.mode(), *config.sway.ends()] if config.sway else []
+    slow = max([SWING_SLACK, *(0.5 * swing.period_s for swing in swings)])
+    return SLACK if one and config.filter.kind in SPREADING else float(slow)
 
 
 def _forwarded(axis: Any, deployment: Any) -> bool:
