@@ -96,3 +96,16 @@ def test_a_hoist_in_motion_is_followed() -> None:
     assert period_s(rig) == pytest.approx(of_rope(6.5))
     assert max(abs(b - a) for a, b in pairwise(speeds)) <= LARGEST_STEP
     assert rig.news() == []
+
+
+def test_what_drives_the_valve_for_a_measurement_follows_no_rope() -> None:
+    rig = OverheadRig()
+    rig.run(3)
+    runner = rig.controller.axes["bridge"]
+    own, joystick = runner.axis, rig.controller.joysticks["left"]
+    runner.isolate(joystick, rig.controller.axes["hoist"].axis)
+    rig.rope_m = 5.2
+    rig.run(2)
+    assert own.sway is not None
+    assert own.sway.mode.period_s == pytest.approx(of_rope(5.2))
+    assert runner.axis.sway is None

@@ -107,7 +107,7 @@ def test_numbers_that_the_length_chooses_are_not_adjustable(tmp_path: Path) -> N
 
 
 def test_a_motion_of_an_axis_with_a_rope_is_refused(tmp_path: Path) -> None:
-    motion = "motion: { one: { slew: bridge, near_far: trolley } }\nuncertainty:"
+    motion = "motion: { one: { slew: bridge } }\nuncertainty:"
     slewing = (
         "    sway:\n      length_m",
         "    slewing: { full_speed_rad_s: 1, largest_radius_m: 5 }\n    sway:\n      length_m",

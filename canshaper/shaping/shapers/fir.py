@@ -33,7 +33,7 @@ class Fir:
         # A tenth of a percent is rounding of taps written to a file, far below any valve's step.
         if not abs(total - 1.0) <= 1e-3:
             raise ValueError(f"sum of the taps: expected 1, got {total:g}")
-        self.taps = tuple(tap / total for tap in taps)
+        self.taps: Sequence[float] = tuple(tap / total for tap in taps)
         self._history: deque[float] = deque([0.0] * len(self.taps), maxlen=len(self.taps))
 
     def step(self, command: float) -> float:
@@ -43,7 +43,7 @@ class Fir:
 
     def response(self, weights: Sequence[float]) -> float:
         """Response to the commands so far with these taps instead, the newest command first."""
-        return math.fsum(map(mul, weights, self._history))
+        return sum(map(mul, weights, self._history))
 
     def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""

@@ -106,18 +106,15 @@ class LimitAware:
         assert self._table is not None  # it was prepared
         least, step, rows = self._table
         at = min(max((factor - least) / step, 0.0), TABLE_STEPS - 1e-9)
-        low, share = rows[int(at)], at % 1.0
-        high = rows[int(at) + 1]
-        taps, angle, rate = (
-            [a + share * (b - a) for a, b in zip(one, two, strict=True)]
-            for one, two in zip(low, high, strict=True)
-        )
+        low, high, share = rows[int(at)], rows[int(at) + 1], at % 1.0
         shaper, twin, mode = self._shaper, self._twin, self._sway.mode
-        shaper.taps = tuple(taps)
+        shaper.taps = [a + share * (b - a) for a, b in zip(low[0], high[0], strict=True)]
         twin.follow(mode)
         if self._sway.angle != 0.0 or self._sway.rate != 0.0:
-            twin.angle, twin.rate = shaper.response(angle), shaper.response(rate)
-            self._unlimited = shaper.response(taps)
+            now, then = (map(shaper.response, one) for one in (low, high))
+            self._unlimited, twin.angle, twin.rate = (
+                a + share * (b - a) for a, b in zip(now, then, strict=True)
+            )
         self._gff.follow(self._pole / self._pole_rad_s(mode.omega_rad_s))
 
     def copy_state(self, old: "LimitAware") -> None:

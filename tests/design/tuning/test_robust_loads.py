@@ -150,7 +150,10 @@ def test_what_cannot_be_designed_is_refused_in_one_line(options: list[str], expe
 @pytest.mark.parametrize(
     ("verb", "cure"),
     [
-        ("robust", "--loads writes all of them, --lengths LOW:HIGH that while the load is not known"),
+        (
+            "robust",
+            "--loads writes all of them, --lengths LOW:HIGH that while the load is not known",
+        ),
         ("tune", "robust --loads --write designs one for each"),
     ],
 )
