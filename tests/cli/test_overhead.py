@@ -32,6 +32,13 @@ def test_demo_shows_what_the_filters_do(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_rehearsal_leads_to_the_report(tmp_path: Path) -> None:
+    said = run("commission", str(changed(tmp_path)), "--simulated", "--yes")
+    assert "ok: bridge, trolley: the length of the rope is measured" in said
+    assert "All steps are done" in said
+
+
+@pytest.mark.slow
 def test_a_campaign_draws_ropes(tmp_path: Path) -> None:
     said = run("campaign", str(FILE), "-n", "4", "--out", str(tmp_path), "--processes", "1")
     assert "0 of 4 drives broke one" in said
