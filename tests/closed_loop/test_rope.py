@@ -103,7 +103,8 @@ def test_axes_may_have_any_name(tmp_path: Path) -> None:
     assert max(recording.axes["long_travel"].sway_deg or []) > 0.3
     assert recording.axes["main_hoist"].sway_deg is None
     assert recording.crane is not None
-    assert recording.crane.tip_m[-1][0] == pytest.approx(5.0, abs=0.7)
+    assert 2.0 < recording.crane.tip_m[-1][0] < 6.0
+    assert recording.crane.tip_m[-1][1] == 0.0
     assert recording.dwell_s == 10.0
 
 

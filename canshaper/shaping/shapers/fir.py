@@ -43,7 +43,7 @@ class Fir:
 
     def response(self, weights: Sequence[float]) -> float:
         """Response to the commands so far with these taps instead, the newest command first."""
-        return sum(map(mul, weights, self._history))
+        return float(sum(map(mul, weights, self._history)))
 
     def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""
