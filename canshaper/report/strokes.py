@@ -67,7 +67,7 @@ def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]
     return [window for window in alone if window]
 
 
-def residual_window(t_s: list[float], rest: range, dwell_s: float = RESIDUAL_DWELL_S) -> range:
+def residual_window(t_s: list[float], rest: range, dwell_s: float) -> range:
     """The part of a rest in which residual swing shows; empty where too little is left of it."""
     begin_s = t_s[rest.start] + dwell_s - _ROUNDING_S
     start = next((k for k in rest if t_s[k] >= begin_s), rest.stop)
