@@ -41,6 +41,7 @@ NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
     ("axes", "*"): ("sway_sensor", "gain_schedule", "profiles"),
     ("axes", "*", "command"): ("flags", "negative"),
     ("axes", "*", "valve"): ("direction", "also", "cia408", "node", *_PROTECTED[:3]),
+    ("axes", "*", "sway"): ("length",),
     ("axes", "*", "limits"): ("ends",),
     ("motion", "*", "radius"): _PROTECTED,
 }

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from canshaper import Fir
-from canshaper.config.limits import Limits, Motion, Radius
+from canshaper.config.limits import Limits, Motion, Radius, Sway
 from canshaper.config.schema import AxisSection, Bus, Command, DeploymentConfig, Joystick, Valve
 from canshaper.errors import ConfigError
 from canshaper.native.source import sizes_source, tables_source
@@ -28,7 +28,7 @@ HANDLED: dict[Any, tuple[type[BaseModel], set[str]]] = {
     (): (
         DeploymentConfig,
         {"version", "tick_ms", "tick", "buses", "dbc", "joysticks", "axes", "motion", "status"}
-        | {"identity", "control", "assumed", "still_deg", "uncertainty", "accept"},
+        | {"identity", "control", "assumed", "crane", "still_deg", "uncertainty", "accept"},
     ),
     ("buses", "*"): (Bus, set(Bus.model_fields) - {"canopen", "j1939"}),
     ("joysticks", "*"): (Joystick, {*_READ, "enable", "reset", "anti_sway_off", "stuck_s"}),
@@ -38,6 +38,7 @@ HANDLED: dict[Any, tuple[type[BaseModel], set[str]]] = {
     ),
     ("axes", "*", "command"): (Command, {*_ABOUT, "joystick", "neutral_pct"}),
     ("axes", "*", "valve"): (Valve, {*_READ, *_ABOUT} - {"codes", "alive_max_step", "qualify"}),
+    ("axes", "*", "sway"): (Sway, set(Sway.model_fields) - {"length"}),
     ("axes", "*", "limits"): (Limits, set(Limits.model_fields) - {"ends"}),
     ("motion", "*", "radius"): (Radius, {*_READ, "signal", "codes"}),
 }
