@@ -36,6 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2210,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
+    "docs/export.md": 300,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
@@ -49,6 +50,7 @@ BUDGET = {
     "docs/service.md": 790,
     "docs/states.md": 300,
     "docs/studio.md": 717,
+    "docs/study.md": 333,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
@@ -59,16 +61,16 @@ BUDGET = {
 
 # Lines of Python, and why so many.
 LINES = {
-    "canshaper/gate": (2_291, "read in a day by someone who has never seen it"),
+    "canshaper/gate": (2_098, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_673,
+        4_671,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_190, "a new ability takes the room of an old one"),
-    "tests": (95_595, "one level for each behaviour"),
+    "canshaper": (63_018, "a new ability takes the room of an old one"),
+    "tests": (97_316, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (332, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:
