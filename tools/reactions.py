@@ -88,6 +88,12 @@ ROWS = (
         "no axis READY",
         "protocols/canopen/test_cia408::waits_until_the_valve_is_active",
     ),
+    Row(
+        "LENGTH_LOST",
+        "with `lost: neutral`",
+        "controller/test_rope::neutral_stops",
+        "its timeout + tick",
+    ),
     Row("ENABLE_LOST", "also in a frame out of sequence", "hil/frame_faults::enable_lost", "tick"),
     Row(
         "R2",

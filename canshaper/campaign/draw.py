@@ -6,7 +6,7 @@ meet the same crane and the same operator.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,10 +16,13 @@ from canshaper.config.uncertainty import MOST_FLOW, Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.axes import ALL_AXES, JOINT_AXES, NEAR_FAR, SLEW
+from canshaper_sim.axes import ALL_AXES, JOINT_AXES, NEAR_FAR, OVERHEAD_AXES, SLEW
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
+from canshaper_sim.overhead import OverheadParameters
+from canshaper_sim.recorder import dwell_s
+from canshaper_sim.recording import DWELL_S
 from canshaper_sim.strokes import Script
 
 # How near an end stop a drive begins that is to meet it.
@@ -34,6 +37,9 @@ _FULL_SPEEDS = {
     "lift_cylinder": "lift_cylinder_full_speed_rad_s",
     "knuckle": "knuckle_full_speed_rad_s",
     "extension": "extension_full_speed_m_s",
+    "bridge": "bridge_full_speed_m_s",
+    "trolley": "trolley_full_speed_m_s",
+    "hoist": "hoist_full_speed_m_s",
 }
 
 
@@ -57,10 +63,17 @@ class Setting:
 
 
 def driven_axes(deployment: Deployment) -> tuple[str | None, list[str]]:
-    """Name of the crane that is driven, of several the first one, and the axes it has."""
+    """Name of the crane that is driven, of several the first one, and what its axes move.
+
+    Raises:
+        CampaignError: its axes move nothing.
+    """
     crane = next(iter(cranes(deployment)), None)
-    driven = driven_part(deployment, crane)
-    return crane, [axis for axis in ALL_AXES if axis in driven.axes]
+    moved = {*driven_part(deployment, crane).coordinates.values()}
+    if not moved:
+        text = "expected an axis that moves the crane, got none: the section crane names them"
+        raise CampaignError(f"{deployment.path}: {text}")
+    return crane, [axis for axis in ALL_AXES if axis in moved]
 
 
 def check_same_axes(first: Deployment, second: Deployment) -> None:
@@ -95,7 +108,14 @@ def draw_drive(
     swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
     operator = of_operator.one_of([*OPERATORS])
     script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
+    if (longer_s := dwell_s(deployment) - DWELL_S) > 0.0:
+        script = replace(script, duration_s=script.duration_s + longer_s)
+    by_coordinate = {moved: axis for axis, moved in deployment.coordinates.items()}
+    if deployment.config.crane:
+        script = script.moving(by_coordinate)
     loads, of_loads = _loads(of_load, ranges, script.duration_s, parameters.grapple)
+    if "rope_m" in factors:  # on a rope every load swings alike
+        loads, of_loads = [], {}
     sensors = any(axis.sway_sensor for axis in deployment.axes.values())
     fault = _fault(of_fault, ranges, script.duration_s, sensors=sensors)
     sensor = replace(parameters.sway_sensor, seed=seed % 1_000_000, **fault.sensor)
@@ -119,8 +139,10 @@ def _crane(
     factors = {
         "length_pct": draw.between(*ranges.length_pct),
         "damping_pct": draw.between(*ranges.damping_pct),
-        "radius_m": draw.between(*ranges.radius_m),
     }
+    by_rope = bool({*axes} & {*OVERHEAD_AXES})
+    start = "rope_m" if by_rope else "radius_m"
+    factors[start] = draw.between(*getattr(ranges, start))
     damped = 1.0 + factors["damping_pct"] / 100.0
     grapple = nominal.grapple
     grapple = replace(
@@ -132,6 +154,8 @@ def _crane(
     by_joints = bool({*axes} & {*JOINT_AXES} - {SLEW})
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
+    elif by_rope:
+        crane = replace(crane, overhead=_overhead(nominal.overhead, factors))
     else:
         radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
         crane = replace(crane, start_radius_m=radius_m)
@@ -146,7 +170,7 @@ def _crane(
         gain_pct = draw.between(*ranges.valve_gain_pct)
         factors |= {f"{axis}_{name}": value for name, value in drawn.items()}
         factors[f"{axis}_gain_pct"] = gain_pct
-        owner = joints if by_joints and axis != SLEW else crane
+        owner = joints if by_joints and axis != SLEW else crane.overhead if by_rope else crane
         full = _FULL_SPEEDS[axis]
         changed = {
             axis: replace(getattr(owner, axis), **drawn),
@@ -154,15 +178,32 @@ def _crane(
         }
         if owner is joints:
             joints = replace(joints, **changed)
+        elif by_rope:
+            crane = replace(crane, overhead=replace(crane.overhead, **changed))
         else:
             crane = replace(crane, **changed)
     return replace(crane, joints=joints), factors
 
 
+def _overhead(nominal: OverheadParameters, factors: Mapping[str, float]) -> OverheadParameters:
+    """The rope that was drawn."""
+    return replace(
+        nominal,
+        rope_m=min(max(factors["rope_m"], nominal.rope_min_m), nominal.rope_max_m),
+        rope_error_pct=factors["length_pct"],
+        damping_ratio=nominal.damping_ratio * (1.0 + factors["damping_pct"] / 100.0),
+    )
+
+
 def _place(
     draw: Draw, axes: Sequence[str], ranges: Uncertainty, crane: CraneParameters, seed: int
 ) -> tuple[CraneParameters, dict[str, float]]:
-    """Pump, ground and wind, and how near its stops the tip is; what was drawn of them."""
+    """Pump, ground and wind, and how near its stops the tip is; what was drawn of them.
+
+    An overhead crane has none of them.
+    """
+    if {*axes} & {*OVERHEAD_AXES}:
+        return crane, {}
     factors = {
         "pump_flow": draw.between(*ranges.pump_flow),
         "starved": float(draw.between(0.0, 100.0) < ranges.starved_pct),

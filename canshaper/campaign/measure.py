@@ -11,9 +11,10 @@ from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
 from canshaper.machine.deployment import Deployment
 from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
-from canshaper_sim.axes import LIFT, SLEW
+from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY
 from canshaper_sim.crane import CraneParameters, CraneState
 from canshaper_sim.plant import PlantNode
+from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 Row = dict[str, Any]
@@ -90,8 +91,11 @@ class _Tracks:
     def __init__(
         self, deployment: Deployment, setting: Setting, nominal: CraneParameters, plant: PlantNode
     ) -> None:
-        crane, axes = driven_axes(deployment)
+        crane, _ = driven_axes(deployment)
         driven = driven_part(deployment, crane)
+        self._moves = moves = driven.coordinates
+        axes = sorted(moves, key=lambda one: ALL_AXES.index(moves[one]))
+        self._dwell_s = dwell_s(driven)
         self._plant, self._script = plant, setting.script
         self._tick_s = deployment.config.tick_ms / 1000.0
         self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}
@@ -106,7 +110,7 @@ class _Tracks:
 
     def add(self, time_ms: int) -> None:
         """Take the state of the crane after a tick."""
-        plant = self._plant
+        plant, moves = self._plant, self._moves
         crane, commands, speeds = plant.crane, self._commands, self._speeds
         self._t_s.append(time_ms / 1000.0)
         self._states.append(state := crane.state)
@@ -116,7 +120,7 @@ class _Tracks:
         self._along.append(math.degrees(state.theta6_rad - along))
         for name in commands:
             commands[name].append(plant.command(name))
-            speeds[name].append(crane.speed(name))
+            speeds[name].append(crane.speed(moves[name]))
 
     def measures(self) -> dict[str, float | None]:
         """Return the measures of the drive by the names of ``MEASURES``; None for a missing one."""
@@ -130,13 +134,13 @@ class _Tracks:
             name: AxisTrace(
                 [self._script.command(name, time_s) for time_s in self._t_s],
                 [limits.velocity(command) for command in self._commands[name]],
-                [speed / self._full[name] for speed in self._speeds[name]],
-                across if name == SLEW else None if name == LIFT else along,
+                [speed / self._full[self._moves[name]] for speed in self._speeds[name]],
+                self._sway(self._moves[name]),
             )
             for name, limits in self._limits.items()
         }
         crane = CraneTrace(tip, tip, swing)
-        recording = Recording(self._t_s, axes, crane)
+        recording = Recording(self._t_s, axes, crane, self._dwell_s)
         of_crane = crane_metrics(recording, crane, self._still_deg)
         strokes = find_strokes(recording)
         dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
@@ -149,6 +153,12 @@ class _Tracks:
             "travel_error_s": max(self._travel_errors(axes), default=None),
             "dip_pct": 100.0 * max(dips, default=0.0),
         }
+
+    def _sway(self, moved: str) -> list[float] | None:
+        """Swing that the axis of a coordinate makes; None for one that makes none."""
+        if moved in WITHOUT_SWAY:
+            return None
+        return self._across if moved in (SLEW, BRIDGE) else self._along
 
     def _travel_errors(self, axes: Mapping[str, AxisTrace]) -> Iterator[float]:
         """Yield the travel error of each axis: its way less the joystick's, s of full speed."""

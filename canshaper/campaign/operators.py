@@ -9,7 +9,7 @@ import numpy as np
 
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Joysticks
-from canshaper_sim.axes import LIFT
+from canshaper_sim.axes import WITHOUT_SWAY
 from canshaper_sim.operator import REACH_S, random_script
 from canshaper_sim.strokes import Script, Stroke
 
@@ -104,7 +104,7 @@ def _both(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
 
 
 def _swinging(axes: Sequence[str]) -> Sequence[str]:
-    return [axis for axis in axes if axis != LIFT] or axes
+    return [axis for axis in axes if axis not in WITHOUT_SWAY] or axes
 
 
 def _resting(

@@ -245,7 +245,7 @@ def special_name(signal: Signal, value: float) -> str | None:
 # Unit of a length in a DBC file; many have none.
 LENGTHS = (None, "", "m")
 # Largest radius of a crane, with room; a range in mm or cm is far beyond.
-FARTHEST_M = 100.0
+FARTHEST_M = 120.0
 
 
 def radius_range(signal: Signal) -> str | None:

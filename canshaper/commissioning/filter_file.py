@@ -6,6 +6,7 @@ from pathlib import Path
 from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.edit.edit import Change, FileValue, change, note, of_limits, written_by
+from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
 
@@ -61,6 +62,24 @@ def write_filters(
         text = f"expected {tail_s:g} s, got {config.limits.tail_s:g} s, which stays"
         lines.append(f"WARNING: axes.{axis}.limits.tail_s: {text}: stop_distance_m: {kept}")
     return lines
+
+
+def refuse_scheduled(deployment: Deployment, axis: str, cure: str) -> None:
+    """Refuse to write one filter where a gain schedule has others, which would stay as they are.
+
+    Args:
+        deployment: the machine.
+        axis: name of the axis.
+        cure: what to do instead.
+
+    Raises:
+        UsageError: the axis has a gain schedule.
+    """
+    bound = deployment.axes.get(axis)
+    if bound and bound.config.gain_schedule:
+        points = ", ".join(f"{one.breakpoint:g}" for one in bound.config.gain_schedule)
+        text = f"expected an axis without gain_schedule, got {axis} with {points}"
+        raise UsageError(f"--write: {text}, whose filters would stay: {cure}")
 
 
 def _with_origin(

@@ -34,7 +34,9 @@ def _pump(deployment: Deployment) -> Mistakes:
     """Nothing says whether the pump has the oil that two axes ask for at once."""
     axes = deployment.config.axes
     shaped = [name for name, axis in axes.items() if axis.filter.kind != "off"]
-    if len(shaped) > 1 and not deployment.config.hydraulics:
+    crane = deployment.config.crane
+    electric = crane is not None and crane.kind == "cartesian"
+    if len(shaped) > 1 and not electric and not deployment.config.hydraulics:
         text = f"missing: where the pump lacks oil for {' and '.join(shaped[:2])} at once, swing is"
         cure = f"left; measure flow (canshaper calibrate {deployment.path} --together), or write"
         yield ("hydraulics",), f"{text} {cure} {{ flow: {len(axes)} }} where the oil is enough"

@@ -33,8 +33,8 @@ def lengths_of(text: str | None) -> tuple[float, float] | None:
         raise UsageError(
             f"--lengths: expected LOW:HIGH in m, such as 1.2:1.6, got {text}"
         ) from None
-    if not 0.05 <= low_m <= high_m <= 30.0:
-        most = min(high_m, 30.0)
+    if not 0.05 <= low_m <= high_m <= 150.0:
+        most = min(high_m, 150.0)
         raise UsageError(f"--lengths: expected LOW of 0.05 to {most:g} m, up to HIGH, got {text}")
     return low_m, high_m
 

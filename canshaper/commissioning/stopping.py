@@ -21,6 +21,7 @@ from canshaper.config.schema import AxisSection
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import at_ends
 from canshaper.machine.stopping import (
     FullSpeed,
     allowed_s,
@@ -39,7 +40,7 @@ VALVE_LAG_S = 0.1
 _AXES_A_TABLE = 3  # as many as fit 80 columns
 # Until a filter of the schema gives full speed: five times the longest time constant.
 WARM_UP_S = 25.0
-# Releases that are tried: up to so long a stroke, at such intervals.
+# Releases that are tried: up to so long a stroke, or as long as the tail, at such intervals.
 LONGEST_PULSE_S = 4.0
 RELEASES_S = 0.1
 # Longer than the longest tail and the slowest fall of the schema.
@@ -153,6 +154,8 @@ def _variants(bound: BoundAxis) -> Iterator[BoundAxis]:
         for sway, chosen in pairs:
             changes = {"sway": sway, "filter": chosen}
             yield replace(bound, config=config.model_copy(update=changes))
+    for _, chosen, sway in at_ends(("axes", bound.name), config):
+        yield replace(bound, config=config.model_copy(update={"sway": sway, "filter": chosen}))
 
 
 def print_stopping(deployment: Deployment, console: Console) -> None:
@@ -262,10 +265,11 @@ def needed_s(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: 
     """
     most = 0.0
     ticks = max(round(RELEASES_S / period_s), 1)
+    longest_s = max(LONGEST_PULSE_S, new_axis().tail_s)
     for sign in (1.0, -1.0):
         axis, way = new_axis(), 0.0
         axis.tick(CommandInput())
-        for _ in range(round(LONGEST_PULSE_S / RELEASES_S)):
+        for _ in range(round(longest_s / RELEASES_S)):
             for _ in range(ticks):
                 axis.tick(CommandInput(sign))
             way = max(way, _way(axis, CommandInput(), sign, period_s)[0])

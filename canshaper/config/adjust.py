@@ -90,6 +90,8 @@ def faults(key: Key, config: AxisSection, low: float, high: float) -> Iterator[s
         yield f"expected one of the limits {', '.join(LIMITS)}, got {key.name}"
     elif config.gain_schedule or config.profiles:
         yield f"axis {key.axis} has a gain schedule or profiles, which choose its numbers"
+    elif config.sway and config.sway.length:
+        yield f"axis {key.axis} has a measured length, which chooses its numbers"
     elif config.sway is None and key.section == "filter":
         yield f"axis {key.axis} has no sway data; adjustable are its limits"
     elif not low <= now <= high:

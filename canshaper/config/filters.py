@@ -28,7 +28,7 @@ _DAMPING = 0.03
 class SecondMode(Section):
     """A second mode that a filter was designed for, such as that of long logs."""
 
-    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")]
+    period_s: Annotated[float, number(0.15, 25, "s", "time of one full swing")]
     damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")]
     length_range_pct: Annotated[
         float, number(0, 60, "%", "error of the pendulum length that it covers, +-")
@@ -38,7 +38,7 @@ class SecondMode(Section):
 class DesignedFor(Section):
     """Swing and valve that a filter was designed for; compared with the file when it is loaded."""
 
-    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")]
+    period_s: Annotated[float, number(0.15, 25, "s", "time of one full swing")]
     damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")]
     length_range_pct: (
         Annotated[float, number(0, 60, "%", "error of the pendulum length that it covers, +-")]
@@ -265,6 +265,8 @@ def schedule_fault(kind: str, sets: Sequence[Breakpoint]) -> str | None:
     if not KINDS[kind].needs_sway:
         return f"filter {kind} knows no sway; a gain schedule is for filters that do"
     for one in sets:
+        if one.sway.length:
+            return "expected no length at a breakpoint, but in the sway of the axis"
         if one.filter.kind != kind:
             return f"expected the filter of the axis, {kind}, got {one.filter.kind} at a breakpoint"
     values = [one.breakpoint for one in sets]

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from canshaper.config.inputs import InputSection, NamedCodes, Status
 from canshaper.config.section import Origin, Section, number
 from canshaper.shaping.limits import OutputLimits, ValveCurve
+from canshaper.shaping.rope import Lost
 from canshaper.shaping.sway import SwayMode
 
 
@@ -15,7 +16,7 @@ class Slewing(Section):
 
     full_speed_rad_s: Annotated[float, number(0.05, 3, "rad/s", "angular speed at full command")]
     largest_radius_m: Annotated[
-        float, number(0.5, 40, "m", "radius of the tip when the boom is all out")
+        float, number(0.5, 120, "m", "radius of the tip when the boom is all out")
     ]
 
 
@@ -79,13 +80,13 @@ class Limits(Section):
     """Speeds of the measured valve at each of these commands (% of full speed)."""
     curve_origin: Origin | None = Field(None, description="where this curve comes from")
     tail_s: Annotated[
-        float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
+        float, number(0, 12, "s", "how long the output may stay as fast as was asked before")
     ] = 2.0
     """How long the output may stay as fast as was commanded before, which bounds the run-on after
     release; then it falls to zero by fall_per_s. A shorter tail stops the crane sooner and leaves
     more swing."""
     stop_s: Annotated[
-        float, number(0.1, 5, "s", "longest shaped stop after the input was lost, then neutral")
+        float, number(0.1, 12, "s", "longest shaped stop after the input was lost, then neutral")
     ] = 2.0
     stop_distance_m: (
         Annotated[float, number(0.05, 200, "m", "farthest that the tip may travel when it stops")]
@@ -101,7 +102,7 @@ class Limits(Section):
     with brake_shaped it runs on along the filter for reversal_s, never faster than was commanded in
     that direction: less swing, later to turn round."""
     reversal_s: Annotated[
-        float, number(0.1, 5, "s", "longest motion in the old direction after a reversal")
+        float, number(0.1, 12, "s", "longest motion in the old direction after a reversal")
     ] = 0.45
     """With brake_shaped: longest motion in the old direction after the joystick was pulled the
     other way, the fall included."""
@@ -169,7 +170,7 @@ class Motion(Section):
     radius. A single joint of the boom is none."""
     radius: Radius | None = None
     """Radius of the tip, where it is measured."""
-    radius_m: Annotated[float, number(0.5, 30, "m", "radius of the grapple")] | None = None
+    radius_m: Annotated[float, number(0.5, 120, "m", "radius of the grapple")] | None = None
     """Instead: radius of the grapple, where it hardly changes."""
     max_pct: Annotated[
         float,
@@ -227,24 +228,47 @@ class Hydraulics(Section):
         return self
 
 
+class RopeSection(Position):
+    """Length of the rope, measured; sway and filter follow it while it changes."""
+
+    signal: str = Field(description="signal with the length in m")
+    offset_m: Annotated[
+        float, number(-20, 50, "m", "from there to the middle of the load, added to it")
+    ] = 0.0
+    lowest_m: Annotated[float, number(0.3, 150, "m", "shortest pendulum")]
+    highest_m: Annotated[float, number(0.3, 150, "m", "longest pendulum")]
+    lost: Lost = "longest"
+    """While the length is lost, or has jumped: the filter of the longest pendulum, hold that of the
+    last one, or neutral: stop, and wait for it."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.lowest_m < self.highest_m:
+            raise ValueError(f"highest_m: expected more than lowest_m, got {self.highest_m:g}")
+        return self
+
+
 class Sway(Section):
     """Swing of the tool on one axis.
 
     Either grapple data (``length_m``, ``damping_nms``, ``mass_kg``), or what a stopwatch shows
-    (``period_s`` with ``damping_ratio`` or ``decay_per_swing``).
+    (``period_s`` with ``damping_ratio`` or ``decay_per_swing``), or a rope (``length_m``,
+    ``damping_ratio``).
     """
 
     full_speed_m_s: Annotated[
         float, number(0.05, 20, "m/s", "speed of the tip at full command, scales the sway shown")
     ]
-    length_m: Annotated[float, number(0.05, 30, "m", "pendulum length")] | None = None
+    length_m: Annotated[float, number(0.05, 150, "m", "pendulum length")] | None = None
     damping_nms: Annotated[float, number(0, 1e6, "N m s/rad", "damping of the joint")] | None = None
     mass_kg: Annotated[float, number(1, 1e5, "kg", "mass of tool and load")] | None = None
-    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")] | None = None
+    period_s: Annotated[float, number(0.15, 25, "s", "time of one full swing")] | None = None
     damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")] | None = None
     decay_per_swing: (
         Annotated[float, number(0, 0.99, "", "part of the amplitude lost over a full swing")] | None
     ) = None
+    length: RopeSection | None = None
+    """Where the length of the rope is measured: the filter of the axis is then drawn out to it."""
     origin: Origin | None = Field(None, description="where these numbers come from")
 
     @model_validator(mode="after")
@@ -258,7 +282,8 @@ class Sway(Section):
         Raises:
             ValueError: the data is incomplete, given twice, or makes no sense.
         """
-        given = self.model_dump(exclude={"full_speed_m_s", "origin"}, exclude_none=True).keys()
+        others = {"full_speed_m_s", "origin", "length"}
+        given = self.model_dump(exclude=others, exclude_none=True).keys()
         if given == {"length_m", "damping_nms", "mass_kg"}:
             assert self.length_m and self.mass_kg and self.damping_nms is not None
             return SwayMode.from_grapple(self.length_m, self.damping_nms, self.mass_kg)
@@ -268,7 +293,20 @@ class Sway(Section):
         if given == {"period_s", "decay_per_swing"}:
             assert self.period_s and self.decay_per_swing is not None
             return SwayMode.from_decay(self.period_s, self.decay_per_swing)
+        if given == {"length_m", "damping_ratio"}:
+            assert self.length_m and self.damping_ratio is not None
+            return SwayMode.from_length(self.length_m, self.damping_ratio)
         raise ValueError(
             "expected length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
-            f" and decay_per_swing, got {', '.join(sorted(given)) or 'no sway data'}"
+            " and decay_per_swing, or length_m and damping_ratio, got"
+            f" {', '.join(sorted(given)) or 'no sway data'}"
         )
+
+    def at_length(self, length_m: float) -> SwayMode:
+        """Sway mode of a rope of another length."""
+        return SwayMode.from_length(length_m, self.mode().damping_ratio)
+
+    def ends(self) -> list[SwayMode]:
+        """Modes of the shortest and the longest rope; without a measured length none."""
+        rope = self.length
+        return [self.at_length(end) for end in (rope.lowest_m, rope.highest_m)] if rope else []

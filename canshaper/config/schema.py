@@ -5,6 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from canshaper.config.bus import Bus, Control, Gateway
+from canshaper.config.crane import CraneSection
 from canshaper.config.filters import (
     Breakpoint,
     Filter,
@@ -260,6 +261,9 @@ class DeploymentConfig(Section):
         {}, description="switches in messages of their own that enable joysticks, by name"
     )
     axes: dict[str, AxisSection] = Field(min_length=1, description="axes by name")
+    crane: CraneSection | None = Field(
+        None, description="which axis moves which coordinate; by default their names say it"
+    )
     motion: dict[str, Motion] = Field(
         {}, description="slew and near-far of a crane as one motion, by name"
     )

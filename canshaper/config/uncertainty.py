@@ -52,8 +52,11 @@ class Uncertainty(Section):
     damping_pct: Range[Annotated[float, _end(-95, 500, "%")]] = _usual(
         -50.0, 100.0, "damping of its joints"
     )
-    radius_m: Range[Annotated[float, _end(0.5, 30, "m")]] = _usual(
+    radius_m: Range[Annotated[float, _end(0.5, 120, "m")]] = _usual(
         2.5, 6.5, "radius of the tip at the start; joint by joint it is not drawn"
+    )
+    rope_m: Range[Annotated[float, _end(0.5, 150, "m")]] = _usual(
+        3.0, 15.0, "rope of an overhead crane at the start; its signal is wrong by length_pct"
     )
     sway_deg: Range[Annotated[float, _end(0, 30, "deg")]] = _usual(
         0.0, 3.0, "swing at the start, along and across the boom"

@@ -23,6 +23,7 @@ from canshaper.shaping.states import Reason, State, Transition
 if TYPE_CHECKING:
     from canshaper.controller.demands import AxisEnds, SharedFlow
     from canshaper.controller.parameter_sets import Load
+    from canshaper.controller.rope import RopeControl
 
 NOWHERE: frozenset[str] = frozenset()
 
@@ -224,7 +225,7 @@ class Controller:
             self.events += protocol.changes()
 
     def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisControl]:
-        """Count missed ticks for every axis, look for its ends, add the motions, share the oil.
+        """Count missed ticks of every axis, look for ends and ropes, add motions, share the oil.
 
         Returns:
             The axes whose state has changed: their filters failed in a missed tick.
@@ -267,7 +268,7 @@ class Controller:
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
             self._sensors[name] = SensorReport(name, self.axes[name])
-        self._ends: list[AxisEnds] = []
+        self._ends: list[AxisEnds | RopeControl] = []
         self._flow: SharedFlow | None = None
         oil = self.deployment.config.hydraulics
         if oil or inputs.positions:
@@ -277,6 +278,10 @@ class Controller:
             others = inputs.other_flow
             if oil:
                 self._flow = demands.SharedFlow(oil, self.axes, inputs.joysticks, others, tick_s)
+        if inputs.ropes:
+            from canshaper.controller import rope
+
+            self._ends += [rope.RopeControl(n, self.axes[n], v) for n, v in inputs.ropes.items()]
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
         for motion in self.deployment.motions.values():
             if motion.aim:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.message import Sender
-from canshaper.config.limits import Ends, OtherFlow, Radius
+from canshaper.config.limits import Ends, OtherFlow, Radius, RopeSection
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
@@ -37,6 +37,7 @@ class MachineInputs:
         profile: the operator's choice, where there is one.
         sway_sensors: measurements of sway, by the name of each axis that reads them.
         radii: measured radius of the tip, by the name of its two-axis motion.
+        ropes: measured length of the rope, by the name of the axis that follows it.
         positions: measured position, by the name of the axis that has ends.
         other_flow: measured flow of functions that are not ours, where there is one.
         gates: switches that enable a joystick, but for the one that is pressed, by its name.
@@ -59,6 +60,7 @@ class MachineInputs:
         motions, axes = deployment.motions.items(), deployment.axes.items()
         self.radii = {n: self._position(one.radius) for n, one in motions if one.radius}
         self.positions = {name: self._position(one.ends) for name, one in axes if one.ends}
+        self.ropes = {name: self._position(one.rope) for name, one in axes if one.rope}
         others = deployment.other_flow
         self.other_flow = self._position(others) if others else None
         self.sway_sensors = self._sway_sensors(deployment)
@@ -104,7 +106,11 @@ class MachineInputs:
         return ProfileButtons(having, profile_names(config)) if having else None
 
     def _position(
-        self, bound: BoundValue[Radius] | BoundValue[Ends] | BoundValue[OtherFlow]
+        self,
+        bound: BoundValue[Radius]
+        | BoundValue[Ends]
+        | BoundValue[OtherFlow]
+        | BoundValue[RopeSection],
     ) -> Value:
         if (message := self._positions.get(bound.key)) is None:
             message = self._positions[bound.key] = PositionInput(bound)

@@ -24,7 +24,8 @@ SPREADING = ("off", "first_order", "s_curve", "zv", "zvd", "ei", "two_mode")
 """Filters that spread the demand over time, and know of no swing."""
 SLACK, SWING_SLACK = 0.4, 1.5
 """Slack of those filters, and of the others, s of full speed. Taps in the time of the swing sum up:
-a G_FF needs 1.04 s to damp that, a robust shaper .9 s after a bypass (gate/test_distance.py)."""
+a G_FF needs 1.04 s to damp that, a robust shaper .9 s after a bypass (gate/test_distance.py). Of a
+swing of more than 3 s it is half of that."""
 # J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
@@ -196,7 +197,9 @@ def slack_of(config: Any) -> float:
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
     one = not (config.gain_schedule or config.profiles or config.sway_sensor)
-    return SLACK if one and config.filter.kind in SPREADING else SWING_SLACK
+    swings = [config.sway.mode(), *config.sway.ends()] if config.sway else []
+    slow = max([SWING_SLACK, *(0.5 * swing.period_s for swing in swings)])
+    return SLACK if one and config.filter.kind in SPREADING else float(slow)
 
 
 def _forwarded(axis: Any, deployment: Any) -> bool:

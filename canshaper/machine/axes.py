@@ -8,7 +8,7 @@ from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
 from canshaper.machine.filters import check_filters
 from canshaper.machine.identity import bind_status
-from canshaper.machine.inputs import bind_ends, bind_feedback, bind_status_word
+from canshaper.machine.inputs import bind_ends, bind_feedback, bind_rope, bind_status_word
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.stopping import stated_fault
 from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
@@ -59,6 +59,7 @@ def _bind_axis(
     if len(problems) > before:
         return None
     cia408, ends = axis.valve.cia408, axis.limits.ends
+    rope = axis.sway.length if axis.sway else None
     at: Place = (*place, "valve", "cia408", "status")
     return BoundAxis(
         name=name,
@@ -73,4 +74,5 @@ def _bind_axis(
         else None,
         status_word=bind_status_word(lookup, at, cia408.status) if cia408 else None,
         ends=bind_ends(lookup, (*place, "limits", "ends"), ends) if ends else None,
+        rope=bind_rope(lookup, (*place, "sway", "length"), rope) if rope else None,
     )

@@ -74,6 +74,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     switches = bind_switches(lookup)
     axes = bind_axes(lookup)
     motions = bind_motions(lookup)
+    _check_crane(lookup)
     measured = config.hydraulics.others_measured if config.hydraulics else None
     others = bind_others(lookup, ("hydraulics", "others_measured"), measured) if measured else None
     stop = bind_emergency_stop(lookup, config.emergency_stop) if config.emergency_stop else None
@@ -112,6 +113,18 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         codes=lookup.codes(),
         starts=lookup.starts(),
     )
+
+
+def _check_crane(lookup: Lookup) -> None:
+    """Check that each coordinate of the crane has an axis of its own."""
+    crane, taken = lookup.config.crane, dict[str, str]()
+    for key, name in crane.model_dump(exclude={"kind"}, exclude_none=True).items() if crane else ():
+        place = ("crane", key)
+        if lookup.diagnostics.check_axis(place, name, lookup.config.axes):
+            if name in taken:
+                text = f"expected an axis of its own, got {name!r}, that of {taken[name]}"
+                lookup.diagnostics.add(place, text)
+            taken.setdefault(name, key)
 
 
 def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None]) -> None:

@@ -1,5 +1,6 @@
 """A deployment, checked: what its files say, with the codecs of its messages."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +11,7 @@ from cantools.database.can import Message
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.message import SentMessage
 from canshaper.codec.status import AIM, ReportedAim, StatusCodec
+from canshaper.config.crane import coordinates
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Motion, OtherFlow, Radius
 from canshaper.config.schema import DeploymentConfig, EmergencyStop
@@ -141,13 +143,18 @@ class Deployment:
             listen_only=self.listen_only,
         )
 
+    @cached_property
+    def coordinates(self) -> Mapping[str, str]:
+        """Coordinate of the crane that each axis moves, by its name."""
+        return coordinates(self.config.crane, self.axes)
+
     def inputs(self) -> list[Bound[InputSection]]:
         """Joysticks, switches, positions, sway sensors, feedback and status words of the valves."""
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
         # Several parts may read one message.
         radii = (motion.radius for motion in self.motions.values())
-        read = [*radii, *(axis.ends for axis in axes), self.other_flow]
+        read = [*radii, *(one for axis in axes for one in (axis.ends, axis.rope)), self.other_flow]
         positions = {one.key: one for one in read if one}.values()
         sensors = {s.message.key: s.message for axis in axes if (s := axis.sway_sensor)}.values()
         others = (

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from canshaper.config.filters import Breakpoint, Filter, Profile
+from canshaper.config.filters import Breakpoint, Filter, Profile, designed
 from canshaper.config.limits import Sway
 from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.source import Diagnostics, Place
@@ -15,6 +15,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
     """Check that every filter that the axis may get runs at the period of its valve."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
+    check_rope(lookup, place, axis)
     parts, filters = _parts(place, axis), every_filter(place, axis)
     for at, part in parts:
         if part.gain_schedule and not lookup.config.load_state:
@@ -69,12 +70,48 @@ def _parts(place: Place, axis: AxisSection) -> list[tuple[Place, AxisSection | P
 
 def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway | None]]:
     """Every filter that the axis may get, by its place, with the sway data that it runs with."""
-    filters: list[tuple[Place, Filter, Sway | None]] = []
+    filters = [*at_ends(place, axis)]
     for at, part in _parts(place, axis):
         filters.append(((*at, "filter"), part.filter, axis.sway))
         for i, one in enumerate(part.gain_schedule):
             filters.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
     return filters
+
+
+def at_ends(place: Place, axis: AxisSection) -> Iterator[tuple[Place, Filter, Sway | None]]:
+    """Filter and swing of an axis at the shortest and the longest rope that it follows."""
+    sway, chosen = axis.sway, axis.filter
+    follows = KINDS[chosen.kind].follows
+    if sway is None or sway.length is None or follows is None:
+        return
+    for key, mode in zip(("lowest_m", "highest_m"), sway.ends(), strict=True):
+        factor = mode.period_s / sway.mode().period_s
+        swing = designed(mode)
+        changes = follows(chosen.parameters(), factor)
+        if design := chosen.design():
+            lasts = {"duration_s": design.duration_s and round(factor * design.duration_s, 2)}
+            rate = design.valve_rate_per_s
+            rate_then = {"valve_rate_per_s": rate and round(rate / factor, 2)}
+            changes["designed_for"] = design.model_copy(update=swing | lasts | rate_then)
+        one = dict.fromkeys(("length", "length_m", "damping_nms", "mass_kg", "decay_per_swing"))
+        at = (*place, "sway", "length", key)
+        yield at, chosen.model_copy(update=changes), sway.model_copy(update=one | swing)
+
+
+def check_rope(lookup: Lookup, place: Place, axis: AxisSection) -> None:
+    """Check that what an axis has goes with a measured length of its rope."""
+    if axis.sway is None or axis.sway.length is None:
+        return
+    add, at = lookup.diagnostics.add, (*place, "sway", "length")
+    if KINDS[axis.filter.kind].follows is None:
+        kinds = ", ".join(name for name, kind in KINDS.items() if kind.follows)
+        add(at, f"expected a filter that follows it, {kinds}, got {axis.filter.kind}")
+    for key in ("gain_schedule", "profiles", "sway_sensor"):
+        if getattr(axis, key):
+            add(at, f"expected no {key} with it: sway and filter follow the length alone")
+    for name, motion in lookup.config.motion.items():
+        if place[-1] in (motion.slew, motion.near_far):
+            add(at, f"expected an axis that is in no motion, got one of {name}")
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:

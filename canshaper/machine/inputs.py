@@ -9,12 +9,12 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.frame import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.message import Protection
-from canshaper.codec.signals import ends_fault, find_signal, radius_range
+from canshaper.codec.signals import LENGTHS, ends_fault, find_signal, radius_range
 from canshaper.codec.velocity import Velocity
 from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
-from canshaper.config.limits import Ends, OtherFlow, Position, Radius
+from canshaper.config.limits import Ends, OtherFlow, Position, Radius, RopeSection
 from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
@@ -192,6 +192,27 @@ def bind_ends(lookup: Lookup, place: Place, config: Ends) -> BoundValue[Ends] | 
         return None
     _check_range(lookup, place, result, ("lowest", "highest"), "a position")
     return result[1]
+
+
+def bind_rope(lookup: Lookup, place: Place, config: RopeSection) -> BoundValue[RopeSection] | None:
+    """Bind the measured length of a rope."""
+    if (result := _bind_position(lookup, place, config, "a length")) is None:
+        return None
+    used, bound = result
+    signal = bound.signal
+    if signal.unit not in LENGTHS:
+        used.add_fault(f"{signal.name}: expected a length in m, got a signal in {signal.unit}")
+    elif fault := ends_fault(signal, "what lies outside is no length"):
+        used.add_fault(fault)
+    else:
+        low, high = (
+            float(end or 0.0) + config.offset_m for end in (signal.minimum, signal.maximum)
+        )
+        for key in ("lowest_m", "highest_m"):
+            if not low <= (value := getattr(config, key)) <= high:
+                text = f"expected a length within the range of {signal.name}, {low:g} to {high:g} m"
+                lookup.diagnostics.add((*place, key), f"{text}, got {value:g}")
+    return bound
 
 
 def bind_others(lookup: Lookup, place: Place, config: OtherFlow) -> BoundValue[OtherFlow] | None:

@@ -20,7 +20,7 @@ from canshaper.codec.signals import (
 from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.velocity import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
-from canshaper.config.limits import Ends
+from canshaper.config.limits import Ends, RopeSection
 from canshaper.config.schema import (
     AxisSection,
     Command,
@@ -289,6 +289,7 @@ class BoundAxis:
     status_word: Bound[StatusWord] | None = None
     ends: BoundValue[Ends] | None = None
     sway_sensor: "BoundSwaySensor | None" = None
+    rope: BoundValue[RopeSection] | None = None
 
     @property
     def valve_message(self) -> Message:

@@ -216,11 +216,12 @@ class _CranePose:
         self._row = writer.group(Group("crane", POSE))
         self._tip: tuple[float, float, float] | None = None
         self._next_ns = -math.inf
-        names = [name for name in deployment.axes if name != ROTATOR]
-        self._valves = {name: deployment.axes[name].valve for name in names}
-        self._openings = dict.fromkeys(names, 0.0)
-        kind = machine_for(deployment.axes)
-        fits = {*names} <= {*AXES_OF[kind]}
+        moves = deployment.coordinates
+        axes = [name for name in deployment.axes if name != ROTATOR]
+        self._valves = {moves.get(name, name): deployment.axes[name].valve for name in axes}
+        self._openings = dict.fromkeys(self._valves, 0.0)
+        kind = machine_for(moves.values())
+        fits = self._valves.keys() <= {*AXES_OF[kind]}
         self._machine = build_machine(kind, parameters) if fits else None
         self._tick_s = deployment.config.tick_ms / 1000.0
 

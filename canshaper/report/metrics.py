@@ -53,7 +53,7 @@ class AxisMetrics:
         peak_deg: largest |sway| in the plane of the axis over the whole drive, degrees.
         rms_deg: square root of the time mean of sway^2 over the whole drive (trapezoids, so a
             lost sample gets no extra weight), degrees.
-        residual_deg: largest |sway| later than ``RESIDUAL_DWELL_S`` after the release of the axis,
+        residual_deg: largest |sway| later than ``dwell_s`` after the release of the axis,
             until any joystick is moved; only after strokes during which no other axis was moved.
             Swing still left from before the press is in it.
         cross_residual_deg: the same windows, the sway of the other planes.

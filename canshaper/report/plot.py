@@ -13,7 +13,6 @@ from matplotlib.gridspec import GridSpec
 
 from canshaper.report.console import NOTHING, axis_title, change_text
 from canshaper.report.strokes import (
-    RESIDUAL_DWELL_S,
     Stroke,
     aligned,
     find_strokes,
@@ -75,7 +74,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
     fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
     _head(fig, report["crane"], height)
     if _windows(raw):
-        _explain_shade(fig, height)
+        _explain_shade(fig, height, raw.dwell_s)
     top, bottom = 1.0 - _HEAD_PX / height, _FOOT_PX / height
     right = _TIME_RIGHT if views else _RIGHT
     grid = fig.add_gridspec(
@@ -143,7 +142,7 @@ def _change(measures: Mapping[str, Any], measure: str) -> str:
 
 def _windows(drive: Recording) -> list[range]:
     """Where residual swing shows, whatever axes were moved before."""
-    every = (residual_window(drive.t_s, rest) for rest in rests(drive))
+    every = (residual_window(drive.t_s, rest, drive.dwell_s) for rest in rests(drive))
     return [window for window in every if window]
 
 
@@ -176,11 +175,11 @@ def gain_and_price(crane: Mapping[str, Any]) -> str:
     )
 
 
-def _explain_shade(fig: Figure, height: float) -> None:
+def _explain_shade(fig: Figure, height: float, dwell_s: float) -> None:
     fig.text(
         _LEFT,
         46 / height,  # the stamp is below
-        f"shaded: residual swing, from {RESIDUAL_DWELL_S:g} s after release to the next move",
+        f"shaded: residual swing, from {dwell_s:g} s after release to the next move",
         va="bottom",
         fontsize=TEXT_PT,
         color=TEXT_COLOUR,

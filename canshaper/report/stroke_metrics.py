@@ -127,7 +127,7 @@ class CraneMetrics:
         swings_on: whether that is a lower bound: the rest ended with more swing.
         peak_deg: largest total swing of the grapple over the whole drive, degrees.
         rms_deg: square root of the time mean of its square, degrees.
-        residual_deg: largest total swing of the rests, later than ``RESIDUAL_DWELL_S`` after the
+        residual_deg: largest total swing of the rests, later than ``dwell_s`` after the
             release.
         run_on_s: from the release until every axis stays below 5 % of its full speed. The longest;
             a rest that ends before counts with the time it lasted (a lower bound).
@@ -155,7 +155,9 @@ def crane_metrics(
     """
     t_s, sway = recording.t_s, crane.sway_deg
     still = [rest for rest in rests(recording) if len(rest) > 1]
-    windows = [window for rest in still if (window := residual_window(t_s, rest))]
+    windows = [
+        window for rest in still if (window := residual_window(t_s, rest, recording.dwell_s))
+    ]
     traces = recording.axes.values()
     speed = [max(abs(trace.speed[k]) for trace in traces) for k in range(len(t_s))]
     still_s, swings_on = still_after(t_s, sway, still, still_deg)

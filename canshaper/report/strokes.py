@@ -2,15 +2,15 @@
 
 import math
 import statistics
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
-from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
+from canshaper_sim.recording import DWELL_S, AxisTrace, CraneTrace, Recording
 
 # Deflection: two steps of a frame of 1/125 and a little, never a command.
 NEUTRAL_BAND = 0.02
 PLATEAU = 0.95  # of the largest deflection of a stroke: a hand holding still wanders this far
-RESIDUAL_DWELL_S = 2.5  # the slowest shapers have stopped the crane by then (stop 2.4 s)
+RESIDUAL_DWELL_S = DWELL_S
 RESIDUAL_WINDOW_MIN_S = 1.0  # half a period of a 1 m tool: a shorter look may fall on a zero
 _ROUNDING_S = 1e-6  # a time base that was shifted must not lose the sample on the edge
 
@@ -58,17 +58,18 @@ def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
 def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]:
     """Rests in which the residual swing of these strokes (of one axis) shows.
 
-    A window holds the samples from ``RESIDUAL_DWELL_S`` after the release until a joystick moves.
+    A window holds the samples from ``dwell_s`` after the release until a joystick moves.
     Strokes during which another axis was moved have none, nor have rests that leave less than
     ``RESIDUAL_WINDOW_MIN_S``.
     """
-    alone = (residual_window(recording.t_s, s.rest) for s in strokes if s.alone and s.rest)
+    t_s, dwell_s = recording.t_s, recording.dwell_s
+    alone = (residual_window(t_s, s.rest, dwell_s) for s in strokes if s.alone and s.rest)
     return [window for window in alone if window]
 
 
-def residual_window(t_s: list[float], rest: range) -> range:
+def residual_window(t_s: list[float], rest: range, dwell_s: float) -> range:
     """The part of a rest in which residual swing shows; empty where too little is left of it."""
-    begin_s = t_s[rest.start] + RESIDUAL_DWELL_S - _ROUNDING_S
+    begin_s = t_s[rest.start] + dwell_s - _ROUNDING_S
     start = next((k for k in rest if t_s[k] >= begin_s), rest.stop)
     window = range(start, rest.stop)
     if window and t_s[window[-1]] - t_s[start] >= RESIDUAL_WINDOW_MIN_S - _ROUNDING_S:
@@ -204,4 +205,6 @@ def _cut(recording: Recording, begin_s: float, end_s: float) -> Recording:
     crane = recording.crane
     if crane:
         crane = CraneTrace(crane.tip_m[part], crane.grapple_m[part], crane.sway_deg[part])
-    return Recording([t - begin_s for t in recording.t_s[part]], axes, crane)
+    return replace(
+        recording, t_s=[t - begin_s for t in recording.t_s[part]], axes=axes, crane=crane
+    )

@@ -105,6 +105,11 @@ class ShapedAxis:
         return self.output.setpoint
 
     @property
+    def tail_s(self) -> float:
+        """How long the output may run on."""
+        return self._stage.limits.tail_s
+
+    @property
     def applied(self) -> float:
         """Part of that velocity that drives the sway model."""
         return self.output.applied
@@ -246,6 +251,21 @@ class ShapedAxis:
         self.sway = sway
         if self.sensed is not None:
             self.sensed.retune(sway)
+
+    def prepare(self, least: float, most: float) -> None:
+        """Prepare the filter, which has not run, for ``follow`` from least to most."""
+        self._transfer.prepare(least, most)
+
+    def follow(self, mode: SwayMode, factor: float) -> None:
+        """Go on with the swing of a rope that has another length now, without a jump of the output.
+
+        Args:
+            mode: the swing.
+            factor: its period, of that which the filter was made for.
+        """
+        assert self.sway is not None  # checked with the deployment
+        self.sway.follow(mode)
+        self._transfer.follow(factor)
 
     def allow_added(self, largest: float, time_s: float) -> None:
         """Let a motion of two axes move this one where no one commands it.

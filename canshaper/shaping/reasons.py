@@ -179,6 +179,13 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "a valve of CiA 408 is brought up, or has a fault, or its status word is lost",
         "nothing; else the valve",
     ),
+    Reason.LENGTH_LOST: ReasonText(
+        "the length of the rope is not known",
+        "the length of the rope is silent, no length, or has jumped, and the file says "
+        "`lost: neutral`",
+        "sensor of the length; it counts again a second after a jump",
+        fmi=9,
+    ),
     Reason.ENABLE_LOST: ReasonText(
         "enable released in motion",
         "enable released in motion",

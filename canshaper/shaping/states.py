@@ -64,6 +64,7 @@ class Reason(IntEnum):
     ADDRESS_NOT_CLAIMED = 42
     NODE_FAULT = 43
     VALVE_NOT_READY = 44
+    LENGTH_LOST = 45
     # Neutral at once, latched.
     ENABLE_LOST = 64
     OUTPUT_INVALID = 65

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import Self
 
 GRAVITY_M_S2 = 9.81
-SLOWEST_RAD_S, FASTEST_RAD_S = 0.5, 50.0
+SLOWEST_RAD_S, FASTEST_RAD_S = 0.25, 50.0
 
 
 def _require(name: str, value: float, low: float, high: float, unit: str) -> float:
@@ -36,7 +36,7 @@ class SwayMode:
     """Undamped natural frequency and damping ratio of one axis' sway.
 
     Attributes:
-        omega_rad_s: undamped natural frequency, 0.5 to 50 rad/s (length about 39 m to 4 mm).
+        omega_rad_s: undamped natural frequency, 0.25 to 50 rad/s (length about 157 m to 4 mm).
         damping_ratio: 0 (swings for ever) to below 1.
 
     Raises:
@@ -53,16 +53,22 @@ class SwayMode:
     @classmethod
     def from_grapple(cls, length_m: float, damping_nms: float, mass_kg: float) -> Self:
         """Mode from grapple data: omega^2 = g/l, 2 zeta omega = c/(m l^2) (paper Eq. 12-13)."""
-        _require("pendulum length", length_m, 0.05, 30.0, "m")
+        _require("pendulum length", length_m, 0.05, 150.0, "m")
         _require("joint damping", damping_nms, 0.0, 1e6, "N m s/rad")
         _require("mass", mass_kg, 1.0, 1e5, "kg")
         omega = math.sqrt(GRAVITY_M_S2 / length_m)
         return cls(omega, damping_nms / (mass_kg * length_m**2) / (2.0 * omega))
 
     @classmethod
+    def from_length(cls, length_m: float, damping_ratio: float) -> Self:
+        """Mode of a load on a rope: omega^2 = g/l."""
+        _require("pendulum length", length_m, 0.05, 150.0, "m")
+        return cls(math.sqrt(GRAVITY_M_S2 / length_m), damping_ratio)
+
+    @classmethod
     def from_period(cls, period_s: float, damping_ratio: float) -> Self:
         """Mode from the period seen on a stopwatch (that of the damped swing) and damping ratio."""
-        _require("period", period_s, 0.15, 12.0, "s")
+        _require("period", period_s, 0.15, 25.0, "s")
         _require("damping ratio", damping_ratio, 0.0, 0.95, "")
         return cls(_omega_rad_s(period_s, damping_ratio), damping_ratio)
 
@@ -90,7 +96,7 @@ class SwayMode:
         period_s = self.period_s + share * (other.period_s - self.period_s)
         ratio = self.damping_ratio + share * (other.damping_ratio - self.damping_ratio)
         # Not from_period: its range is of what a stopwatch shows. A mode of length and mass may
-        # have a longer period, and 12 s may have become a little more by rounding.
+        # have a longer period, and 25 s may have become a little more by rounding.
         omega = _omega_rad_s(period_s, ratio)
         return SwayMode(min(max(omega, SLOWEST_RAD_S), FASTEST_RAD_S), ratio)
 
@@ -193,6 +199,22 @@ class SwayModel:
         model.rate = (self.rate + velocity) * scale - velocity
         model.free_angle, model.free_rate = self.free_angle * scale, self.free_rate * scale
         return model
+
+    def follow(self, mode: SwayMode) -> None:
+        """Go on with the mode of a rope that is being hoisted or lowered.
+
+        The state stays as it is. Of a load on a rope it is its way from the trolley and its speed,
+        V angle = l theta and V (rate + v) = (l theta)', and these know of the length by their
+        acceleration g theta alone: (l theta)'' = a - (g - l'') theta. So the term 2 l' theta' of
+        the angle is in it.
+
+        Raises:
+            ValueError: the mode does not suit the tick.
+        """
+        name = f"natural frequency at a tick of {self.tick_s:g} s"
+        _require(name, mode.omega_rad_s, 0.0, 1.0 / self.tick_s, "rad/s")
+        self.mode = mode
+        self.f11, self.f12, self.f21, self.f22 = swing_over(mode, self.tick_s)
 
     def sway_rad(self, full_speed_m_s: float) -> float:
         """Predicted swing angle, rad, for an axis whose full speed is ``full_speed_m_s``."""

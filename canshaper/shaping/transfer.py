@@ -2,7 +2,7 @@
 
 import math
 
-from canshaper.shaping.shapers.kind import Shaper, ShaperKind, carry_over
+from canshaper.shaping.shapers.kind import Following, Shaper, ShaperKind, carry_over
 from canshaper.shaping.state_machine import BYPASS_ON, STOPPING
 from canshaper.shaping.states import MOVING, State
 
@@ -84,6 +84,16 @@ class BumplessTransfer:
     def hold(self, command: float) -> None:
         """Count a missed tick with this command."""
         self._shaper.step(command)
+
+    def prepare(self, least: float, most: float) -> None:
+        """Prepare the filter for ``follow`` from least to most."""
+        assert isinstance(self._shaper, Following)  # checked with the deployment
+        self._shaper.prepare(least, most)
+
+    def follow(self, factor: float) -> None:
+        """Let the filter follow the sway model to so many times the period of its file."""
+        assert isinstance(self._shaper, Following)
+        self._shaper.follow(factor)
 
     def replace(self, shaper: Shaper, command: float) -> None:
         """Go on with another filter; ``command`` is the one that is in force."""

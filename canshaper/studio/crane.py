@@ -22,7 +22,7 @@ from canshaper.studio.view import CraneView, Report
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.machines import AXES_OF, build_machine, machine_for
+from canshaper_sim.machines import AXES_OF, OVERHEAD, build_machine, machine_for
 
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0
@@ -195,19 +195,24 @@ class SimulatedPose:
         self, view: CraneView, deployment: Deployment, parameters: CraneParameters
     ) -> None:
         self._view = view
-        self._axes = [name for name in deployment.axes if name != ROTATOR]
-        self._machine = build_machine(machine_for(deployment.axes), parameters)
+        moves = deployment.coordinates
+        self._axes = {moves.get(name, name): name for name in deployment.axes if name != ROTATOR}
+        self._machine = build_machine(machine_for(deployment.coordinates.values()), parameters)
 
     @staticmethod
     def fits(deployment: Deployment) -> bool:
-        """Whether the simulated crane has the axes of a deployment."""
-        axes = deployment.axes.keys() - {ROTATOR}
-        return axes <= {*AXES_OF[machine_for(deployment.axes)]}
+        """Whether the simulated crane has the axes of a deployment, and its views can show it."""
+        moves = deployment.coordinates
+        axes = {moves.get(name, name) for name in deployment.axes.keys() - {ROTATOR}}
+        kind = machine_for(moves.values())
+        return kind != OVERHEAD and axes <= {*AXES_OF[kind]}
 
     def advance(self, dt_s: float, now_s: float) -> None:
         """Hold the last valve commands for so long."""
         view, crane = self._view, self._machine.crane
-        self._machine.step(dt_s, {name: view.axes[name].opening for name in self._axes})
+        self._machine.step(
+            dt_s, {moved: view.axes[name].opening for moved, name in self._axes.items()}
+        )
         state = crane.state
         heading = math.degrees(math.remainder(state.theta1_rad, 2.0 * math.pi))
         joints = None

@@ -36,12 +36,13 @@ class Number:
 def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
     """The numbers of each slider; none where no filter of the deployment has any.
 
-    An axis with a gain schedule or profiles is left out: what is in force there
+    An axis with a gain schedule, profiles or a measured rope is left out: what is in force there
     changes with the machine.
     """
     numbers: list[Number] = []
     for name, axis in config.axes.items():
-        if axis.sway and not axis.gain_schedule and not axis.profiles:
+        several = axis.gain_schedule or axis.profiles
+        if axis.sway and not several and not axis.sway.length:
             # The period grows with the root of the length.
             for key, power in (("length_m", 1.0), ("period_s", 0.5)):
                 if (value := getattr(axis.sway, key)) is not None:

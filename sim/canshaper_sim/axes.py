@@ -1,7 +1,8 @@
 """Names of the axes a simulated machine can have, and what their positive direction is.
 
 A crane with tip control is commanded in cylindrical coordinates of its tip, a conventional one
-joint by joint. Slewing is the same axis in both.
+joint by joint. Slewing is the same axis in both. An overhead crane moves a trolley and a rope. A
+deployment may call its axes otherwise: its ``coordinates`` say which is which.
 """
 
 from typing import Final
@@ -12,8 +13,13 @@ LIFT: Final = "lift"  # positive: upwards
 LIFT_CYLINDER: Final = "lift_cylinder"  # joint theta2; positive: the main boom rises
 KNUCKLE: Final = "knuckle"  # joint theta3; positive: the outer boom folds out
 EXTENSION: Final = "extension"  # joint d4; positive: the telescope goes out
+BRIDGE: Final = "bridge"  # positive: along the runway
+TROLLEY: Final = "trolley"  # positive: along the bridge
+HOIST: Final = "hoist"  # positive: upwards, the rope gets shorter
 ROTATOR: Final = "rotator"  # turns the grapple about itself; positive: counter-clockwise from above
 
 TIP_AXES: Final = (SLEW, NEAR_FAR, LIFT)
 JOINT_AXES: Final = (SLEW, LIFT_CYLINDER, KNUCKLE, EXTENSION)
-ALL_AXES: Final = (*TIP_AXES, *JOINT_AXES[1:])
+OVERHEAD_AXES: Final = (BRIDGE, TROLLEY, HOIST)
+ALL_AXES: Final = (*TIP_AXES, *JOINT_AXES[1:], *OVERHEAD_AXES)
+WITHOUT_SWAY: Final = (LIFT, HOIST)  # they excite none by themselves

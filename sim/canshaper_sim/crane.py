@@ -1,18 +1,29 @@
 """The simulated crane: valves move the boom tip, the grapple hangs from it and swings.
 
-Two booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
+Three booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
 (slew angle theta1, radius x, height z), one valve a coordinate; `JointBoom` moves the joints, and
-the tip by their kinematics. Both follow their valves exactly. By default the pump delivers what all
-valves ask for and no boom bends, as in the paper.
+the tip by their kinematics; `OverheadBoom` moves a trolley and a rope. All follow their valves
+exactly. By default the pump delivers what all valves ask for and no boom bends, as in the paper.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, cast
 
 from canshaper_sim.actuator import Actuator, EndParameters
-from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, ROTATOR, SLEW
+from canshaper_sim.axes import (
+    BRIDGE,
+    EXTENSION,
+    HOIST,
+    KNUCKLE,
+    LIFT,
+    LIFT_CYLINDER,
+    NEAR_FAR,
+    ROTATOR,
+    SLEW,
+    TROLLEY,
+)
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.bend import Bend, BendParameters
 from canshaper_sim.carrier import Carrier, CarrierParameters
@@ -20,6 +31,7 @@ from canshaper_sim.contact import ContactParameters
 from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
+from canshaper_sim.overhead import OverheadParameters
 from canshaper_sim.pump import Pump, PumpParameters
 from canshaper_sim.ranges import check_ranges
 from canshaper_sim.rotator import Rotator, RotatorParameters
@@ -38,6 +50,7 @@ __all__ = [
     "Crane",
     "CraneParameters",
     "CraneState",
+    "OverheadCrane",
     "joint_crane",
 ]
 
@@ -100,6 +113,7 @@ class CraneParameters:
     carrier: CarrierParameters = field(default_factory=CarrierParameters)
     wind: WindParameters = field(default_factory=WindParameters)
     rotator: RotatorParameters = field(default_factory=RotatorParameters)
+    overhead: OverheadParameters = field(default_factory=OverheadParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -119,6 +133,9 @@ class CraneParameters:
             LIFT_CYLINDER: self.joints.lift_cylinder_full_speed_rad_s,
             KNUCKLE: self.joints.knuckle_full_speed_rad_s,
             EXTENSION: self.joints.extension_full_speed_m_s,
+            BRIDGE: self.overhead.bridge_full_speed_m_s,
+            TROLLEY: self.overhead.trolley_full_speed_m_s,
+            HOIST: self.overhead.hoist_full_speed_m_s,
         }
 
     def tip_boom(self) -> TipBoom:
@@ -326,3 +343,23 @@ def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = N
     p = parameters or CraneParameters()
     start = (p.start_theta1_rad, p.start_radius_m, p.start_height_m)
     return Crane(p, sway, JointBoom(p.joints, p.slew, p.slew_full_speed_rad_s, start, p.ends))
+
+
+class OverheadCrane(Crane):
+    """A load on a rope below a trolley; see `OverheadBoom`.
+
+    It stands on level rails without wind: of the parameters, overhead, ends and sway sensor count.
+    """
+
+    __slots__ = ("_rope",)
+
+    def __init__(self, parameters: CraneParameters | None = None, sway: Sway | None = None) -> None:
+        p = parameters or CraneParameters()
+        self._rope = p.overhead.boom(p.ends)
+        self._rope.swing(sway or Sway())
+        own = CraneParameters(overhead=p.overhead, ends=p.ends, sway_sensor=p.sway_sensor)
+        super().__init__(own, sway, cast("CraneBoom", self._rope))
+
+    def _advance(self, step_s: float) -> None:
+        self._rope.advance(step_s)
+        self._sway = Sway(*self._rope.angles)

@@ -1,7 +1,8 @@
 """Several cranes in one deployment: the part of it that is one of them.
 
 The crane of an axis is the first part of its name, where what follows is the name of an axis:
-``front_slew`` and ``rear_slew`` are the slew axes of the cranes ``front`` and ``rear``.
+``front_slew`` and ``rear_slew`` are the slew axes of the cranes ``front`` and ``rear``. A file that
+says what its axes move (``crane``) has one crane.
 """
 
 from dataclasses import replace
@@ -15,7 +16,7 @@ from canshaper_sim.axes import ALL_AXES, ROTATOR
 def cranes(deployment: Deployment) -> list[str]:
     """Names of the cranes of a deployment; none where its axes are those of one."""
     names: dict[str, None] = {}
-    for name in deployment.axes:
+    for name in deployment.axes if deployment.config.crane is None else ():
         for axis in (*ALL_AXES, ROTATOR):
             if name.endswith(f"_{axis}") and name not in ALL_AXES:
                 names[name.removesuffix(f"_{axis}")] = None

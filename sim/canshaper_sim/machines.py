@@ -3,15 +3,16 @@
 - ``tip``: one valve a tip coordinate; the tip follows its commands exactly.
 - ``tip-controller``: tip commands go to the machine's tip controller, which drives the joints.
 - ``joints``: one valve a joint; the operator drives the joints.
+- ``overhead``: bridge, trolley and hoist, a drive each; the load hangs from a rope.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final, Protocol
 
 from canshaper.errors import DesignError
-from canshaper_sim.axes import JOINT_AXES, ROTATOR, SLEW, TIP_AXES
-from canshaper_sim.crane import Crane, CraneParameters, joint_crane
+from canshaper_sim.axes import JOINT_AXES, OVERHEAD_AXES, ROTATOR, SLEW, TIP_AXES
+from canshaper_sim.crane import Crane, CraneParameters, OverheadCrane, joint_crane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.tip_controller import TipController
@@ -19,10 +20,12 @@ from canshaper_sim.tip_controller import TipController
 TIP: Final = "tip"
 TIP_CONTROLLER: Final = "tip-controller"
 JOINTS: Final = "joints"
+OVERHEAD: Final = "overhead"
 AXES_OF: Final[Mapping[str, tuple[str, ...]]] = {
     TIP: TIP_AXES,
     TIP_CONTROLLER: TIP_AXES,
     JOINTS: JOINT_AXES,
+    OVERHEAD: OVERHEAD_AXES,
 }
 MACHINES: Final = tuple(AXES_OF)
 
@@ -113,21 +116,24 @@ def build_machine(
         return TipControlledCrane(parameters, sway)
     if name == JOINTS:
         return ValveDrivenCrane(joint_crane(parameters, sway))
+    if name == OVERHEAD:
+        return ValveDrivenCrane(OverheadCrane(parameters, sway))
     raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {name!r}")
 
 
-def machine_for(axes: Mapping[str, object], requested: str | None = None) -> str:
-    """The machine for a deployment with these axes; `requested` may name one.
+def machine_for(axes: Iterable[str], requested: str | None = None) -> str:
+    """The machine for a deployment whose axes move these coordinates; `requested` may name one.
 
-    Without one a deployment with a joint of the boom is driven joint by joint, every other moves
-    the tip.
+    Without one a deployment with a joint of the boom is driven joint by joint, one with a bridge,
+    trolley or hoist is an overhead crane, every other moves the tip.
 
     Raises:
-        DesignError: no such machine.
+        DesignError: no such machine, or it is no crane of this kind.
     """
+    moved = {*axes}
+    overhead, joints = moved & {*OVERHEAD_AXES}, moved & {*JOINT_AXES} - {SLEW}
     if requested is None:
-        joints = {*JOINT_AXES} - {SLEW}
-        return JOINTS if joints & axes.keys() else TIP
+        return OVERHEAD if overhead else JOINTS if joints else TIP
     if requested not in AXES_OF:
         raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {requested!r}")
     return requested

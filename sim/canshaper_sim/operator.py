@@ -5,21 +5,26 @@ import random
 from collections.abc import Sequence
 
 from canshaper.errors import DesignError, did_you_mean
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import (
     ALL_AXES,
+    BRIDGE,
     EXTENSION,
+    HOIST,
     JOINT_AXES,
     KNUCKLE,
     LIFT,
     LIFT_CYLINDER,
     NEAR_FAR,
+    OVERHEAD_AXES,
     SLEW,
+    TROLLEY,
 )
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.scripts import SCRIPTS
 from canshaper_sim.strokes import Script, Stroke
 
-__all__ = ["SCRIPTS", "Script", "Stroke", "random_script", "script_named"]
+__all__ = ["SCRIPTS", "Script", "Stroke", "random_script", "script_for", "script_named"]
 
 
 def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXES) -> Script:
@@ -52,6 +57,9 @@ REACH_S = {
     LIFT_CYLINDER: (-1.6, 0.0),
     KNUCKLE: (-0.6, 1.4),
     EXTENSION: (0.0, 1.8),
+    BRIDGE: (-40.0, 40.0),
+    TROLLEY: (-20.0, 20.0),
+    HOIST: (-6.0, 6.0),
 }
 LARGEST_LEVEL = {
     SLEW: 0.6,
@@ -60,6 +68,9 @@ LARGEST_LEVEL = {
     LIFT_CYLINDER: 0.7,
     KNUCKLE: 0.6,
     EXTENSION: 0.8,
+    BRIDGE: 1.0,
+    TROLLEY: 1.0,
+    HOIST: 1.0,
 }
 # Share of pauses among the segments that makes the joystick neutral 40 % of the time: pauses last
 # longer than strokes, and so do the rests at both ends.
@@ -96,13 +107,15 @@ def _random_strokes(source: random.Random, axis: str, end_s: float) -> list[Stro
 def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     """A built-in script, or `random-<seed>` of 30 s on these axes.
 
-    Where they are joints of the boom, `demo` and `loading` are the same work joint by joint.
+    Where they are joints of the boom, `demo` and `loading` are the same work joint by joint; where
+    they are those of an overhead crane, that of one.
 
     Raises:
         DesignError: no script of that name; lists the names.
     """
     joints = {*JOINT_AXES} - {SLEW}
-    script = (joints & {*axes} and SCRIPTS.get(f"{name}-joints")) or SCRIPTS.get(name)
+    kind = "joints" if joints & {*axes} else "overhead" if {*OVERHEAD_AXES} & {*axes} else ""
+    script = SCRIPTS.get(f"{name}-{kind}") or SCRIPTS.get(name)
     if script is not None:
         return script
     kind, _, seed = name.partition("-")
@@ -110,3 +123,21 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
         return random_script(int(seed), axes=axes)
     names = f"{', '.join(SCRIPTS)}, random-<seed>"
     raise DesignError(f"script: expected one of {names}, got {name!r}{did_you_mean(name, SCRIPTS)}")
+
+
+def script_for(deployment: Deployment, name: str) -> Script:
+    """A script by its name, or the pulse of an axis by the axis' own, for a deployment's axes.
+
+    Raises:
+        DesignError: no script of that name, or it moves nothing of this crane.
+    """
+    moves = deployment.coordinates
+    axes = {moved: axis for axis, moved in moves.items()}
+    pulse, _, axis = name.partition("-")
+    if pulse == "pulse" and axis in moves:
+        name = f"{pulse}-{moves[axis]}"
+    script = script_named(name, [moved for moved in ALL_AXES if moved in axes])
+    if script.strokes and not {*script.axes} & axes.keys():
+        has = ", ".join(axes) or "none that a script moves; the section crane names them"
+        raise DesignError(f"script {name} moves {', '.join(script.axes)}; the crane has {has}")
+    return script.moving(axes) if deployment.config.crane else script

@@ -15,7 +15,8 @@ from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.machines import AXES_OF, JOINTS, TIP, build_machine, machine_for
+from canshaper_sim.machines import AXES_OF, JOINTS, OVERHEAD, TIP, build_machine, machine_for
+from canshaper_sim.overhead import OverheadBoom
 from canshaper_sim.sensor_messages import sensor_messages
 from canshaper_sim.valve_frames import CommandReader
 
@@ -30,6 +31,12 @@ FEEDBACK: Mapping[str, tuple[str, ...]] = {
 JOINT_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointPosition": ("SlewAngle", "LiftAngle", "KnuckleAngle", "Extension"),
     "JointVelocity": ("SlewRate", "LiftRate", "KnuckleRate", "ExtensionSpeed"),
+}
+# Of an overhead crane, whose sway is that in the direction of each axis.
+OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
+    "CranePosition": ("Bridge", "Trolley", "RopeLength"),
+    "CraneVelocity": ("BridgeSpeed", "TrolleySpeed", "HoistSpeed"),
+    "LoadSway": ("SwayBridge", "SwayTrolley"),
 }
 
 # Frames of a valve that are kept once read.
@@ -48,6 +55,7 @@ class _ValveInput:
     def __init__(self, axis: str, deployment: Deployment) -> None:
         bound = deployment.axes[axis]
         self.axis = axis
+        self.moves = deployment.coordinates.get(axis, axis)
         self._length = bound.valve_message.length
         self._reader = CommandReader(deployment, axis)
         self._sequence = SequenceChecker(bound.valve.message.protection, None, qualify=1)
@@ -81,10 +89,10 @@ class _ValveInput:
 class _ValveFeedback:
     """What a valve says of itself: how far it is open, each cycle of its message."""
 
-    def __init__(self, axis: str, bound: BoundValue[FeedbackSection]) -> None:
+    def __init__(self, moves: str, bound: BoundValue[FeedbackSection]) -> None:
         config = bound.config
         source = VALVE_ADDRESS if bound.any_source else bound.key[1] & 0xFF
-        self._axis = axis
+        self._moves = moves
         self._signal = config.signal
         self._full = config.full or float(bound.signal.maximum or 0.0)
         self._sender = SentMessage(config.bus, bound.message, source, bound.protection).sender()
@@ -96,7 +104,7 @@ class _ValveFeedback:
         self._left_s -= passed_s
         if self._left_s <= 1e-9:
             self._left_s += self._cycle_s
-            value = self._full * crane.opening(self._axis)
+            value = self._full * crane.opening(self._moves)
             yield self._sender.frame({self._signal: self._sender.fields.raw(self._signal, value)})
 
 
@@ -129,7 +137,8 @@ class PlantNode:
     """Valves, crane and grapple behind the valve messages of a deployment.
 
     Args:
-        deployment: names the valve messages; its axes name the machine where none is named.
+        deployment: names the valve messages; what its axes move names the machine where none is
+            named.
         parameters: the crane; by default the nominal one.
         machine: one of `machines.MACHINES`.
         sway: swing of the grapple at the start; by default it hangs still.
@@ -151,10 +160,12 @@ class PlantNode:
         *,
         listeners: bool = True,
     ) -> None:
-        name = machine_for(deployment.axes, machine)
+        name = machine_for(deployment.coordinates.values(), machine)
         problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
         self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
+        if name == OVERHEAD:
+            self._feedback = OVERHEAD_FEEDBACK
         self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
         measured = [motion.radius for motion in deployment.motions.values()]
@@ -180,7 +191,7 @@ class PlantNode:
             }
         self._machine = build_machine(name, parameters, sway)
         self._valve_feedback = [
-            _ValveFeedback(axis, bound.feedback)
+            _ValveFeedback(deployment.coordinates.get(axis, axis), bound.feedback)
             for axis, bound in deployment.axes.items()
             if bound.feedback
         ]
@@ -222,7 +233,7 @@ class PlantNode:
                 valve.command = 0.0
             valve.age_s += dt_s
             closed = canopen.present and canopen.closed(valve.axis)
-            commands[valve.axis] = 0.0 if closed else valve.command
+            commands[valve.moves] = 0.0 if closed else valve.command
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:
@@ -260,11 +271,23 @@ class PlantNode:
         if name == "GrappleSway":
             return math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)
         boom = self.crane.boom
+        if isinstance(boom, OverheadBoom):
+            return _overhead_values(name, boom)
         assert isinstance(boom, JointBoom)
         if name == "JointVelocity":
             return boom.joint_rates
         slew, lift, knuckle, extension = boom.joints
         return math.degrees(slew), math.degrees(lift), math.degrees(knuckle), extension
+
+
+def _overhead_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
+    """Of the signals of a feedback message of an overhead crane, in its order."""
+    bridge, trolley, hoist = boom.axes.values()
+    if name == "CraneVelocity":
+        return bridge.speed, trolley.speed, hoist.speed
+    if name == "CranePosition":
+        return bridge.position, trolley.position, boom.signal_m
+    return tuple(math.degrees(angle) for angle in boom.angles[:2])
 
 
 def _heading_deg(theta1_rad: float) -> float:
@@ -274,12 +297,14 @@ def _heading_deg(theta1_rad: float) -> float:
 def _axis_problems(deployment: Deployment, machine: str, *, named: bool) -> list[Problem]:
     """Axes of the deployment that the machine does not have."""
     has = f"the crane has {', '.join(AXES_OF[machine])}"
-    if named:
+    if deployment.config.crane:
+        has = f"the section crane names no coordinate of it; {has}"
+    elif named:
         has = f"machine {machine} has {', '.join(AXES_OF[machine])}"
     elif machine == TIP:
         has += f", or joint by joint {', '.join(AXES_OF[JOINTS])}"
     return [
         Problem(str(deployment.path), None, f"axes.{name}", has)
         for name in deployment.axes
-        if name not in (*AXES_OF[machine], ROTATOR)
+        if deployment.coordinates.get(name, name) not in (*AXES_OF[machine], ROTATOR)
     ]

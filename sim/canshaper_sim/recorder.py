@@ -3,6 +3,7 @@
 Sway of an axis: slewing swings the grapple across the boom (perpendicular), near_far and the joints
 lift_cylinder, knuckle and extension swing it along the boom (parallel), lift by the tip excites
 none. With joint commands the three boom joints thus show the same sway, each with its own strokes.
+Bridge and trolley swing the load in their own directions, the hoist excites none.
 """
 
 import math
@@ -14,9 +15,19 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.states import Reason
-from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.axes import (
+    BRIDGE,
+    EXTENSION,
+    HOIST,
+    KNUCKLE,
+    LIFT,
+    LIFT_CYLINDER,
+    NEAR_FAR,
+    SLEW,
+    TROLLEY,
+)
 from canshaper_sim.crane import CraneParameters
-from canshaper_sim.recording import AxisTrace, CraneTrace, Point, Recording
+from canshaper_sim.recording import DWELL_S, AxisTrace, CraneTrace, Point, Recording
 
 _Handler = Callable[[bytes, float], None]  # data of the right length, time in s
 
@@ -28,9 +39,17 @@ _SPEED_SIGNALS = {
         KNUCKLE: "KnuckleRate",
         EXTENSION: "ExtensionSpeed",
     },
+    "CraneVelocity": {BRIDGE: "BridgeSpeed", TROLLEY: "TrolleySpeed", HOIST: "HoistSpeed"},
 }
 _SWAY_SIGNALS = ACROSS, ALONG = "SwayPerpendicular", "SwayParallel"
+_OVERHEAD_SIGNAL = {BRIDGE: "SwayBridge", TROLLEY: "SwayTrolley"}
 _SWAY_SIGNAL = {SLEW: ACROSS, **dict.fromkeys((NEAR_FAR, LIFT_CYLINDER, KNUCKLE, EXTENSION), ALONG)}
+
+
+def dwell_s(deployment: Deployment) -> float:
+    """How long after a release what swings is residual: where a run-on lasts longer, its tail."""
+    longest = max(axis.config.limits.tail_s for axis in deployment.axes.values())
+    return longest if longest > 2.0 * DWELL_S else DWELL_S
 
 
 class Recorder:
@@ -40,7 +59,10 @@ class Recorder:
         crane = parameters or CraneParameters()
         self._full = crane.full_speeds
         self._grapple = crane.grapple
+        self._moves = deployment.coordinates
+        self._dwell_s = dwell_s(deployment)
         self._tip = (0.0, 0.0)  # slew angle in rad, radius in m
+        self._hook = (0.0, 0.0, 0.0)  # of an overhead crane: bridge, trolley, rope, m
         self._start_s: float | None = None
         # Of each axis: joystick, sent, speed, sway.
         self._now = {name: [0.0, 0.0, 0.0, 0.0] for name in deployment.axes}
@@ -62,6 +84,9 @@ class Recorder:
         for name, feedback in (
             ("TipVelocity", self._speed),
             ("JointVelocity", self._speed),
+            ("CraneVelocity", self._speed),
+            ("CranePosition", self._trolley),
+            ("LoadSway", self._load),
             ("TipPosition", self._position),
             ("GrappleSway", self._sway),
             ("ShaperStatus", self._status),
@@ -92,11 +117,13 @@ class Recorder:
         for name, rows in self._rows.items():
             columns = [list(column) for column in zip(*rows, strict=True)] or [[], [], [], []]
             joystick, sent, speed, sway = columns
-            traces[name] = AxisTrace(joystick, sent, speed, sway if name in _SWAY_SIGNAL else None)
+            swings = self._moves.get(name) in _SWAY_SIGNAL | _OVERHEAD_SIGNAL
+            traces[name] = AxisTrace(joystick, sent, speed, sway if swings else None)
         tip, grapple, sway = (
             map(list, zip(*self._crane, strict=True)) if self._crane else ([], [], [])
         )
-        return Recording(list(self._t_s), traces, CraneTrace(tip, grapple, sway))
+        crane = CraneTrace(tip, grapple, sway)
+        return Recording(list(self._t_s), traces, crane, self._dwell_s)
 
     def _joystick(self, joystick: BoundJoystick, axes: Mapping[str, BoundAxis]) -> _Handler:
         commanded = [
@@ -130,11 +157,11 @@ class Recorder:
         return receive
 
     def _speed(self, fields: FieldSet) -> _Handler:
-        value = fields.value
+        value, signals = fields.value, _SPEED_SIGNALS[fields.message.name]
         speeds = [
-            (self._now[name], signal, self._full[name])
-            for name, signal in _SPEED_SIGNALS[fields.message.name].items()
-            if name in self._now
+            (self._now[name], signals[moved], self._full[moved])
+            for name, moved in self._moves.items()
+            if moved in signals
         ]
 
         def receive(data: bytes, _time_s: float) -> None:
@@ -156,7 +183,8 @@ class Recorder:
 
     def _sway(self, fields: FieldSet) -> _Handler:
         rows = [
-            (self._now[name], self._rows[name], _SWAY_SIGNAL.get(name, "")) for name in self._now
+            (self._now[name], self._rows[name], _SWAY_SIGNAL.get(self._moves.get(name, ""), ""))
+            for name in self._now
         ]
 
         def receive(data: bytes, time_s: float) -> None:
@@ -171,6 +199,42 @@ class Recorder:
             tip = _from_above(heading, radius_m, 0.0)
             grapple = _from_above(heading, radius_m + offset[0], offset[1])
             self._crane.append((tip, grapple, math.hypot(across, along)))
+            for now, kept, signal in rows:
+                now[3] = sways.get(signal, 0.0)
+                kept.append(now.copy())
+
+        return receive
+
+    def _trolley(self, fields: FieldSet) -> _Handler:
+        value = fields.value
+
+        def receive(data: bytes, _time_s: float) -> None:
+            raw = fields.layout.decode(data)
+            bridge, trolley, rope = (
+                value(name, raw[name]) for name in ("Bridge", "Trolley", "RopeLength")
+            )
+            self._hook = bridge, trolley, rope
+
+        return receive
+
+    def _load(self, fields: FieldSet) -> _Handler:
+        rows = [
+            (self._now[name], self._rows[name], _OVERHEAD_SIGNAL.get(self._moves.get(name, ""), ""))
+            for name in self._now
+        ]
+
+        def receive(data: bytes, time_s: float) -> None:
+            if self._start_s is None:
+                return
+            raw = fields.layout.decode(data)
+            sways = {s: fields.value(s, raw[s]) for s in _OVERHEAD_SIGNAL.values()}
+            self._t_s.append(time_s - self._start_s)
+            along, across = (math.tan(math.radians(angle)) for angle in sways.values())
+            x, y, rope = self._hook
+            tilt = math.hypot(along, across)
+            down = rope / math.hypot(1.0, tilt)
+            total = math.degrees(math.atan(tilt))
+            self._crane.append(((x, y), (x + down * along, y + down * across), total))
             for now, kept, signal in rows:
                 now[3] = sways.get(signal, 0.0)
                 kept.append(now.copy())

@@ -1,7 +1,9 @@
 """A recorded drive: what the operator asked, what the valves were sent, what the crane did."""
 
 from dataclasses import dataclass
+from typing import Final
 
+DWELL_S: Final = 2.5  # the slowest shapers have stopped the crane by then (stop 2.4 s)
 Point = tuple[float, float]  # from above, (x, y) about the pillar, m
 
 
@@ -43,9 +45,11 @@ class CraneTrace:
 class Recording:
     """A drive on a common time base (seconds from its start, increasing).
 
-    ``crane`` is None where nothing says where the tip is and how the grapple swings.
+    ``crane`` is None where nothing says where the tip is and how the grapple swings; swing is
+    residual from ``dwell_s`` after a release on.
     """
 
     t_s: list[float]
     axes: dict[str, AxisTrace]
     crane: CraneTrace | None = None
+    dwell_s: float = DWELL_S

@@ -1,6 +1,17 @@
-"""Built-in operator scripts: pulses, a demonstration, loading; for tip and for joint commands."""
+"""Built-in operator scripts: pulses, a demonstration, loading; of tips, joints and trolleys."""
 
-from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.axes import (
+    BRIDGE,
+    EXTENSION,
+    HOIST,
+    KNUCKLE,
+    LIFT,
+    LIFT_CYLINDER,
+    NEAR_FAR,
+    OVERHEAD_AXES,
+    SLEW,
+    TROLLEY,
+)
 from canshaper_sim.strokes import Script, Stroke
 
 _PULSE_RAMP_S = 0.10
@@ -132,6 +143,22 @@ _LOADING_JOINTS = Script(
     23.0,
 )
 
+# A load over the hall: up and away with both at once, the rope shorter on the way, down at the end
+# and a correction.
+_DEMO_OVERHEAD = Script(
+    "demo-overhead",
+    (
+        Stroke(HOIST, 0.5, 4.0, 1.0),
+        Stroke(BRIDGE, 2.0, 8.0, 1.0),
+        Stroke(TROLLEY, 3.0, 6.0, 0.8),
+        Stroke(HOIST, 24.0, 4.0, -1.0),
+        Stroke(BRIDGE, 25.0, 5.0, -0.7),
+        Stroke(BRIDGE, 30.0, 0.6, 0.4),
+        Stroke(TROLLEY, 26.0, 3.0, -1.0),
+    ),
+    52.0,
+)
+
 # From the start pose of the default boom each joint stays clear of its stops.
 _JOINT_PULSES = ((LIFT_CYLINDER, -0.6), (KNUCKLE, 0.8), (EXTENSION, 0.9))
 
@@ -146,5 +173,10 @@ SCRIPTS: dict[str, Script] = {
         *(_pulse(axis, level) for axis, level in _JOINT_PULSES),
         _DEMO_JOINTS,
         _LOADING_JOINTS,
+        *(
+            Script(f"pulse-{axis}", (Stroke(axis, 0.5, 6.0, 1.0, _PULSE_RAMP_S),), 31.5)
+            for axis in OVERHEAD_AXES
+        ),
+        _DEMO_OVERHEAD,
     )
 }

@@ -7,7 +7,8 @@ reversal included. The area under a stroke is level times duration, whatever the
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from canshaper.errors import DesignError
 from canshaper_sim.axes import ALL_AXES
@@ -97,6 +98,11 @@ class Script:
         moved = dict.fromkeys(stroke.axis for stroke in self.strokes)
         known = tuple(axis for axis in ALL_AXES if axis in moved)
         return known + tuple(axis for axis in moved if axis not in ALL_AXES)
+
+    def moving(self, axes: Mapping[str, str]) -> "Script":
+        """The same with the axes that move these coordinates, by coordinate; those alone."""
+        moved = tuple(replace(s, axis=axes[s.axis]) for s in self.strokes if s.axis in axes)
+        return Script(self.name, moved, self.duration_s)
 
     def command(self, axis: str, time_s: float) -> float:
         """Joystick value -1 .. 1 of one axis; neutral for an axis the script does not move."""

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 Problems = Callable[[str | bytes], list[str]]
 TOP = (
-    "version, tick_ms, tick, buses, dbc, joysticks, switches, axes, motion, hydraulics, gateway,"
-    " emergency_stop, load_state, profile, status, identity, control, assumed, still_deg,"
+    "version, tick_ms, tick, buses, dbc, joysticks, switches, axes, crane, motion, hydraulics,"
+    " gateway, emergency_stop, load_state, profile, status, identity, control, assumed, still_deg,"
     " uncertainty, accept"
 )
 

@@ -53,7 +53,8 @@ def one_of(arguments: tuple[Any, ...], kind: str) -> Any:
     some = [a for a in arguments if a is not types.NoneType]
     if len(some) == 1:
         return some[0]
-    return next(s for s in some if kind in get_args(s.model_fields["kind"].annotation))
+    of_kind = (s for s in some if kind in get_args(s.model_fields["kind"].annotation))
+    return next(of_kind, some[0])  # the first one of cranes
 
 
 def of_field(field: FieldInfo, kind: str) -> Any:

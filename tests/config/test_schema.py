@@ -97,7 +97,7 @@ def test_it_refuses_an_unknown_key(
         (("axes", "slew", "filter", "a1"), "0.7"),
         (("axes", "slew", "filter"), {"kind": "gff", "poles_rad_s": [-3, 3]}),
         (("axes", "slew", "filter"), {"kind": "gff", "poles_rad_s": [-3]}),
-        (("axes", "slew", "limits", "tail_s"), 5.1),
+        (("axes", "slew", "limits", "tail_s"), 12.1),
         (("axes", "slew", "command"), None),
     ],
 )

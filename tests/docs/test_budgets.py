@@ -42,6 +42,7 @@ BUDGET = {
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
+    "docs/machines.md": 350,
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
@@ -61,16 +62,16 @@ BUDGET = {
 
 # Lines of Python, and why so many.
 LINES = {
-    "canshaper/gate": (2_098, "read in a day by someone who has never seen it"),
+    "canshaper/gate": (2_101, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_671,
+        4_926,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (63_018, "a new ability takes the room of an old one"),
-    "tests": (97_316, "one level for each behaviour"),
+    "canshaper": (63_846, "a new ability takes the room of an old one"),
+    "tests": (98_152, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (349, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

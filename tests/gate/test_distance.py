@@ -280,3 +280,14 @@ class TestSound:
             assert not refusals(world, wait)
         assert not refusals(world, ticks, slew=slew)
         assert not refusals(world, 120)
+
+    @pytest.mark.parametrize(("period_s", "slack"), [(2.9, SWING_SLACK), (10.0, 5.0)])
+    def test_a_slow_swing_takes_longer_to_damp(self, period_s: float, slack: float) -> None:
+        config = load("forwarder").axes["slew"].config
+        assert config.sway is not None
+        sway = config.sway.model_copy(update={"period_s": period_s, "damping_ratio": 0.0})
+        assert slack_of(config.model_copy(update={"sway": sway})) == pytest.approx(slack)
+
+    def test_of_a_rope_the_longest_counts(self) -> None:
+        config = load("bridge-crane").axes["bridge"].config
+        assert slack_of(config) == pytest.approx(math.pi * math.sqrt(30.0 / 9.81), rel=1e-4)

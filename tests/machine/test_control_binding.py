@@ -59,8 +59,8 @@ def test_numbers_of_sway_filter_and_limits_may_be_changed(machine: Machine) -> N
             "expected a range around the number itself, 2.356, got 2.4 to 3",
         ),
         (
-            "axes.slew.sway.period_s: [1, 13]",
-            "expected both ends within the range of this key, got 13",
+            "axes.slew.sway.period_s: [1, 26]",
+            "expected both ends within the range of this key, got 26",
         ),
         (
             "axes.slew.limits.max_pct: [0, 100]",

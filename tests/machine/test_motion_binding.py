@@ -74,7 +74,7 @@ def measured(**changes: str) -> str:
         ),
         (f"{FIXED}, radius: {{ {TIP} }}", ": expected one of radius and radius_m, got both"),
         ("slew: slew, radius_m: 3", ": expected near_far with a radius or an aim, got none"),
-        (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "expected 0.5 to 30 m, got 0.4"),
+        (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "expected 0.5 to 120 m, got 0.4"),
         (f"{FIXED}, max_pct: 51", ".max_pct: expected 1 to 50 % of full speed, got 51"),
         (f"{FIXED}, speed: 1", ".speed: expected one of the keys slew, near_far, radius"),
         (

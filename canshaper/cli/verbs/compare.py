@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from canshaper.cli.common import PICTURE, REPORT, echo, end_interrupted, engine, loader
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+    from canshaper.cli.results import Results
     from canshaper.design.comparison.limits import Least
     from canshaper.design.comparison.manoeuvres import Candidate
     from canshaper.design.comparison.summary import Row
@@ -65,6 +67,9 @@ def compare(
     30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
     shows what is done until then.
 
+    Of an overhead crane it is one table of the swing left by the length of the rope, still and
+    hoisted, next to ZVD for one length and ZV by length.
+
     Examples:
 
       canshaper compare
@@ -81,12 +86,18 @@ def compare(
     from canshaper.design.comparison.limits import AXIS, least, limits_for
     from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
     from canshaper.design.comparison.measure import measure_all
+    from canshaper.design.comparison.ropes import is_overhead
     from canshaper.design.comparison.summary import recommendations, rows
     from canshaper.design.profiles import swinging_axis
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)()
     results = Results("Comparison of filters", deployment, report, picture, quiet=as_json)
+    if is_overhead(deployment):
+        if work:
+            raise UsageError("--work: its operator works with slew and near-far, not with a rope")
+        _ropes(deployment, results, out, processes, as_json=as_json)
+        return
     out.mkdir(parents=True, exist_ok=True)  # reported before minutes of driving
     tasks = manoeuvres()
     filters = candidates(deployment)
@@ -128,6 +139,34 @@ def compare(
     calm = advice["calm"][0]
     title = f"{calm.name} leaves {calm.worst_30_deg:.1f}° of {off.worst_30_deg:.1f}° at worst"
     results.picture_line(results.picture(out / "compare.png", figure))
+    results.write()
+
+
+def _ropes(
+    deployment: "Deployment",
+    results: "Results",
+    out: Path,
+    processes: int | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Compare the filters of an overhead crane."""
+    from canshaper.design.comparison.ropes import compare_ropes
+    from canshaper.report.console import new_table, progress_bar
+
+    with progress_bar("ropes of 2 to 25 m") as on_progress:
+        table = compare_ropes(deployment, on_progress, processes)
+    cells = [*next(iter(table.values()))]
+    shown = new_table("left, deg", *(cell.replace(" m ", " m\n") for cell in cells))
+    for name, row in table.items():
+        shown.add_row(name, *(f"{row[cell]:.2f}" for cell in cells))
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "compare.json").write_text(
+        json.dumps({"ropes": table}, indent=2) + "\n", encoding="utf-8"
+    )
+    if as_json:
+        echo(json.dumps({"ropes": table}, indent=2))
+    results.print(shown)
     results.write()
 
 

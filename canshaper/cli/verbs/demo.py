@@ -81,7 +81,8 @@ def demo(
     """Drive the simulated crane twice, anti-sway off and on, and show the difference.
 
     Without FILE it is the recommended deployment, forwarder-robust.yaml. The script "demo" moves
-    slew and near-far (or the joints) together. Of several cranes it is the first one.
+    slew and near-far (or joints, or bridge and trolley) together. Of several cranes it is the first
+    one.
 
     Operator, daemon and plant run as three processes and exchange frames on vcan0 where the
     kernel has it, otherwise on python-can's udp_multicast. Prints a table and writes demo.png
@@ -109,9 +110,8 @@ def demo(
     from canshaper.design.processes import choose_transport
     from canshaper.report.console import print_report
     from canshaper.report.metrics import report_dict
-    from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.cranes import cranes, one_crane
-    from canshaper_sim.operator import script_named
+    from canshaper_sim.operator import script_for
     from canshaper_sim.parameters import changed_parameters
 
     nominal = changed_parameters(changes or [])  # wrong ones are named before anything begins
@@ -124,10 +124,9 @@ def demo(
     way = None if lockstep or sys.platform != "linux" else choose_transport(transport, deployment)
     several = cranes(deployment)
     crane = crane or next(iter(several), None)
-    axes = (one_crane(deployment, crane) if crane else deployment).axes
     options: DriveOptions = {"parameters": nominal, "crane": crane}
     if seed is None:
-        played = script_named(script, [axis for axis in ALL_AXES if axis in axes])
+        played = script_for(one_crane(deployment, crane) if crane else deployment, script)
         if rest is not None:
             released_s = max((stroke.end_s for stroke in played.strokes), default=0.0)
             played = replace(played, duration_s=released_s + rest)

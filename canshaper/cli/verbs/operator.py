@@ -41,9 +41,8 @@ def operator(
 
       canshaper operator config/forwarder-robust.yaml --list
     """
-    from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.cranes import one_crane
-    from canshaper_sim.operator import SCRIPTS, script_named
+    from canshaper_sim.operator import SCRIPTS, script_for
     from canshaper_sim.realtime import run_operator
 
     if show:
@@ -54,8 +53,7 @@ def operator(
     deployment = loader(file, interface, channel, network=network)()
     if crane:
         deployment = one_crane(deployment, crane)
-    axes = [axis for axis in ALL_AXES if axis in deployment.axes]
-    played = script_named(script, axes)
+    played = script_for(deployment, script)
     filters = "off" if bypass else "on"
     echo(
         f"script {played.name}, {played.duration_s:g} s, moves {', '.join(played.axes)} with"

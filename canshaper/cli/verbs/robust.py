@@ -81,7 +81,7 @@ def robust(
       canshaper robust config/forwarder.yaml --axis slew --report slew.html
     """
     from canshaper.cli.results import Results
-    from canshaper.commissioning.filter_file import written_line
+    from canshaper.commissioning.filter_file import refuse_scheduled, written_line
     from canshaper.commissioning.loads import design_loads, lengths_of, print_loads
     from canshaper.commissioning.robust import design_robust, figure, print_design, write_design
     from canshaper.edit.edit import flow
@@ -93,6 +93,13 @@ def robust(
     lengths_m = lengths_of(lengths)
     if loads and lengths_m:
         raise UsageError("expected one of --lengths and --loads, got both")
+    if write and not loads and not lengths_m:
+        own = "--lengths LOW:HIGH that while the load is not known"
+        refuse_scheduled(deployment, axis, f"--loads writes all of them, {own}")
+    bound = deployment.axes.get(axis)
+    if lengths_m and bound and bound.rope:
+        text = "expected an axis that does not follow its rope, got"
+        raise UsageError(f"--lengths: {text} {axis}: one filter, without --lengths, is for all")
     options: dict[str, Any] = {"range_pct": range_pct, "residual_pct": residual_pct}
     options |= {"duration_s": duration_s, "second": second}
     if loads:

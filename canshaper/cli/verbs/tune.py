@@ -86,7 +86,7 @@ def tune(
       canshaper tune config/forwarder.yaml --axis slew --method manual
     """
     from canshaper.cli.results import Results
-    from canshaper.commissioning.filter_file import written_line
+    from canshaper.commissioning.filter_file import refuse_scheduled, written_line
     from canshaper.commissioning.tuned import (
         as_dict,
         design_tuned,
@@ -100,6 +100,7 @@ def tune(
     results = Results(f"Filter for {axis}", deployment, report, picture, quiet=as_json)
     if write:
         refuse_shipped(file)
+        refuse_scheduled(deployment, axis, "robust --loads --write designs one for each")
     given: dict[str, Any] = {"preference": preference, "q": _numbers(q), "r": r, "s": s, "p": p}
     given |= {"states": states, "horizon_s": horizon_s, "pole_distance": pole_distance}
     given |= {"within_command": within_command, "max_jump": max_jump, "max_rate_per_s": max_rate}

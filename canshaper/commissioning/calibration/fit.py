@@ -52,12 +52,15 @@ class Calibration:
     def curve(self) -> tuple[list[float], list[float]]:
         """Commands and speeds in % for the deployment file, full speed that of the faster one."""
         full = max(self.positive.full, self.negative.full)
-        commands, speeds = [], []
+        commands, speeds = list[float](), list[float]()
         for sign, one in ((-1.0, self.negative), (1.0, self.positive)):
             points = [(one.opens, 0.0), *one.points, (1.0, one.full)]
             part = [(sign * 100.0 * c, sign * 100.0 * s / full) for c, s in points]
             for command, speed in reversed(part) if sign < 0 else part:
-                commands.append(round(command, 2) + 0.0)
+                step = round(command, 2) + 0.0
+                if commands and step <= commands[-1]:  # without a deadband both ends of it are 0
+                    step = round(commands[-1] + 0.01, 2)
+                commands.append(step)
                 speeds.append(round(speed, 2) + 0.0)
         return commands, speeds
 

@@ -130,7 +130,7 @@ def run_simulated(
 
 def _give_room(plant: PlantNode, deployment: Deployment, axis: str, travel_s: float) -> None:
     """Bring the axis back with its joystick, as a person does on request."""
-    actuator = plant.crane.boom.axes[axis]
+    actuator = plant.crane.boom.axes[deployment.coordinates.get(axis, axis)]
     back = Script("back", (Stroke(axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)
     lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand])

@@ -13,7 +13,7 @@ from canshaper.machine.deployment import Deployment
 
 # Axes whose speeds are so near to each other slow down alike.
 ALIKE = 0.1
-# Speed of each axis as `canshaper sim` sends it.
+# Speed of each coordinate as `canshaper sim` sends it.
 SIMULATED = {
     "slew": "TipVelocity.SlewRate",
     "near_far": "TipVelocity.RadialSpeed",
@@ -21,6 +21,9 @@ SIMULATED = {
     "lift_cylinder": "JointVelocity.LiftRate",
     "knuckle": "JointVelocity.KnuckleRate",
     "extension": "JointVelocity.ExtensionSpeed",
+    "bridge": "CraneVelocity.BridgeSpeed",
+    "trolley": "CraneVelocity.TrolleySpeed",
+    "hoist": "CraneVelocity.HoistSpeed",
 }
 
 
@@ -36,7 +39,8 @@ def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[
         raise UsageError(f"--axis: expected an axis, got {axis!r}; there are {names}")
     if speed is None and bound.config.feedback:
         return bound.config.feedback.message, bound.config.feedback.signal
-    message, dot, signal = (speed or SIMULATED.get(axis, "")).partition(".")
+    moved = deployment.coordinates.get(axis, axis)
+    message, dot, signal = (speed or SIMULATED.get(moved, "")).partition(".")
     if not (message and dot and signal):
         raise UsageError(f"--speed: expected MESSAGE.SIGNAL, got {speed or 'none'}")
     return message, signal

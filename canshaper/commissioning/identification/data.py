@@ -119,6 +119,8 @@ _PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
 SIMULATED = {
     "slew": "GrappleSway.SwayPerpendicular",
     **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
+    "bridge": "LoadSway.SwayBridge",
+    "trolley": "LoadSway.SwayTrolley",
 }
 # Name of the axis where neither a deployment nor an option names one.
 UNNAMED = "swing"
@@ -141,9 +143,9 @@ def stopwatch(
     """
     if not swings >= 3:
         raise IdentificationError(f"--swings: expected 3 or more, better 10, got {swings:g}")
-    if not 0.15 <= seconds / swings <= 12.0:
+    if not 0.15 <= seconds / swings <= 25.0:
         text = f"{seconds / swings:g} s, of {seconds:g} s for {swings:g} swings"
-        raise IdentificationError(f"--seconds: expected 0.15 to 12 s a swing, got {text}")
+        raise IdentificationError(f"--seconds: expected 0.15 to 25 s a swing, got {text}")
     if not 0.0 < last_deg <= first_deg <= 60.0:
         raise IdentificationError(
             "--first, --last: expected up to 60 degrees, the last one above 0 and not larger than"
@@ -290,9 +292,10 @@ def _simulated(
     deployment: Deployment | None, messages: Messages, axis: str | None
 ) -> dict[str, str]:
     """Signals of the simulated crane, where no others are named."""
-    axes = list(deployment.axes) if deployment else list(SIMULATED)
-    there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
-    if not there or isinstance(messages.find("GrappleSway"), str):
+    moves = deployment.coordinates if deployment else {one: one for one in SIMULATED}
+    there = {a: SIMULATED[m] for a, m in moves.items() if m in SIMULATED and axis in (None, a)}
+    sent = {signal.partition(".")[0] for signal in there.values()}
+    if not there or any(isinstance(messages.find(one), str) for one in sent):
         text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
         raise UsageError(text)
     return there

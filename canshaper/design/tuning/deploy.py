@@ -8,7 +8,14 @@ from typing import Any
 from rich.table import Table
 
 from canshaper.config.filters import Filter, filter_of
-from canshaper.design.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, gff
+from canshaper.design.tuning.evaluate import (
+    Evaluation,
+    Machine,
+    ShaperFor,
+    evaluate,
+    gff,
+    longest_tail_s,
+)
 from canshaper.design.tuning.optimal import FLAT, Tuning
 from canshaper.report.console import new_table
 from canshaper.shaping.shapers.gff import denominator_from_poles, poles_from_denominator
@@ -17,7 +24,6 @@ from canshaper.shaping.sway import SwayMode
 _DIGITS = 6
 # A tail that ends the run-on early is reported from so much more residual sway on.
 _TAIL_MATTERS = 0.01
-_LONGEST_TAIL_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +110,10 @@ def tail_for(
     None where not even the longest tail that a file may have is enough.
     """
     shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
-    best = _left(mode, tick_s, shaper, machine, _LONGEST_TAIL_S)
+    longest_s = longest_tail_s(mode)
+    best = _left(mode, tick_s, shaper, machine, longest_s)
     result = None
-    for tenths in range(round(10.0 * _LONGEST_TAIL_S) - 1, -1, -1):
+    for tenths in range(round(10.0 * longest_s) - 1, -1, -1):
         left = _left(mode, tick_s, shaper, machine, tenths / 10.0)
         if left - best >= _TAIL_MATTERS:
             break

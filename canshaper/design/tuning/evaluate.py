@@ -33,8 +33,8 @@ RISEN = 0.95
 _AT_END, _LONGEST_S, _HELD_S = 1e-9, 120.0, 4.0
 STILL = 0.02
 _LAGS = 10.0  # of the valve, until it has followed
-# Longer than any plateau between two taps (half the longest second mode of 12 s).
-_STILL_S = 8.0
+# Longer than any plateau between two taps: half of the longest swing, 12 s of most tools.
+_STILL_S, _STILL_PERIODS = 8.0, 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +127,11 @@ class Traces:
     swing_raw: tuple[float, ...]
 
 
+def longest_tail_s(mode: SwayMode) -> float:
+    """Longest tail that is looked at for a swing: two periods, 5 s or more, 12 s as in a file."""
+    return min(max(5.0, math.ceil(2.0 * mode.period_s)), 12.0)
+
+
 def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
     """G_FF of any axis with these poles."""
     return lambda sway: Gff(sway, poles_rad_s, third_pole_rad_s=third_pole_rad_s)
@@ -190,7 +195,8 @@ def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[
     shaper = shaper_for(sway)
     y: list[float] = []
     still = 0
-    while still < _STILL_S / tick_s and len(y) < _LONGEST_S / tick_s:
+    still_s = max(_STILL_S, _STILL_PERIODS * mode.period_s)
+    while still < still_s / tick_s and len(y) < _LONGEST_S / tick_s:
         command = shaper.step(1.0)
         sway.step(command)
         still = still + 1 if y and abs(command - y[-1]) < _AT_END * tick_s else 0

@@ -12,7 +12,13 @@ from typing import Any, Self
 from canshaper.config.filters import Filter
 from canshaper.config.limits import Sway
 from canshaper.config.source import Place
-from canshaper.design.tuning.evaluate import Machine, ShaperFor, evaluate, shaper_of
+from canshaper.design.tuning.evaluate import (
+    Machine,
+    ShaperFor,
+    evaluate,
+    longest_tail_s,
+    shaper_of,
+)
 from canshaper.design.tuning.formulation import MOST_DAMPED
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import every_filter
@@ -21,7 +27,6 @@ from canshaper.shaping.sway import SwayMode
 
 # Of the swing: up to GOOD is left by a good filter, more than USELESS by one that is not written.
 GOOD, USELESS = 0.10, 0.50
-_LONGEST_TENTHS = 50  # of a second: the longest tail of a file
 _FASTER = (1.5, 2.0, 3.0, 5.0)  # times the rate of the valve
 # A change is worth naming that leaves less than this part.
 _HELPS = 0.8
@@ -105,7 +110,7 @@ def judge(
         if best <= GOOD:
             break
     verdict = verdict.with_cure(best, what)
-    low, high = int(10.0 * machine.limits.tail_s), _LONGEST_TENTHS
+    low, high = int(10.0 * machine.limits.tail_s), round(10.0 * longest_tail_s(mode))
     if low < high:
         best = left_with(tail_s=high / 10.0)
         while best <= GOOD and high - low > 1:  # the shortest that is good: halve what is between

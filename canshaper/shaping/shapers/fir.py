@@ -33,7 +33,7 @@ class Fir:
         # A tenth of a percent is rounding of taps written to a file, far below any valve's step.
         if not abs(total - 1.0) <= 1e-3:
             raise ValueError(f"sum of the taps: expected 1, got {total:g}")
-        self.taps = tuple(tap / total for tap in taps)
+        self.taps: Sequence[float] = tuple(tap / total for tap in taps)
         self._history: deque[float] = deque([0.0] * len(self.taps), maxlen=len(self.taps))
 
     def step(self, command: float) -> float:
@@ -41,9 +41,17 @@ class Fir:
         self._history.appendleft(command)
         return math.fsum(map(mul, self.taps, self._history))
 
+    def response(self, weights: Sequence[float]) -> float:
+        """Response to the commands so far with these taps instead, the newest command first."""
+        return float(sum(map(mul, weights, self._history)))
+
     def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""
-        self._history.extend([command] * len(self.taps))
+        self._history.extend([command] * (self._history.maxlen or 0))
+
+    def lengthen(self, count: int) -> None:
+        """Remember so many commands, of a filter that has not run."""
+        self._history = deque([0.0] * count, maxlen=count)
 
     def copy_state(self, old: "Fir") -> None:
         """Go on with the commands that another one has seen; of older ones its oldest is taken."""
@@ -173,7 +181,7 @@ KINDS = (
             "two-mode": {"period_s": 0.4 * mode.period_s, "damping_ratio": 0.02}
         },
         (
-            Parameter("period_s", 0.15, 12, "s", "period of the second mode"),
+            Parameter("period_s", 0.15, 25, "s", "period of the second mode"),
             Parameter("damping_ratio", 0, 0.95, "", "damping ratio of the second mode"),
         ),
         needs_sway=True,

@@ -29,7 +29,7 @@ class Gff:
         ValueError: a pole is not negative or too fast for the tick.
     """
 
-    __slots__ = ("_command", "_share", "_sway", "k1", "k2", "poles_rad_s")
+    __slots__ = ("_command", "_share", "_sway", "_third", "k1", "k2", "poles_rad_s")
 
     def __init__(
         self,
@@ -46,13 +46,24 @@ class Gff:
                     f" got {pole:g} rad/s"
                 )
         self._sway = sway
-        # The lag reaches exp(p T) in the tick of the step; a share of 1 is no lag.
-        self._share = (
-            1.0 if third_pole_rad_s is None else -math.expm1(third_pole_rad_s * sway.tick_s)
-        )
+        self._third = third_pole_rad_s
         self._command = 0.0
         self.poles_rad_s = poles_rad_s
-        d1, d2 = (math.expm1(p * sway.tick_s) for p in poles_rad_s)
+        self.follow(1.0)
+
+    def prepare(self, least: float, most: float) -> None:
+        """Nothing has to be ready for ``follow``."""
+
+    def follow(self, factor: float) -> None:
+        """Suit the sway model as it is now: poles in so many times the time of those of the file.
+
+        Args:
+            factor: period of the swing, of that which the filter was made for.
+        """
+        sway, third = self._sway, self._third
+        # The lag reaches exp(p T) in the tick of the step; a share of 1 is no lag.
+        self._share = 1.0 if third is None else -math.expm1(third / factor * sway.tick_s)
+        d1, d2 = (math.expm1(p / factor * sway.tick_s) for p in self.poles_rad_s)
         # In increments d = z - 1 the closed loop F - F (0,1) K has trace d1 + d2, determinant
         # d1 d2; det(F) is the product of the sway poles' own increments.
         swing = sway.mode.pole * sway.tick_s
@@ -145,6 +156,15 @@ def _by_poles(parameters: Parameters) -> Parameters:
     return rest | {"poles_rad_s": sorted(rest["poles_rad_s"])}
 
 
+def _followed(parameters: Parameters, factor: float) -> Parameters:
+    """Return the parameters for a swing of so many times the period; see ``Gff.follow``."""
+    power = {"a1": factor, "a2": factor**2, "third_pole_rad_s": 1.0 / factor}
+    new = {name: one * power[name] for name, one in parameters.items() if name in power}
+    if "poles_rad_s" in parameters:
+        new["poles_rad_s"] = [pole / factor for pole in parameters["poles_rad_s"]]
+    return parameters | new
+
+
 def _settings(mode: SwayMode, _tick_s: float) -> dict[str, Parameters]:
     omega = mode.omega_rad_s
     return {
@@ -182,6 +202,7 @@ KINDS = (
         limit_aware=True,
         check=_check,
         interpolable=_by_poles,
+        follows=_followed,
         designed_by="tune",
     ),
 )

@@ -7,7 +7,7 @@ The schema of the deployment file, ``build_shaper``, the table in docs/deploymen
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from canshaper.shaping.sway import SwayMode
 
@@ -33,6 +33,17 @@ class Shaper(Protocol):
         Called once a tick, also while the axis is neutral (then with command 0).
         """
         ...
+
+
+@runtime_checkable
+class Following(Protocol):
+    """A shaper that follows the swing of a rope; its kind has ``ShaperKind.follows``."""
+
+    def prepare(self, least: float, most: float) -> None:
+        """Make ready for periods from least to most, in parts of that of the file."""
+
+    def follow(self, factor: float) -> None:
+        """Suit the sway model as it is now, whose period is so many times that of the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +103,8 @@ class ShaperKind:
             line from one set to another.
         stretched: the same filter for a swing of so many times the period; of a kind whose
             parameters hold for one period only.
+        follows: parameters as the filter has them while it follows a rope to so many times the
+            period, by ``follow(factor)``; None where it cannot.
         designed_by: verb of ``canshaper`` that finds the parameters, "" without one.
 
     Raises:
@@ -124,6 +137,7 @@ class ShaperKind:
     check: Callable[..., object] | None = None
     interpolable: Callable[[Parameters], Parameters] | None = None
     stretched: Callable[[Parameters, float], Parameters] | None = None
+    follows: Callable[[Parameters, float], Parameters] | None = None
     designed_by: str = ""
 
     def __post_init__(self) -> None:

@@ -25,6 +25,10 @@ POLE_PER_OMEGA = -1.4
 POLE_PER_ROOT = -1.3
 
 
+# Taps for a rope: positions between the shortest and the longest, between two of them interpolated.
+TABLE_STEPS = 64
+
+
 class LimitAware:
     """A shaper with feedback of the swing that limits made.
 
@@ -38,7 +42,16 @@ class LimitAware:
     """
 
     spreads = True
-    __slots__ = ("_gff", "_shaper", "_sway", "_twin", "_unlimited")
+    __slots__ = (
+        "_gff",
+        "_pole",
+        "_rate",
+        "_shaper",
+        "_sway",
+        "_table",
+        "_twin",
+        "_unlimited",
+    )
 
     def __init__(self, sway: SwayModel, shaper: Fir, rate_per_s: float = math.inf) -> None:
         omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
@@ -47,12 +60,62 @@ class LimitAware:
                 f"natural frequency: expected up to {fastest:g} rad/s for this filter"
                 f" at a tick of {sway.tick_s:g} s, got {omega:g} rad/s"
             )
-        pole = max(POLE_PER_OMEGA * omega, POLE_PER_ROOT * math.sqrt(rate_per_s * omega))
+        self._rate = rate_per_s
+        self._pole = pole = self._pole_rad_s(omega)
         self._gff = Gff(sway, (pole, pole))
+        self._table: (
+            tuple[float, float, list[tuple[list[float], list[float], list[float]]]] | None
+        ) = None
         self._sway = sway
         self._twin = SwayModel(sway.mode, sway.tick_s)
         self._shaper = shaper
         self._unlimited = 0.0
+
+    def _pole_rad_s(self, omega: float) -> float:
+        return max(POLE_PER_OMEGA * omega, POLE_PER_ROOT * math.sqrt(self._rate * omega))
+
+    def prepare(self, least: float, most: float) -> None:
+        """Make the taps for every period that ``follow`` will name, in parts of the file's.
+
+        And what the twin does after a command of one tick, for each of them.
+        """
+        taps, period_s = self._shaper.taps, self._sway.mode.period_s
+        longest = len(stretched(taps, most))
+        rows = []
+        for i in range(TABLE_STEPS + 1):
+            factor = least + (most - least) * i / TABLE_STEPS
+            row = stretched(taps, factor)
+            row += [0.0] * (longest - len(row))
+            ratio = self._sway.mode.damping_ratio
+            twin = SwayModel(SwayMode.from_period(factor * period_s, ratio), self._sway.tick_s)
+            angles, rates = [], []
+            for tap in row:
+                angles.append(twin.angle)
+                rates.append(twin.rate)
+                twin.step(tap)
+            rows.append((row, angles, rates))
+        self._table = least, (most - least) / TABLE_STEPS, rows
+        self._shaper.lengthen(longest)
+
+    def follow(self, factor: float) -> None:
+        """Suit the sway model as it is now: its taps in so many times the time.
+
+        The twin gets the swing that it would have had all the time with this rope. So it ends with
+        the taps, and the feedback damps what the change of the length has made of the real one.
+        """
+        assert self._table is not None  # it was prepared
+        least, step, rows = self._table
+        at = min(max((factor - least) / step, 0.0), TABLE_STEPS - 1e-9)
+        low, high, share = rows[int(at)], rows[int(at) + 1], at % 1.0
+        shaper, twin, mode = self._shaper, self._twin, self._sway.mode
+        shaper.taps = [a + share * (b - a) for a, b in zip(low[0], high[0], strict=True)]
+        twin.follow(mode)
+        if self._sway.angle != 0.0 or self._sway.rate != 0.0:
+            now, then = (map(shaper.response, one) for one in (low, high))
+            self._unlimited, twin.angle, twin.rate = (
+                a + share * (b - a) for a, b in zip(now, then, strict=True)
+            )
+        self._gff.follow(self._pole / self._pole_rad_s(mode.omega_rad_s))
 
     def copy_state(self, old: "LimitAware") -> None:
         """Go on from where another one stands."""
@@ -124,5 +187,6 @@ KINDS = (
         check=_check,
         designed_by="robust",
         stretched=_stretched,
+        follows=_stretched,
     ),
 )

@@ -9,20 +9,23 @@ from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.codec.velocity import ValveCodec
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
+from canshaper.commissioning.calibration.fit import Calibration, Direction, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.run import run_simulated
+from canshaper.commissioning.calibration.write import speed_signal
 from canshaper.config.section import Origin
 from canshaper.edit.edit import written_by
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from canshaper.shaping.limits import ValveCurve
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script, Stroke
 from canshaper_sim.parameters import changed_parameters
 
 ROOT = Path(__file__).parents[3]
 FILE = ROOT / "config" / "forwarder.yaml"
+OVERHEAD = ROOT / "config" / "bridge-crane.yaml"
 RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
 SPEED = ("TipVelocity", "SlewRate")
 TICK_NS = 20_000_000
@@ -317,3 +320,16 @@ def test_the_guard_stops_a_command_that_is_beyond_the_ramp(
     sent = run(drive, hands(deployment), 6.0)
     assert drive.ended == "stopped: OUTPUT_REFUSED"
     assert max(frame.data[0] for frame in sent) < 0.1 * 125
+
+
+def test_a_drive_without_a_deadband_has_a_curve_all_the_same() -> None:
+    one = Direction(0.0, ((0.1, 0.1), (0.4, 0.4)), 0.0, 1.0)
+    commands, speeds = Calibration(one, one).curve()
+    assert commands == [-100.0, -40.0, -10.0, 0.0, 0.01, 10.0, 40.0, 100.0]
+    curve = ValveCurve([v / 100.0 for v in commands], [v / 100.0 for v in speeds])
+    assert curve.command(0.4) == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("axis", "signal"), [("bridge", "BridgeSpeed"), ("hoist", "HoistSpeed")])
+def test_the_speed_of_an_axis_is_that_of_what_it_moves(axis: str, signal: str) -> None:
+    assert speed_signal(load_deployment(OVERHEAD), axis, None) == ("CraneVelocity", signal)

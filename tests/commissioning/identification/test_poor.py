@@ -216,7 +216,7 @@ def test_a_stopwatch_with_next_to_no_amplitude_left() -> None:
         (2, 5.0, 20, 10, "--swings"),
         (float("nan"), 5.0, 20, 10, "--swings"),
         (10, 1.0, 20, 10, "--seconds"),
-        (10, 200.0, 20, 10, "--seconds"),
+        (10, 300.0, 20, 10, "--seconds"),
         (10, 23.0, 10, 20, "--first, --last"),
         (10, 23.0, 90, 20, "--first, --last"),
         (10, 23.0, 20, 0, "--first, --last"),

@@ -125,7 +125,7 @@ def test_of_a_range_with_a_residual_the_shortest_is_taken(file: Path) -> None:
     ("lengths", "expected"),
     [
         ("1.6:1.2", "expected LOW of 0.05 to 1.2 m, up to HIGH, got 1.6:1.2"),
-        ("1.2:40", "expected LOW of 0.05 to 30 m, up to HIGH, got 1.2:40"),
+        ("1.2:151", "expected LOW of 0.05 to 150 m, up to HIGH, got 1.2:151"),
         ("1.2", "expected LOW:HIGH in m, such as 1.2:1.6, got 1.2"),
         ("nan:1", "expected LOW of 0.05 to 1 m, up to HIGH, got nan:1"),
     ],
@@ -145,3 +145,30 @@ def test_a_range_that_is_none_is_refused_in_one_line(lengths: str, expected: str
 )
 def test_what_cannot_be_designed_is_refused_in_one_line(options: list[str], expected: str) -> None:
     assert words("forwarder.yaml", "--axis", "slew", *options, code=2) == expected
+
+
+@pytest.mark.parametrize(
+    ("verb", "cure"),
+    [
+        (
+            "robust",
+            "--loads writes all of them, --lengths LOW:HIGH that while the load is not known",
+        ),
+        ("tune", "robust --loads --write designs one for each"),
+    ],
+)
+def test_one_filter_beside_those_of_a_schedule_is_not_written(
+    file: Path, verb: str, cure: str
+) -> None:
+    before = file.read_bytes()
+    done = invoke(verb, str(file), "--axis", "slew", "--write")
+    says = "--write: expected an axis without gain_schedule, got slew with 0, 600, whose filters"
+    assert done.exit_code == 2
+    assert " ".join(done.output.split()) == f"{says} would stay: {cure}"
+    assert file.read_bytes() == before
+
+
+def test_a_filter_that_follows_its_rope_needs_no_lengths() -> None:
+    text = words("bridge-crane.yaml", "--axis", "trolley", "--lengths", "2:30", code=2)
+    says = "--lengths: expected an axis that does not follow its rope, got trolley: one filter,"
+    assert text == f"{says} without --lengths, is for all"

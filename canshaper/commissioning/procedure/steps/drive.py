@@ -23,8 +23,7 @@ from canshaper.report.console import new_table, print_report
 from canshaper.report.metrics import MIN_RAW_DEG, report_dict
 from canshaper.report.plot import figure
 from canshaper.report.strokes import RESIDUAL_DWELL_S, RESIDUAL_WINDOW_MIN_S
-from canshaper_sim.axes import ALL_AXES
-from canshaper_sim.operator import script_named
+from canshaper_sim.operator import script_for
 from canshaper_sim.recording import Recording
 
 # A tenth of the swing: with more, the filter is for another swing than this one.
@@ -69,7 +68,7 @@ def run(context: Context) -> Outcome:
 
 def _driven(context: Context, axes: list[str]) -> list[Path]:
     """Logs of both drives."""
-    demo = script_named("demo", [axis for axis in ALL_AXES if axis in context.deployment.axes])
+    demo = script_for(context.deployment, "demo")
     # As the words say it: without the corrections, which pull against the run-on.
     script = replace(demo, strokes=tuple(s for s in demo.strokes if s.duration_s >= 1.0))
     logs = []

@@ -70,7 +70,7 @@ def run(context: Context) -> Outcome:
 
 def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
     """MESSAGE.SIGNAL of the speed of an axis; a dash where there is none."""
-    default = SIMULATED.get(name, NONE)
+    default = SIMULATED.get(deployment.coordinates.get(name, name), NONE)
     if isinstance(deployment.messages.find(default.partition(".")[0]), str):
         default = NONE
     if feedback := deployment.axes[name].config.feedback:

@@ -1,0 +1,194 @@
+"""An overhead crane: bridge, trolley and hoist; a load that hangs from a rope and swings freely.
+
+The load is a point at r below the trolley, as far away as the rope is long, |r| = l(t). Its tension
+per kg and m of rope, k, keeps it there:
+
+    r'' = -a - g e_z - k r - c (r' - (l'/l) r)      a: acceleration of the trolley
+    k = (r . (-a - g e_z) + |r'|^2 - l'^2 - l l'') / l^2
+
+(r . r = l^2, differentiated twice; Goldstein, Classical Mechanics, 1.4). No small angle is assumed,
+and a rope that gets longer or shorter does all that it does: 2 l' theta' is in it. A rope that is
+slack is none: the load never falls freely.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from canshaper_sim.actuator import Actuator, EndParameters
+from canshaper_sim.axes import BRIDGE, HOIST, TROLLEY
+from canshaper_sim.ranges import check_ranges
+from canshaper_sim.valve import ValveParameters
+
+if TYPE_CHECKING:
+    from canshaper_sim.grapple import Sway
+
+Vector = tuple[float, float, float]
+
+# name -> (lowest, highest) value that still describes an overhead crane.
+_ALLOWED = {
+    "bridge_full_speed_m_s": (0.05, 5.0),
+    "trolley_full_speed_m_s": (0.05, 5.0),
+    "hoist_full_speed_m_s": (0.02, 3.0),
+    "rope_min_m": (0.5, 150.0),
+    "rope_max_m": (0.5, 150.0),
+    "runway_m": (1.0, 1000.0),
+    "span_m": (1.0, 200.0),
+    "damping_ratio": (0.0, 0.5),
+    "rope_error_pct": (-50.0, 50.0),
+    "g_m_s2": (1.0, 25.0),
+}
+
+
+def _drive() -> ValveParameters:
+    """An inverter follows every command, within its ramp."""
+    return ValveParameters(deadband=0.0, rate_limit_1_s=5.0, lag_s=0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class OverheadParameters:
+    """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
+
+    bridge: ValveParameters = field(default_factory=_drive)
+    trolley: ValveParameters = field(default_factory=_drive)
+    hoist: ValveParameters = field(default_factory=_drive)
+    bridge_full_speed_m_s: float = 1.0
+    trolley_full_speed_m_s: float = 1.0
+    hoist_full_speed_m_s: float = 0.5
+    runway_m: float = 100.0  # it begins in the middle of both
+    span_m: float = 60.0
+    rope_m: float = 8.0  # from the trolley to the middle of the load, at the start
+    rope_min_m: float = 1.5
+    rope_max_m: float = 30.0
+    damping_ratio: float = 0.005
+    rope_error_pct: float = 0.0  # how much more than that the length signal says
+    g_m_s2: float = 9.81
+
+    def __post_init__(self) -> None:
+        check_ranges("overhead", self, _ALLOWED | {"rope_m": (self.rope_min_m, self.rope_max_m)})
+
+    def boom(self, ends: EndParameters) -> "OverheadBoom":
+        """Trolley and rope at the start."""
+        runway, span = 0.5 * self.runway_m, 0.5 * self.span_m
+        rope = (-self.rope_m, -self.rope_max_m, -self.rope_min_m)
+        return OverheadBoom(
+            {
+                BRIDGE: Actuator(
+                    self.bridge, self.bridge_full_speed_m_s, 0.0, -runway, runway, ends=ends
+                ),
+                TROLLEY: Actuator(
+                    self.trolley, self.trolley_full_speed_m_s, 0.0, -span, span, ends=ends
+                ),
+                HOIST: Actuator(self.hoist, self.hoist_full_speed_m_s, *rope, ends=ends),
+            },
+            self,
+        )
+
+
+class OverheadBoom:
+    """Bridge, trolley and rope, with the load on it.
+
+    Args:
+        axes: actuators of the three axes; the hoist's position is the height below the trolley.
+        parameters: of the crane.
+
+    Attributes:
+        load: the load from the trolley: along the runway, along the bridge, upwards, m.
+        rate: its velocity, from the trolley's, m/s.
+    """
+
+    def __init__(self, axes: dict[str, Actuator], parameters: OverheadParameters) -> None:
+        self.axes = axes
+        self._p = parameters
+        self.load: Vector = (0.0, 0.0, axes[HOIST].position)
+        self.rate: Vector = (0.0, 0.0, 0.0)
+
+    def swing(self, sway: "Sway") -> None:
+        """Let the load hang with these angles: theta5 along the runway, theta6 along the bridge."""
+        along, across = math.tan(sway.theta5_rad), math.tan(sway.theta6_rad)
+        down = self.rope_m / math.sqrt(1.0 + along * along + across * across)
+        self.load = (down * along, down * across, -down)
+
+    @property
+    def rope_m(self) -> float:
+        """Length of the rope."""
+        return -self.axes[HOIST].position
+
+    @property
+    def signal_m(self) -> float:
+        """Length that the crane reports."""
+        return self.rope_m * (1.0 + self._p.rope_error_pct / 100.0)
+
+    @property
+    def angles(self) -> tuple[float, float, float, float]:
+        """Swing along runway and bridge, rad, and its rates."""
+        x, y, z = self.load
+        vx, vy, vz = self.rate
+        along, across = x * x + z * z, y * y + z * z
+        return (
+            math.atan2(x, -z),
+            math.atan2(y, -z),
+            (x * vz - z * vx) / along,
+            (y * vz - z * vy) / across,
+        )
+
+    @property
+    def pose(self) -> tuple[float, float, float, float, float, float]:
+        """Trolley in polar coordinates about the start, hook below it, and their rates."""
+        bridge, trolley, hoist = self.axes.values()
+        x, y, vx, vy = bridge.position, trolley.position, bridge.speed, trolley.speed
+        radius = math.hypot(x, y)
+        turn = (x * vy - y * vx) / radius**2 if radius else 0.0
+        out = (x * vx + y * vy) / radius if radius else 0.0
+        return math.atan2(y, x), radius, hoist.position, turn, out, hoist.speed
+
+    def advance(self, step_s: float) -> None:
+        """Move on by step_s seconds: a classical Runge-Kutta step, and back onto the rope."""
+        bridge, trolley, hoist = self.axes.values()
+        before = hoist.position, hoist.speed
+        for axis in (bridge, trolley, hoist):
+            axis.advance(step_s)
+        start = (bridge.start_acceleration, trolley.start_acceleration)
+        middle = (bridge.middle_acceleration, trolley.middle_acceleration)
+        end = (bridge.end_acceleration, trolley.end_acceleration)
+        ropes = (
+            (*before, hoist.start_acceleration),
+            (hoist.middle_position, hoist.middle_speed, hoist.middle_acceleration),
+            (hoist.position, hoist.speed, hoist.end_acceleration),
+        )
+        r, v, half = self.load, self.rate, 0.5 * step_s
+        a1 = self._acceleration(r, v, start, ropes[0])
+        r2, v2 = _plus(r, half, v), _plus(v, half, a1)
+        a2 = self._acceleration(r2, v2, middle, ropes[1])
+        r3, v3 = _plus(r, half, v2), _plus(v, half, a2)
+        a3 = self._acceleration(r3, v3, middle, ropes[1])
+        r4, v4 = _plus(r, step_s, v3), _plus(v, step_s, a3)
+        a4 = self._acceleration(r4, v4, end, ropes[2])
+        sixth = step_s / 6.0
+        r = _plus(_plus(_plus(_plus(r, sixth, v), 2 * sixth, v2), 2 * sixth, v3), sixth, v4)
+        v = _plus(_plus(_plus(_plus(v, sixth, a1), 2 * sixth, a2), 2 * sixth, a3), sixth, a4)
+        length, change = -hoist.position, -hoist.speed
+        self.load = r = _plus((0.0, 0.0, 0.0), length / math.sqrt(_dot(r, r)), r)
+        self.rate = _plus(v, (change * length - _dot(r, v)) / length**2, r)
+
+    def _acceleration(
+        self, r: Vector, v: Vector, trolley: tuple[float, float], hoist: tuple[float, float, float]
+    ) -> Vector:
+        """Of the load from the trolley; hoist: position, speed and acceleration of the hook."""
+        length, change, change_2 = (-one for one in hoist)
+        pull = (-trolley[0], -trolley[1], -self._p.g_m_s2)
+        tension = (_dot(r, pull) + _dot(v, v) - change**2 - length * change_2) / length**2
+        damping = 2.0 * self._p.damping_ratio * math.sqrt(self._p.g_m_s2 / length)
+        return _plus(_plus(pull, damping * change / length - tension, r), -damping, v)
+
+
+def _plus(first: Vector, factor: float, second: Vector) -> Vector:
+    return (
+        first[0] + factor * second[0],
+        first[1] + factor * second[1],
+        first[2] + factor * second[2],
+    )
+
+
+def _dot(first: Vector, second: Vector) -> float:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]

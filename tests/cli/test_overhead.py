@@ -1,0 +1,67 @@
+"""Commands with the shipped bridge crane."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from tests.rigs.overhead import FILE, changed
+
+
+def run(*words: str, code: int = 0) -> str:
+    done = CliRunner().invoke(app, [*words])
+    assert done.exit_code == code, done.output
+    return " ".join(done.output.split())
+
+
+def test_check_finds_nothing() -> None:
+    said = run("check", str(FILE))
+    assert "bridge-crane.yaml: good" in said
+    assert "WARNING" not in said
+
+
+@pytest.mark.slow
+def test_demo_shows_what_the_filters_do(tmp_path: Path) -> None:
+    run("demo", str(FILE), "--lockstep", "--out", str(tmp_path))
+    crane = json.loads((tmp_path / "report.json").read_text())["crane"]
+    assert crane["raw"]["residual_deg"] > 10.0
+    assert crane["shaped"]["residual_deg"] < 0.5
+    assert (tmp_path / "demo.png").exists()
+
+
+@pytest.mark.slow
+def test_a_rehearsal_leads_to_the_report(tmp_path: Path) -> None:
+    said = run("commission", str(changed(tmp_path)), "--simulated", "--yes")
+    assert "ok: bridge, trolley: the length of the rope is measured" in said
+    assert "All steps are done" in said
+
+
+@pytest.mark.slow
+def test_a_campaign_draws_ropes(tmp_path: Path) -> None:
+    said = run("campaign", str(FILE), "-n", "4", "--out", str(tmp_path), "--processes", "1")
+    assert "0 of 4 drives broke one" in said
+
+
+def test_a_script_that_moves_nothing_of_it_is_refused() -> None:
+    for verb in (["operator", str(FILE)], ["demo", str(FILE), "--lockstep"]):
+        said = run(*verb, "--script", "pulse-slew", code=2)
+        assert "script pulse-slew moves slew; the crane has bridge, trolley, hoist" in said
+
+
+def test_compare_has_no_work_with_a_rope() -> None:
+    said = run("compare", str(FILE), "--work", code=2)
+    assert "--work: its operator works with slew and near-far" in said
+
+
+def test_work_needs_slew_and_near_far() -> None:
+    said = run("work", str(FILE), code=2)
+    assert "expected axes slew and near_far, got bridge, trolley, hoist" in said
+
+
+def test_a_crane_that_moves_nothing_is_no_campaign(tmp_path: Path) -> None:
+    crane = "crane: { kind: cartesian, bridge: bridge, trolley: trolley, hoist: hoist }"
+    file = changed(tmp_path, (crane, ""))
+    said = run("campaign", str(file), "--out", str(tmp_path / "out"), code=2)
+    assert "expected an axis that moves the crane, got none" in said

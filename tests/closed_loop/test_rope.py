@@ -1,0 +1,114 @@
+"""The shipped bridge crane on the simulated one, whose rope is no model of the controller's."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from canshaper.design.comparison.ropes import ROPES_M, RopeFilter, left_deg, rope_filters, tasks
+from canshaper.design.lockstep import drive
+from canshaper.errors import DesignError
+from canshaper.machine.binding import load_deployment
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.operator import script_for
+from canshaper_sim.strokes import Script, Stroke
+from tests.rigs.files import read
+from tests.rigs.overhead import FILE, changed
+
+OWN = RopeFilter("the file's", {})
+
+
+def residual_deg(file: Path, error_pct: float, strokes: list[Stroke], rope_m: float) -> float:
+    """Swing that is left 10 s after the last stroke."""
+    end_s = max(one.end_s for one in strokes) + 10.0
+    overhead = replace(CraneParameters().overhead, rope_m=rope_m, rope_error_pct=error_pct)
+    parameters = CraneParameters(overhead=overhead)
+    recording = drive(read(file), Script("one", tuple(strokes), end_s + 4.0), parameters=parameters)
+    assert recording.crane is not None
+    swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
+    return max(deg for time_s, deg in swing if time_s >= end_s)
+
+
+def test_both_axes_while_the_load_is_hoisted() -> None:
+    strokes = [Stroke("bridge", 0.5, 4.0, 1.0), Stroke("hoist", 1.0, 5.0, 1.0)]
+    strokes.append(Stroke("trolley", 1.5, 3.0, 1.0))
+    assert residual_deg(FILE, 0.0, strokes, 5.0) < 0.6
+
+
+@pytest.mark.slow
+def test_what_the_file_leaves_with_every_rope_still_and_hoisted() -> None:
+    left = [
+        left_deg(read(FILE), (OWN, rope_m, work, strokes))
+        for rope_m in ROPES_M
+        for work, strokes in tasks(rope_m)
+    ]
+    assert sum(left) / len(left) < 0.15
+    assert max(left) < 0.4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("error_pct", [-5.0, 5.0])
+def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
+    for rope_m in ROPES_M:
+        for _, strokes in tasks(rope_m):
+            assert residual_deg(FILE, error_pct, strokes, rope_m) < 2.0
+
+
+@pytest.mark.slow
+def test_every_filter_that_is_compared_is_driven() -> None:
+    """With ropes of another length the filter for one leaves more, those that follow do not."""
+    deployment = read(FILE)
+    strokes = dict(tasks(5.0))["still"]
+    left = {
+        one.name: left_deg(deployment, (one, 5.0, "still", strokes))
+        for one in rope_filters(deployment)
+    }
+    assert left["off"] > 10.0
+    assert left["ZVD for 8 m"] > 1.0
+    assert max(left[name] for name in ("ZV by length", "G_FF by length", "the file's")) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (", hoist: hoist }", " }", "expected bridge, trolley and hoist in crane, without hoist"),
+        (
+            "length: { bus: crane, message: CranePosition, signal: RopeLength, timeout_ms: 200,"
+            " lowest_m: 1.5, highest_m: 30 }",
+            "origin: { date: 2026-01-01, by: hand }",
+            "axes.bridge.sway: expected length, by which filters are compared",
+        ),
+    ],
+)
+def test_what_cannot_be_compared_is_said(tmp_path: Path, old: str, new: str, says: str) -> None:
+    with pytest.raises(DesignError, match=says):
+        rope_filters(load_deployment(changed(tmp_path, (old, new))))
+
+
+AXES = [
+    ("bridge: bridge", "bridge: long_travel"),
+    ("\n  bridge:\n", "\n  long_travel:\n"),
+    ("hoist: hoist", "hoist: main_hoist"),
+    ("\n  hoist:\n", "\n  main_hoist:\n"),
+]
+
+
+def test_axes_may_have_any_name(tmp_path: Path) -> None:
+    deployment = load_deployment(changed(tmp_path, *AXES))
+    for name in ("pulse-bridge", "pulse-long_travel"):
+        assert script_for(deployment, name).axes == ("long_travel",)
+    short = replace(script_for(deployment, "pulse-bridge"), duration_s=7.0)
+    recording = drive(deployment, short)
+    assert max(recording.axes["long_travel"].speed) == pytest.approx(1.0, abs=0.01)
+    assert max(recording.axes["long_travel"].sway_deg or []) > 0.3
+    assert recording.axes["main_hoist"].sway_deg is None
+    assert recording.crane is not None
+    assert 2.0 < recording.crane.tip_m[-1][0] < 6.0
+    assert recording.crane.tip_m[-1][1] == 0.0
+    assert recording.dwell_s == 10.0
+
+
+def test_a_script_of_another_crane_is_refused_in_a_line() -> None:
+    says = "script pulse-slew moves slew; the crane has bridge, trolley, hoist"
+    with pytest.raises(DesignError, match=says):
+        script_for(read(FILE), "pulse-slew")
