@@ -3,7 +3,7 @@
 import logging
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.blackbox.recorder import Recorder
@@ -11,6 +11,9 @@ from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.daemon.control_server import ControlServer
 from canshaper.machine.deployment import Deployment
+
+if TYPE_CHECKING:
+    from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
 log = logging.getLogger("canshaper")
 
@@ -23,17 +26,22 @@ class Control:
         controller: the machine.
         recorder: takes the numbers that were changed.
         black_box: takes requests for a file.
+        rehearsal: makes faults, where the file allows that.
     """
 
     def __init__(
         self,
         server: ControlServer,
         controller: Controller,
-        recorder: Recorder,
+        recorder: "Recorder | Rehearsal",
         black_box: BlackBox,
+        rehearsal: "Rehearsal | None",
     ) -> None:
         self._server, self._recorder, self._black_box = server, recorder, black_box
         self._adjuster = Adjuster(controller)
+        self._rehearsal = rehearsal
+        if rehearsal:
+            rehearsal.connected = server.connected
 
     def serve(self, now_ns: int) -> None:
         """Answer one request, where one waits."""
@@ -44,12 +52,16 @@ class Control:
         self._server.close()
 
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
-        values = request.get("set", {})
+        values, asks = request.get("set", {}), peer
         if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
             peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
-        if request.keys() - {"set", "black_box", "by"} or not isinstance(values, dict):
-            expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
+        if request.keys() - {"set", "black_box", "fault", "by"} or not isinstance(values, dict):
+            expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"} or {"fault": NAME}'
             raise ValueError(f"expected {expected}, got another object")
+        if "fault" in request:
+            if self._rehearsal is None:
+                raise ValueError("faults are rehearsed where the file has control.rehearse_faults")
+            return {"fault": self._rehearsal.answer(request["fault"], asks, peer)}
         if "black_box" in request:
             if request["black_box"] == "write":
                 self._black_box.request()
@@ -70,8 +82,9 @@ class Control:
 def open_control(
     deployment: Deployment,
     controller: Controller,
-    recorder: Recorder,
+    recorder: "Recorder | Rehearsal",
     black_box: BlackBox,
+    rehearsal: "Rehearsal | None" = None,
 ) -> Control | None:
     """Open the control socket that a file has; None where it cannot: the machine works without."""
     control = deployment.config.control
@@ -82,4 +95,4 @@ def open_control(
     except OSError as error:
         log.warning("control=none socket=%s %s", path, error.strerror or error)
         return None
-    return Control(server, controller, recorder, black_box)
+    return Control(server, controller, recorder, black_box, rehearsal)
