@@ -130,7 +130,6 @@ def test_black_boxes_are_written_where_the_daemon_was_started_with(
 
 
 def test_a_request_that_is_none_is_answered_with_what_is_one(bench: Bench, path: Path) -> None:
-    assert answered(bench, path, {"get": 1}) == {
-        "erro"
-        "r": 'expected {} or {"set": {KEY: VALUE}} or {"black_box": "write"}, got another object'
-    }
+    keys = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"} or {"fault": NAME}'
+    error = f"expected {keys}, got another object"
+    assert answered(bench, path, {"get": 1}) == {"error": error}

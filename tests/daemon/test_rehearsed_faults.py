@@ -9,7 +9,7 @@ import cantools
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.velocity import VelocitySignal
 from canshaper.daemon.rehearsal.fault import Editor
 from canshaper.daemon.rehearsal.faults import rehearsed_faults
 from canshaper.daemon.rehearsal.joystick import _codes

@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import pytest
 
-from canshaper.controller import ends
+from canshaper.controller import demands as ends
 from canshaper.controller.controller import Controller
 from canshaper.shaping.demands import FlowBudget
 from tests.faults.judge import Violation
