@@ -129,7 +129,8 @@ class Demands:
     by one that asks, signal by signal, for no more than it does itself, and in no other direction
     (``no_more``): a fault only takes. And a frame that takes something back from what the
     controller was told is never replaced, held or dropped: it passes as it is and ends the fault
-    (``takes_back``). Gate and controller get the same frames, behind the fault.
+    (``takes_back``). Gate and controller get the same frames, behind the fault. The end of a
+    release that was rehearsed is the edge of a switch: in neutral it resets, and moves nothing.
     """
 
     def __init__(self, deployment: Deployment) -> None:
