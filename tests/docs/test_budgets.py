@@ -64,7 +64,7 @@ LINES = {
         4_818,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (60_120, "a new ability takes the room of an old one"),
+    "canshaper": (60_118, "a new ability takes the room of an old one"),
     "tests": (94_040, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.

@@ -131,6 +131,9 @@ class Demands:
     controller was told is never replaced, held or dropped: it passes as it is and ends the fault
     (``takes_back``). Gate and controller get the same frames, behind the fault. The end of a
     release that was rehearsed is the edge of a switch: in neutral it resets, and moves nothing.
+
+    Open: behind altered counters or lost frames the sequence check may refuse the frame that ends
+    the fault, so what is let go counts as many frames later as that check needs.
     """
 
     def __init__(self, deployment: Deployment) -> None:
