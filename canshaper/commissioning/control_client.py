@@ -6,7 +6,7 @@ import os
 import socket
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from canshaper.daemon.control_server import MOST_BYTES
 from canshaper.errors import ControlError
@@ -80,21 +80,63 @@ def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
     return str(now["folder"])
 
 
-def _ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as one:
-        one.settimeout(ANSWER_S)
+class Connection:
+    """A connection to the control socket of a daemon, to be closed.
+
+    Args:
+        path: its control socket.
+
+    Raises:
+        ControlError: no daemon answers.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.settimeout(ANSWER_S)
         try:
-            one.connect(str(path))
-            one.send(json.dumps(request).encode())
-            data = one.recv(MOST_BYTES)
-        except TimeoutError:
-            raise ControlError(f"{path}: the daemon does not answer") from None
+            self._socket.connect(str(path))
         except OSError as error:
-            text = error.strerror or str(error)
-            raise ControlError(f"{path}: {text}: no daemon with a control section?") from None
-    if not data:
-        raise ControlError(f"{path}: the daemon takes no more connections now")
-    answer: dict[str, Any] = json.loads(data)
-    if "error" in answer:
-        raise ControlError(str(answer["error"]))
-    return answer
+            self.close()
+            raise self._lost(error) from None
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    def close(self) -> None:
+        """Close it."""
+        self._socket.close()
+
+    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the answer to a request.
+
+        Raises:
+            ControlError: the daemon does not answer, or it refuses.
+        """
+        try:
+            self._socket.send(json.dumps(request).encode())
+            data = self._socket.recv(MOST_BYTES)
+        except OSError as error:
+            raise self._lost(error) from None
+        if not data:
+            raise ControlError(f"{self._path}: the daemon takes no more connections now")
+        answer: dict[str, Any] = json.loads(data)
+        if "error" in answer:
+            raise ControlError(str(answer["error"]))
+        return answer
+
+    def _lost(self, error: OSError) -> ControlError:
+        if isinstance(error, TimeoutError):
+            return ControlError(f"{self._path}: the daemon does not answer")
+        text = error.strerror or str(error)
+        return ControlError(f"{self._path}: {text}: no daemon with a control section?")
+
+
+def _ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
+    with Connection(path) as one:
+        return one.ask(request)

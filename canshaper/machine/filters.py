@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from canshaper.config.adjust import Key, adjusted, faults
+from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.filters import Breakpoint, Filter, Profile
 from canshaper.config.limits import Sway
 from canshaper.config.schema import AxisSection, DeploymentConfig
@@ -101,8 +102,9 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that every adjustable number can be changed in motion."""
+    """Check that every adjustable number can be changed in motion, and speed while faults are."""
     add, adjustable = diagnostics.add, config.control.adjustable if config.control else {}
+    slow = config.control is not None and config.control.rehearse_faults
     for text, (low, high) in adjustable.items():
         place = ("control", "adjustable", text)
         key = Key.parsed(text)
@@ -111,6 +113,16 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         elif diagnostics.check_axis(place, key.axis, config.axes):
             for fault in faults(key, config.axes[key.axis], low, high):
                 add(place, fault)
+            if slow and key.name == "max_pct" and high > REDUCED_PCT:
+                add(place, f"expected up to {REDUCED_PCT:g} with rehearse_faults, got {high:g}")
+    fast: dict[Place, float] = {}
+    if slow:
+        fast = {("axes", n, "limits", "max_pct"): a.limits.max_pct for n, a in config.axes.items()}
+        fast |= {("motion", n, "max_pct"): one.max_pct for n, one in config.motion.items()}
+    for where, most in fast.items():
+        if most > REDUCED_PCT:
+            text = f"expected up to {REDUCED_PCT:g} with control.rehearse_faults"
+            add(where, f"{text}, got {most:g}")
 
 
 def filter_fault(

@@ -16,6 +16,7 @@ from canshaper.commissioning.procedure.state import (
     Step,
 )
 from canshaper.commissioning.procedure.steps.drive import DRIVE
+from canshaper.commissioning.rehearsal.run import kept, table
 from canshaper.machine.deployment import Deployment
 from canshaper.report import html
 from canshaper.report.console import new_table
@@ -78,6 +79,8 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     for row in origins(deployment.config):
         numbers.add_row(*row)
     parts = [html.table(by_hand), html.table(summary), html.table(numbers)]
+    if faults := kept(folder):
+        parts.append(html.table(table(faults)))
     for name, one in steps.items():
         parts += _step(name, one, folder)
     drive = steps.get(DRIVE.name)
