@@ -91,7 +91,9 @@ class BlackBox:
             except OSError as error:
                 self._log_fault(error.errno or 1)
 
-    def around(self, guarded: Guarded, controller: Controller) -> Recorder:
+    def around(
+        self, guarded: Guarded, controller: Controller, kind: type[Recorder] = Recorder
+    ) -> Recorder:
         """Return a recorder of all calls to a controller and their results; ``begin`` starts it."""
         deployment = controller.deployment
         self._flush()
@@ -107,7 +109,7 @@ class BlackBox:
             log.warning("black-box=none %s", error)
         if self._folder:
             self._number = max(self._number, last_number(self._folder, deployment.path.stem))
-        self._recorder = Recorder(guarded, controller, self._ring)
+        self._recorder = kind(guarded, controller, self._ring)
         return self._recorder
 
     def begin(self, now_ns: int) -> None:

@@ -1,4 +1,4 @@
-"""The other end of the control socket: for ``canshaper set``, ``metrics`` and the live page."""
+"""The other end of the control socket: for ``set``, ``fault``, ``metrics`` and the live page."""
 
 import getpass
 import json
@@ -6,7 +6,7 @@ import os
 import socket
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from canshaper.daemon.control_server import MOST_BYTES
 from canshaper.errors import ControlError
@@ -56,6 +56,21 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
     _ask(path, {"set": dict(values), "by": f"{person()}/{by}" if by else person()})
 
 
+def rehearse(path: Path, what: str) -> dict[str, Any]:
+    """Let a running daemon make a fault, or end it, or ask what has become of it.
+
+    Args:
+        path: its control socket.
+        what: name of a fault, ``report`` or ``end``.
+
+    Raises:
+        ControlError: no daemon answers, or it refuses.
+    """
+    answer = _ask(path, {"fault": what, "by": person()})["fault"]
+    assert isinstance(answer, dict)
+    return answer
+
+
 def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
     """Let a running daemon write its black box, and wait for that.
 
@@ -80,63 +95,21 @@ def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
     return str(now["folder"])
 
 
-class Connection:
-    """A connection to the control socket of a daemon, to be closed.
-
-    Args:
-        path: its control socket.
-
-    Raises:
-        ControlError: no daemon answers.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.settimeout(ANSWER_S)
-        try:
-            self._socket.connect(str(path))
-        except OSError as error:
-            self.close()
-            raise self._lost(error) from None
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close it."""
-        self.close()
-
-    def close(self) -> None:
-        """Close it."""
-        self._socket.close()
-
-    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the answer to a request.
-
-        Raises:
-            ControlError: the daemon does not answer, or it refuses.
-        """
-        try:
-            self._socket.send(json.dumps(request).encode())
-            data = self._socket.recv(MOST_BYTES)
-        except OSError as error:
-            raise self._lost(error) from None
-        if not data:
-            raise ControlError(f"{self._path}: the daemon takes no more connections now")
-        answer: dict[str, Any] = json.loads(data)
-        if "error" in answer:
-            raise ControlError(str(answer["error"]))
-        return answer
-
-    def _lost(self, error: OSError) -> ControlError:
-        if isinstance(error, TimeoutError):
-            return ControlError(f"{self._path}: the daemon does not answer")
-        text = error.strerror or str(error)
-        return ControlError(f"{self._path}: {text}: no daemon with a control section?")
-
-
 def _ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
-    with Connection(path) as one:
-        return one.ask(request)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as one:
+        one.settimeout(ANSWER_S)
+        try:
+            one.connect(str(path))
+            one.send(json.dumps(request).encode())
+            data = one.recv(MOST_BYTES)
+        except TimeoutError:
+            raise ControlError(f"{path}: the daemon does not answer") from None
+        except OSError as error:
+            text = error.strerror or str(error)
+            raise ControlError(f"{path}: {text}: no daemon with a control section?") from None
+    if not data:
+        raise ControlError(f"{path}: the daemon takes no more connections now")
+    answer: dict[str, Any] = json.loads(data)
+    if "error" in answer:
+        raise ControlError(str(answer["error"]))
+    return answer

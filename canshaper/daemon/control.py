@@ -3,7 +3,7 @@
 import logging
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.blackbox.recorder import Recorder
@@ -12,9 +12,6 @@ from canshaper.controller.controller import Controller
 from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.reporter import Reporter
 from canshaper.machine.deployment import Deployment
-
-if TYPE_CHECKING:
-    from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
 log = logging.getLogger("canshaper")
 
@@ -28,24 +25,19 @@ class Control:
         recorder: takes the numbers that were changed.
         black_box: takes requests for a file.
         reporter: knows state, counters and lateness.
-        rehearsal: makes faults, where the file allows that.
     """
 
     def __init__(
         self,
         server: ControlServer,
         controller: Controller,
-        recorder: "Recorder | Rehearsal",
+        recorder: Recorder,
         black_box: BlackBox,
         reporter: Reporter,
-        rehearsal: "Rehearsal | None",
     ) -> None:
         self._server, self._recorder, self._black_box = server, recorder, black_box
         self._reporter = reporter
         self._adjuster = Adjuster(controller)
-        self._rehearsal = rehearsal
-        if rehearsal:
-            rehearsal.connected = server.connected
 
     def serve(self, now_ns: int) -> None:
         """Answer one request, where one waits."""
@@ -56,7 +48,7 @@ class Control:
         self._server.close()
 
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
-        values, asks = request.get("set", {}), peer
+        values = request.get("set", {})
         if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
             peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
         known = {"set", "black_box", "by", "status", "fault"}
@@ -65,9 +57,7 @@ class Control:
             expected += ', {"fault": NAME}'
             raise ValueError(f"expected {expected}, got another object")
         if "fault" in request:
-            if self._rehearsal is None:
-                raise ValueError("faults are rehearsed where the file has control.rehearse_faults")
-            return {"fault": self._rehearsal.answer(request["fault"], asks, peer)}
+            return {"fault": self._recorder.rehearse(request["fault"], peer)}
         if "black_box" in request:
             if request["black_box"] == "write":
                 self._black_box.request()
@@ -90,10 +80,9 @@ class Control:
 def open_control(
     deployment: Deployment,
     controller: Controller,
-    recorder: "Recorder | Rehearsal",
+    recorder: Recorder,
     black_box: BlackBox,
     reporter: Reporter,
-    rehearsal: "Rehearsal | None" = None,
 ) -> Control | None:
     """Open the control socket that a file has; None where it cannot: the machine works without."""
     control = deployment.config.control
@@ -104,4 +93,4 @@ def open_control(
     except OSError as error:
         log.warning("control=none socket=%s %s", path, error.strerror or error)
         return None
-    return Control(server, controller, recorder, black_box, reporter, rehearsal)
+    return Control(server, controller, recorder, black_box, reporter)

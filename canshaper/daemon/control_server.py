@@ -72,10 +72,6 @@ class ControlServer:
             self._not_before_ns = now_ns + LEAST_BETWEEN_NS
             return
 
-    def connected(self, peer: str) -> bool:
-        """Whether a client is there that asks as this one."""
-        return any(_peer(client) == peer for client in self._clients.values())
-
     def close(self) -> None:
         """End; the path is free again."""
         for number in [*self._clients]:

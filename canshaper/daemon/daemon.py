@@ -9,6 +9,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
+from canshaper.blackbox.recorder import Recorder
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
@@ -36,10 +37,8 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 
 if TYPE_CHECKING:
-    from canshaper.blackbox.recorder import Recorder
     from canshaper.daemon.control import Control
     from canshaper.daemon.gateway import InlineGateway
-    from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
 log = logging.getLogger("canshaper")
 
@@ -75,7 +74,6 @@ class Daemon:
         self._ports = opened_ports(deployment, self._on_fault, self._manager)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)
-        self._rehearsal: Rehearsal | None = None
         self._use(deployment)
         self._control = self._open_control(deployment)
 
@@ -187,21 +185,20 @@ class Daemon:
     # -- deployments ---------------------------------------------------------------------------
 
     def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
-        if self._rehearsal:
-            self._rehearsal.end("the file was read again")
-            self._rehearsal = None
+        if before:
+            self._recorder.reloads()
         self._controller = Controller(deployment)
         guarded = Guarded(self._controller)
         if before:
             self._controller.carry_over(before)
             guarded.carry_over(self._guarded)
         self._guarded: Guarded = guarded
-        recorder = self._black_box.around(guarded, self._controller)
-        self._recorder: Recorder | Rehearsal = recorder
+        kind = Recorder
         if deployment.config.control and deployment.config.control.rehearse_faults:
-            from canshaper.daemon.rehearsal import rehearsal
+            from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
-            self._recorder = self._rehearsal = rehearsal.Rehearsal(recorder, self._controller)
+            kind = Rehearsal
+        self._recorder = self._black_box.around(guarded, self._controller, kind)
         self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._follower = tick_follower(deployment, self._controller)
@@ -221,7 +218,7 @@ class Daemon:
         from canshaper.daemon.control import open_control
 
         parts = self._controller, self._recorder, self._black_box, self._reporter
-        return open_control(deployment, *parts, self._rehearsal)
+        return open_control(deployment, *parts)
 
     def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment, if its buses can be opened; else go on as before.

@@ -12,7 +12,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.velocity import VelocitySignal
 from canshaper.daemon.rehearsal.fault import Editor
 from canshaper.daemon.rehearsal.faults import rehearsed_faults
-from canshaper.daemon.rehearsal.joystick import _codes
+from canshaper.daemon.rehearsal.joystick import fault_codes
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import Reason
@@ -68,9 +68,11 @@ def test_a_check_is_spoiled_and_no_signal(protected: Deployment) -> None:
 def test_a_count_is_another_and_its_check_is_right(protected: Deployment) -> None:
     editor, frame = frames(protected, next(iter(protected.joysticks)))
     check, counts = editor.bound.protection.check, editor.bound.protection.counts
-    other = editor.counted(frame, editor.count(frame) + 3)
+    seen: list[int] = []
+    other = editor.counted(frame, lambda count: seen.append(count) or count + 3)
+    editor.counted(other, lambda count: seen.append(count) or count)
     assert check is not None
-    assert editor.count(other) == (editor.count(frame) + 3) % counts
+    assert seen[1] == (seen[0] + 3) % counts
     assert check.verify(other.data)
 
 
@@ -79,8 +81,7 @@ def test_a_float_joystick_is_no_number() -> None:
     velocity = VelocitySignal.of(message.signals[0])
     joystick: Any = SimpleNamespace(message=message, velocities=[velocity])
     for reason in (Reason.JOYSTICK_NOT_A_NUMBER, Reason.JOYSTICK_OUT_OF_RANGE):
-        code = _codes(joystick, reason, {"X": 0.5})["X"]
-        assert velocity.read(code) is reason
+        assert velocity.read(fault_codes(joystick)[reason]["X"]) is reason
 
 
 def test_a_joystick_that_may_stand_for_long_is_not_frozen(machine: Machine) -> None:

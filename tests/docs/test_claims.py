@@ -12,8 +12,6 @@ from collections.abc import Iterator
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.commissioning.rehearsal.reactions import NONE as NO_STOP
-from canshaper.commissioning.rehearsal.reactions import Row
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason
 from tests.docs.pages import ROOT
 from tools import reactions
@@ -102,7 +100,7 @@ def test_a_claim_that_is_wrong_is_seen(entry: str, fault: str | None) -> None:
 
 
 def test_a_row_says_the_reaction_of_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = Row("EMERGENCY_STOP", said=NO_STOP)
+    wrong = reactions.Row("EMERGENCY_STOP", "", "promises/test_1", "", reactions.NONE)
     monkeypatch.setattr(reactions, "ROWS", (wrong,))
     with pytest.raises(ValueError, match=r"^expected one reaction of EMERGENCY_STOP, got "):
         list(reactions.reaction_rows())

@@ -294,9 +294,6 @@ class Requests:
                 self._bench.refused += 1
         self._bench.requests.clear()
 
-    def connected(self, _peer: str) -> bool:
-        return True
-
     def close(self) -> None: ...
 
 

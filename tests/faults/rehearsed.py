@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.rehearsal.verdict import Verdict, judged
+from canshaper.commissioning.procedure.rehearsed import Row, judged
 from canshaper.daemon.rehearsal.fault import Fault
 from canshaper.daemon.rehearsal.faults import rehearsed_faults
 from canshaper.machine.binding import load_deployment
@@ -66,7 +66,7 @@ class Rehearsed:
         answers: how each ended.
         fault: the one that is rehearsed.
         report: what the daemon said of it last.
-        present: whether the client is still connected.
+        present: whether the client goes on asking.
         made_s: when a hand saw that it was made.
         refused: why the daemon has refused a fault.
         settles: the joystick comes back before the next fault.
@@ -112,7 +112,7 @@ class Rehearsed:
         assert self._over, f"{self.fault.name} did not end: {self.report}"
         return self.answers
 
-    def verdicts(self) -> list[Verdict]:
+    def verdicts(self) -> list[Row]:
         """What a person is shown."""
         return [judged(self.faults[n], one, self.deployment) for n, one in self.answers.items()]
 
@@ -126,9 +126,6 @@ class Rehearsed:
             except StopIteration:
                 self._over = True
                 self.world.at(self.world.now_ns + 1, lambda: self.bench.signal(15))
-
-    def connected(self, _peer: str) -> bool:
-        return self.present
 
     def close(self) -> None: ...
 
@@ -160,7 +157,7 @@ class Rehearsed:
             self.report = dict(self.ask("report"))
             while self.report["phase"] != "done":
                 world.healthy = self._hand(self, world.now_ns / 1e9 - since_s)
-                yield 0.0
+                yield 0.0 if self.present else 2.0
                 self.report = dict(self.ask("report"))
             self.answers[name] = self.report
             self.present = True

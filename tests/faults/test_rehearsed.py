@@ -5,16 +5,22 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.commissioning.rehearsal.reactions import NEVER, ROWS
-from canshaper.commissioning.rehearsal.run import ELSEWHERE, refused
-from canshaper.commissioning.rehearsal.verdict import GOOD, UNMADE, Verdict
+from canshaper.commissioning.procedure.rehearsed import (
+    GOOD,
+    NEVER,
+    UNDONE,
+    Row,
+    reaction_of,
+    refused,
+)
 from canshaper.config.bus import REDUCED_PCT
-from canshaper.daemon.rehearsal import rehearsal
-from canshaper.daemon.rehearsal.fault import Demands
+from canshaper.daemon.rehearsal import fault, rehearsal
+from canshaper.daemon.rehearsal.fault import no_more, takes_back
 from canshaper.machine.binding import load_deployment
 from tests.faults.judge import Violation
 from tests.faults.rehearsed import HALF, Hand, Rehearsed, faults_of, held, slow_file
 from tests.faults.shipped import NAMES
+from tools import reactions
 
 # Each kind once, where it is quick.
 QUICK = {
@@ -55,7 +61,7 @@ def of(name: str, faults: tuple[str, ...]) -> list[str]:
     return [one for one in faults if one in faults_of(name)]
 
 
-def rehearsed(name: str, faults: list[str], hand: Hand = held, seed: int = 1) -> list[Verdict]:
+def rehearsed(name: str, faults: list[str], hand: Hand = held, seed: int = 1) -> list[Row]:
     run = Rehearsed(name, faults, hand, seed)
     run.run()
     return run.verdicts()
@@ -64,24 +70,31 @@ def rehearsed(name: str, faults: list[str], hand: Hand = held, seed: int = 1) ->
 @pytest.mark.parametrize(("name", "faults"), CASES, ids=[f"{n}: {f[0]}" for n, f in CASES])
 def test_a_rehearsed_fault_has_its_reaction(name: str, faults: tuple[str, ...]) -> None:
     for one in rehearsed(name, of(name, faults)):
-        assert one.verdict == GOOD, one
+        assert one["verdict"] == GOOD, one
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_fault_of_every_machine_has_its_reaction(name: str) -> None:
-    wrong = [one for one in rehearsed(name, list(faults_of(name))) if one.verdict != GOOD]
+    wrong = [one for one in rehearsed(name, list(faults_of(name))) if one["verdict"] != GOOD]
     assert not wrong
 
 
 def test_every_row_is_rehearsed_somewhere_or_says_why_not() -> None:
     made = {one.claim for name in NAMES for one in faults_of(name).values()}
-    claims = {claim for row in ROWS for claim in row.ids.split(", ")}
+    claims = {claim for row in reactions.ROWS for claim in row.ids.split(", ")}
     assert made.isdisjoint(NEVER)
     assert claims - made == NEVER.keys() | {"JOYSTICK_NOT_A_NUMBER"}  # no shipped one has a float
     here = refused(load_deployment(slow_file("forwarder")))
     assert here["R3"] == NEVER["R3"]
-    assert here["VALVE_FAULT"] == ELSEWHERE
+    assert here["VALVE_FAULT"] == "no part of this machine can have it"
+
+
+def test_a_rehearsal_expects_what_the_page_says() -> None:
+    rows = [line.split(" | ") for line in reactions.reaction_rows()][2:]
+    said = {claim: row[2] for row in rows for claim in row[0].removeprefix("| ").split(", ")}
+    made = {one.claim for name in NAMES for one in faults_of(name).values()}
+    assert {claim: reaction_of(claim) for claim in made} == {one: said[one] for one in made}
 
 
 # -- what the person does -------------------------------------------------------------------------
@@ -100,7 +113,10 @@ def let_go(after_s: float, deflection: float = 0.0) -> Hand:
     return hand
 
 
-FAULTS = ("silent:right", "frozen:right", "frozen_counter:right", "standstill:loop")
+FAULTS = (
+    *("silent:right", "frozen:right", "frozen_counter:right", "jumping_counter:right"),
+    *("one_wrong_frame:right", "standstill:loop"),
+)
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -120,29 +136,42 @@ def test_the_judge_sees_a_fault_that_hides_a_release(monkeypatch: pytest.MonkeyP
         return int(run.report["phase"] != "made"), 0, HALF
 
     Rehearsed("forwarder", ["silent:right"], released).run()
-    monkeypatch.setattr(Demands, "takes_back", lambda *_: False)
+    monkeypatch.setattr(rehearsal, "takes_back", lambda *_: False)
     with pytest.raises(Violation):
         Rehearsed("forwarder", ["silent:right"], released).run()
 
 
+def test_what_is_let_go_in_a_frame_that_does_not_count_trips(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = Rehearsed("forwarder", ["frozen_counter:right"], let_go(0.04, -HALF))
+    run.run()
+    assert ["TRIPPED", "LOOP_STALLED"] in [event[2:] for event in run.report["events"]]
+    monkeypatch.setattr(rehearsal.Rehearsal, "_holds_more", lambda *_: False)
+    with pytest.raises(Violation):
+        Rehearsed("forwarder", ["frozen_counter:right"], let_go(0.04, -HALF)).run()
+
+
 def test_the_judge_sees_a_fault_that_asks_for_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Demands, "takes_back", lambda *_: False)
+    monkeypatch.setattr(rehearsal, "takes_back", lambda *_: False)
     Rehearsed("forwarder", ["frozen:right"], let_go(0.06)).run()
-    monkeypatch.setattr(Demands, "no_more", lambda *_: True)
+    for module in (rehearsal, fault):
+        monkeypatch.setattr(module, "no_more", lambda *_: True)
     with pytest.raises(Violation):
         Rehearsed("forwarder", ["frozen:right"], let_go(0.06)).run()
 
 
 def test_a_frame_that_asks_for_more_is_never_handed_on() -> None:
     real = {"a": 0.5, "b": -0.5, "on": 0.0}
-    assert Demands.no_more({"a": 0.5, "b": -0.2, "on": 0.0}, real)
-    assert Demands.no_more({}, real)
+    assert no_more({"a": 0.5, "b": -0.2, "on": 0.0}, real)
+    assert no_more({}, real)
     for wrong in ({"a": 0.51}, {"a": -0.1}, {"b": -0.6}, {"b": 0.1}, {"on": 1.0}):
-        assert not Demands.no_more(wrong, real)
+        assert not no_more(wrong, real)
     told = {"a": 0.5, "on": 1.0}
-    assert not Demands.takes_back({"a": 0.46, "b": 1.0, "on": 1.0}, told)
-    for less in ({"a": 0.44}, {"a": -1.0}, {"on": 0.0}):
-        assert Demands.takes_back(less, told)
+    assert not takes_back({"a": 0.46, "b": 1.0, "on": 1.0}, told)
+    for less in ({"a": 0.44}, {"a": 0.0}, {"a": -1.0}, {"on": 0.0}):
+        assert takes_back(less, told)
+    assert takes_back({"a": 0.0}, {"a": 0.04})  # into the neutral band
 
 
 def anyhow(seed: int) -> Hand:
@@ -252,7 +281,7 @@ def test_a_fault_does_not_wait_for_its_axis_for_ever(monkeypatch: pytest.MonkeyP
     run = Rehearsed("forwarder", ["silent:left"], lambda *_: (1, 0, 0.0))
     run.run()
     (one,) = run.verdicts()
-    assert (one.verdict, one.happened) == (UNMADE, "its axis was not moved")
+    assert (one["verdict"], one["happened"]) == (UNDONE, "its axis was not moved")
 
 
 def test_an_emergency_that_is_real_outlives_the_rehearsed_one(
@@ -269,5 +298,5 @@ def test_an_emergency_that_is_real_outlives_the_rehearsed_one(
         return held(run, since_s)
 
     first, second = rehearsed("canopen-forwarder", ["emergency:slew", "second_sender:slew"], hand)
-    assert first.verdict == GOOD
-    assert (second.verdict, second.happened) == (UNMADE, "its axis was not moved")
+    assert first["verdict"] == GOOD
+    assert (second["verdict"], second["happened"]) == (UNDONE, "its axis was not moved")

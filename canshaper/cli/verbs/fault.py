@@ -1,7 +1,5 @@
 """``canshaper fault``: faults rehearsed at the running machine."""
 
-import json
-import time
 from pathlib import Path
 
 import typer
@@ -12,7 +10,6 @@ from canshaper.errors import UsageError
 GROUP = "setup"
 
 EXIT_WRONG_REACTION = 1
-POLL_S = 0.1
 
 
 def fault(
@@ -24,7 +21,6 @@ def fault(
     control: Path | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON, behind the questions."),
 ) -> None:
     """Rehearse faults at the running machine: is each reaction the one of the safety concept?
 
@@ -33,8 +29,7 @@ def fault(
     frozen or wrong for controller and gate alike, never with a larger demand than the joystick's.
     Whoever lets the joystick go ends the fault. It is over by itself after some seconds.
 
-    Ctrl-C ends the fault, and what moves trips. Results and a table to print are in
-    FILE.commission/; the report of canshaper commission has them too.
+    Ctrl-C ends the fault, and what moves trips. The report of canshaper commission has the table.
 
     Exit code 0 when each reaction was right, 1 when one was not or the daemon refuses, 2 when the
     file or the command line is wrong.
@@ -47,27 +42,17 @@ def fault(
 
       canshaper fault machine.yaml --only JOYSTICK_TIMEOUT --only standstill:loop
     """
-    from canshaper.commissioning.control_client import Connection
+    from canshaper.commissioning.procedure import rehearsed
     from canshaper.commissioning.procedure.files import Files
-    from canshaper.commissioning.rehearsal.reactions import row_of
-    from canshaper.commissioning.rehearsal.run import (
-        announced,
-        chosen,
-        keep,
-        refused,
-        rehearse,
-        table,
-    )
-    from canshaper.commissioning.rehearsal.verdict import GOOD
     from canshaper.report.console import SafeConsole, new_table
 
     deployment = loader(file)()
-    faults = chosen(deployment, only or [])
+    faults = rehearsed.chosen(deployment, only or [])
     if listed:
-        shown = new_table("fault", "row", "reaction")
+        shown = new_table("fault", "row", "expected")
         for one in faults:
-            shown.add_row(one.name, one.claim, row_of(one.claim).reaction)
-        for claim, why in refused(deployment).items():
+            shown.add_row(one.name, one.claim, rehearsed.expected(one))
+        for claim, why in rehearsed.refused(deployment).items():
             shown.add_row("", claim, f"not rehearsed: {why}")
         SafeConsole().print(shown)
         return
@@ -76,22 +61,21 @@ def fault(
     if section is None or not section.rehearse_faults:
         text = "expected control.rehearse_faults: true, and reduced speed, got none"
         raise UsageError(f"{deployment.path}: {text}")
-    verdicts = []
-    with Connection(control or control_socket(deployment)) as connection:
-        for number, one in enumerate(faults, 1):
-            row = row_of(one.claim)
-            echo(f"{number}/{len(faults)} {one.name}: {row.ids}: {row.what} -> {row.reaction}")
-            if not typer.confirm(f"  Then {announced(one, deployment)}. Make it?", err=as_json):
-                continue
-            verdicts.append(rehearse(connection, one, deployment, lambda _: time.sleep(POLL_S)))
-            echo(f"  {verdicts[-1].happened}: {verdicts[-1].verdict}")
-    rows = [one.as_dict() for one in verdicts]
-    if as_json:
-        echo(json.dumps(rows, indent=2))
-    elif rows:
-        SafeConsole().print(table(rows))
-    folder = Files(deployment.path).folder
-    with os_errors(folder):
-        echo(f"Written: {keep(folder, deployment, verdicts)}", err=as_json)
-    if any(one.verdict != GOOD for one in verdicts):
+    path, folder = control or control_socket(deployment), Files(deployment.path).folder
+    rows = []
+    for number, one in enumerate(faults, 1):
+        act = f"move {' or '.join(one.axes)} to about half and hold it until the fault is over"
+        echo(f"{number}/{len(faults)} {one.name}: {one.claim}: {rehearsed.expected(one)}")
+        act = act if one.axes else "let every joystick rest"
+        if not typer.confirm(f"  Then {act}. Make it?"):
+            continue
+        row = rehearsed.made(path, one, deployment)
+        rows.append(row)
+        with os_errors(folder):
+            kept = rehearsed.keep(folder, row)
+        echo(f"  {row['happened']}: {row['verdict']}")
+    if rows:
+        SafeConsole().print(rehearsed.table(rows))
+        echo(f"Kept in {kept}, for the report of canshaper commission.")
+    if any(row["verdict"] != rehearsed.GOOD for row in rows):
         raise typer.Exit(EXIT_WRONG_REACTION)

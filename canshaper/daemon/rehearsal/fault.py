@@ -1,12 +1,14 @@
 """A fault that is rehearsed, and the rule that keeps it from moving anything."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from canshaper.blackbox.recorder import Recorder
 from canshaper.codec.e2e import E2e
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.identifier import group_of
+from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import Bound
 from canshaper.shaping.states import Reason
@@ -14,10 +16,13 @@ from canshaper.shaping.states import Reason
 MS, S = 1_000_000, 1_000_000_000
 # A held joystick is not still: less than this part of full deflection is no letting go.
 SLACK = 0.05
-LONGEST_S = 30.0  # of a fault
 
 Asked = Mapping[str, float]
 """What frames ask for, by signal: a demand of [-1, 1]; 1 of a switch that lets move, else 0."""
+Alter = Callable[[Frame], tuple[Frame, ...]]
+"""What is received in place of a frame: itself alone, or others."""
+Begin = Callable[[Recorder, int], object]
+"""What is made once, at a time, at what stands behind the fault."""
 
 
 @dataclass(frozen=True)
@@ -29,16 +34,14 @@ class Fault:
         claim: its row in the table of reactions, see docs/safety.md.
         axes: of these one has to move; none: every axis is at rest.
         within_ns: when the reaction has to begin.
-        alter: what is received in place of a frame: itself, another one, or None.
+        alter: what is received in place of a frame.
         once: only one frame is altered.
-        age_ns: how much older a frame arrives.
-        begins, ends: frames of another sender, when it begins and when it is over.
-        copy: what another sender sends behind a frame, or None.
-        late: whether a tick is late, by its number.
-        stall: the late ticks are a standstill, in which nothing is read.
-        reports: what the bus reports.
+        age_ns: how much older an altered frame arrives.
+        begin: what is made once.
+        end: frame of another sender, when it is over.
+        late: numbers of the ticks that are late.
+        stands: the late ticks are a standstill, in which nothing is read.
         unsent: frames are reported as not sent, though they are.
-        off: name of the bus that is reported off.
         lasts_ns: it is over by itself after that; 0 until its reaction is over.
     """
 
@@ -46,17 +49,14 @@ class Fault:
     claim: str
     axes: tuple[str, ...]
     within_ns: int
-    alter: Callable[[Frame], Frame | None] = lambda frame: frame
+    alter: Alter = lambda frame: (frame,)
     once: bool = False
     age_ns: int = 0
-    begins: tuple[Frame, ...] = ()
-    ends: tuple[Frame, ...] = ()
-    copy: Callable[[Frame], Frame | None] = lambda _frame: None
-    late: Callable[[int], bool] = lambda _tick: False
-    stall: bool = False
-    reports: FrameFault | None = None
+    begin: Begin | None = None
+    end: Frame | None = None
+    late: range = range(0)
+    stands: bool = False
     unsent: bool = False
-    off: str = ""
     lasts_ns: int = 0
 
 
@@ -64,22 +64,19 @@ class Editor:
     """Recognises the frames of one message, and changes their bits; the check is made again."""
 
     def __init__(self, bound: Bound[Any]) -> None:
-        self.bound = bound
+        self.bound, self._protection = bound, bound.protection
         self._keys, self._length = frozenset(bound.keys), bound.message.length
 
     def has(self, frame: Frame) -> bool:
         """Whether it is a frame of this message, of its length and page."""
-        bound = self.bound
-        bus, can_id, extended = bound.key
-        if bound.any_source:
-            its = (frame[0], frame[2]) == (bus, extended)
-            its = its and group_of(frame[1]) == group_of(can_id)
-        else:
-            its = frame[:3] in self._keys
-        if not its or len(frame.data) != self._length:
-            return False
-        chosen = bound.chosen
-        return chosen is None or self.raw(frame)[chosen.signal] == chosen.value
+        bus, can_id, extended = self.bound.key
+        its = frame[:3] in self._keys
+        if self.bound.any_source:
+            same = group_of(frame.can_id) == group_of(can_id)
+            its = same and (frame.bus, frame.extended) == (bus, extended)
+        chosen = self.bound.chosen
+        its = its and len(frame.data) == self._length
+        return its and (chosen is None or self.raw(frame)[chosen.signal] == chosen.value)
 
     def raw(self, frame: Frame) -> dict[str, Any]:
         """Raw values."""
@@ -93,85 +90,93 @@ class Editor:
         encode, raw = self.bound.layout.encode, self.raw(frame)
         bits = zip(frame.data, encode(raw), encode({**raw, **values}), strict=True)
         data = bytes(byte ^ before ^ after for byte, before, after in bits)
-        check = self.bound.protection.check
+        check = self._protection.check
         if check is not None:
             data = check.protect(data, check.count(data) if isinstance(check, E2e) else 0)
         return frame._replace(data=data)
 
-    def count(self, frame: Frame) -> int:
-        """Its alive counter."""
-        protection = self.bound.protection
-        if isinstance(protection.check, E2e):
-            return protection.check.count(frame.data)
-        return int(self.raw(frame)[protection.counter or ""])
-
-    def counted(self, frame: Frame, count: int) -> Frame:
-        """The frame with another count."""
-        protection = self.bound.protection
-        count %= protection.counts
-        if isinstance(protection.check, E2e):
-            return frame._replace(data=protection.check.protect(frame.data, count))
-        return self.changed(frame, {protection.counter or "": count})
+    def counted(self, frame: Frame, new: Callable[[int], int]) -> Frame:
+        """The frame with another alive counter, by its own one."""
+        check, counts = self._protection.check, self._protection.counts
+        if isinstance(check, E2e):
+            count = new(check.count(frame.data)) % counts
+            return frame._replace(data=check.protect(frame.data, count))
+        name = self._protection.counter or ""
+        return self.changed(frame, {name: new(self.raw(frame)[name]) % counts})
 
     def spoiled(self, frame: Frame) -> Frame:
-        """The frame with a wrong check and every signal as it was."""
-        check = self.bound.protection.check
-        at, shift = (0, 0) if check is None or isinstance(check, E2e) else (check.byte, check.shift)
-        data = bytearray(frame.data)
-        data[at] ^= 1 << shift
+        """The frame with one bit of its check wrong, and every signal as it was."""
+        data, check = bytearray(frame.data), self._protection.check
+        data[getattr(check, "byte", 0)] ^= 1 << getattr(check, "shift", 0)
         return frame._replace(data=bytes(data))
 
 
+def no_more(altered: Asked, real: Asked) -> bool:
+    """Whether a frame asks for no more than the real one, and in no other direction."""
+    return all(min(0.0, of) <= altered.get(key, 0.0) <= max(0.0, of) for key, of in real.items())
+
+
+def takes_back(real: Asked, told: Asked) -> bool:
+    """Whether a frame asks for less than what was told, for nothing, or the other way."""
+    pairs = [(of, told.get(key, 0.0)) for key, of in real.items()]
+    return any(was and (of * was <= 0.0 or abs(of) < abs(was) - SLACK) for of, was in pairs)
+
+
 class Demands:
-    """What the frames of joysticks, switches and emergency stop ask for, and the one rule.
+    """What joysticks, switches and emergency stop ask for, and the rule: a fault only takes.
 
-    Nothing moves that the joystick did not ask for, because of two facts. A frame is replaced only
-    by one that asks, signal by signal, for no more than it does itself, and in no other direction
-    (``no_more``): a fault only takes. And a frame that takes something back from what the
-    controller was told is never replaced, held or dropped: it passes as it is and ends the fault
-    (``takes_back``). Gate and controller get the same frames, behind the fault. The end of a
-    release that was rehearsed is the edge of a switch: in neutral it resets, and moves nothing.
+    Nothing moves that the joystick did not ask for, and what it takes back acts as without a fault:
 
-    Open: behind altered counters or lost frames the sequence check may refuse the frame that ends
-    the fault, so what is let go counts as many frames later as that check needs.
+    - A frame is replaced only by one that asks, signal by signal, for no more than it does itself,
+      and in no other direction (``no_more``).
+    - A frame that takes something back from what the controller was told, or holds, is never
+      replaced, held or dropped: it passes as it is and ends the fault (``takes_back``).
+    - Where the controller refuses that frame, because frames before it were lost or had other
+      counts, and so holds more than it asks for, what moves trips.
+
+    Gate and controller get the same frames, behind the fault. The end of a release that was
+    rehearsed is the edge of a switch: in neutral it resets, and moves nothing.
     """
 
     def __init__(self, deployment: Deployment) -> None:
         self._inputs: list[tuple[str, Editor, tuple[Any, ...], list[tuple[str, int]]]] = []
-        conditions = {(of, name) for one in deployment.joysticks.values() for of, name in
-                      one.conditions}  # fmt: skip
-        for joystick in deployment.joysticks.values():
-            own = [(name, 1) for of, name in sorted(conditions, key=str) if of == joystick.name]
+        joysticks, self._bands = deployment.joysticks.values(), dict[str, float]()
+        conditions = {one for joystick in joysticks for one in joystick.conditions}
+        for joystick in joysticks:
+            own = [(name, 1) for of, name in conditions if of == joystick.name]
             self._inputs.append((joystick.name, Editor(joystick), joystick.velocities, own))
         for one in deployment.switches:
             self._inputs.append((str([*one.switches]), Editor(one), (), [*one.switches.values()]))
         if stop := deployment.emergency_stop:
-            self._inputs.append(("stop", Editor(stop), (), [(stop.config.signal, 0)]))
+            self._inputs.append(("emergency stop", Editor(stop), (), [(stop.config.signal, 0)]))
+        for axis in deployment.axes.values():
+            command = axis.config.command
+            key, band = f"{command.joystick} {command.signal}", command.neutral_pct / 100.0
+            self._bands[key] = min(band, self._bands.get(key, 1.0))
 
     def read(self, frame: Frame) -> Asked:
         """What a frame asks for; of another message nothing."""
         for name, editor, velocities, switches in self._inputs:
             if editor.has(frame):
                 raw = editor.raw(frame)
-                read = {one.name: one.read(raw) for one in velocities}
-                asked = {
-                    f"{name} {k}": 0.0 if isinstance(v, Reason) else v for k, v in read.items()
-                }
-                return asked | {f"{name} {k} on": float(raw[k] == on) for k, on in switches}
+                asked = self._demanded(name, ((one.name, one.read(raw)) for one in velocities))
+                return asked | {f"{name} {key} on": float(raw[key] == on) for key, on in switches}
         return {}
 
-    @staticmethod
-    def no_more(altered: Asked, real: Asked) -> bool:
-        """Whether a frame asks for no more than the real one, and in no other direction."""
-        return all(
-            min(0.0, of) <= altered.get(key, 0.0) <= max(0.0, of) for key, of in real.items()
-        )
+    def held(self, controller: Controller, now_ns: int) -> Asked:
+        """What a controller goes by: the demands of its last good frames, while they are fresh."""
+        held: dict[str, float] = {}
+        for name, joystick in controller.joysticks.items():
+            if joystick.lost(now_ns) is None:
+                held |= self._demanded(name, joystick.commands.items())
+        return held
 
-    @staticmethod
-    def takes_back(real: Asked, told: Asked) -> bool:
-        """Whether a frame asks for less than what was told, or for the other direction."""
-        pairs = [(of, told.get(key, 0.0)) for key, of in real.items()]
-        return any(was and of * (was > 0 or -1) < abs(was) - SLACK for of, was in pairs)
+    def _demanded(self, name: str, read: Iterable[tuple[str, float | Reason]]) -> dict[str, float]:
+        keys = ((f"{name} {signal}", value) for signal, value in read)
+        return {
+            key: 0.0 if isinstance(v, Reason) or abs(v) <= self._bands.get(key, 0.0) else v
+            for key, v in keys
+        }
 
 
 def tick_ns(deployment: Deployment, ticks: int = 2) -> int:
@@ -180,16 +185,39 @@ def tick_ns(deployment: Deployment, ticks: int = 2) -> int:
     return (ticks + slowest) * deployment.config.tick_ms * MS
 
 
-def dropped(editor: Editor) -> Callable[[Frame], Frame | None]:
-    """Drop the frames of one message."""
-    return lambda frame: None if editor.has(frame) else frame
+def lost_ns(deployment: Deployment, bound: Bound[Any]) -> int:
+    """Until a message that is silent is lost."""
+    timeout_ms: int = bound.config.timeout_ms
+    return timeout_ms * MS + tick_ns(deployment)
 
 
-def edited(editor: Editor, edit: Callable[[Frame], Frame]) -> Callable[[Frame], Frame | None]:
+def dropped(has: Callable[[Frame], bool]) -> Alter:
+    """Drop some frames."""
+    return lambda frame: () if has(frame) else (frame,)
+
+
+def edited(editor: Editor, edit: Callable[[Frame], Frame]) -> Alter:
     """Edit the frames of one message."""
-    return lambda frame: edit(frame) if editor.has(frame) else frame
+    return lambda frame: (edit(frame) if editor.has(frame) else frame,)
 
 
-def put(editor: Editor, **values: int) -> Callable[[Frame], Frame | None]:
+def put(editor: Editor, values: Mapping[str, Any]) -> Alter:
     """Put raw values into the frames of one message."""
     return edited(editor, lambda frame: editor.changed(frame, values))
+
+
+def sent(frame: Frame) -> Begin:
+    """Another sender sends a frame."""
+    return lambda recorder, now_ns: Recorder.receive(recorder, frame, now_ns)
+
+
+def reports(*faults: FrameFault, off: str = "") -> Begin:
+    """Faults are reported, and that we are off a bus."""
+
+    def begin(recorder: Recorder, _now_ns: int) -> None:
+        for fault in faults:
+            recorder.fault(fault)
+        if off:
+            recorder.on_bus_off(off)
+
+    return begin

@@ -1,190 +1,141 @@
 """Faults of a joystick that are rehearsed."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
+
+from cantools.database.can import Signal
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.identifier import with_source
-from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity
-from canshaper.daemon.rehearsal.fault import (
-    LONGEST_S,
-    MS,
-    Asked,
-    Demands,
-    Editor,
-    Fault,
-    S,
-    dropped,
-    edited,
-    put,
-    tick_ns,
-)
+from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, Velocity, VelocitySignal
+from canshaper.daemon.rehearsal import fault as make
+from canshaper.daemon.rehearsal.fault import MS, Alter, Demands, Editor, Fault, S
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import Bound, BoundJoystick
+from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.states import Reason
 
 OTHER_SOURCE = 0xFC
+LONGEST_STUCK_S = 25.0  # until a joystick is frozen: nobody holds it for longer
 
 
-def joystick_faults(deployment: Deployment, joystick: BoundJoystick) -> Iterator[Fault]:
+def joystick_faults(
+    deployment: Deployment, joystick: BoundJoystick, demands: Demands
+) -> Iterator[Fault]:
     """Those of one joystick."""
-    config, of = joystick.config, joystick.name
-    editor, tick = Editor(joystick), tick_ns(deployment)
+    config, of, protection = joystick.config, joystick.name, joystick.protection
+    editor, tick = Editor(joystick), make.tick_ns(deployment)
     axes = tuple(n for n, a in deployment.axes.items() if a.config.command.joystick == of)
-    lost_ns = config.timeout_ms * MS + tick
+    lost_ns = make.lost_ns(deployment, joystick)
     timeout = "R1" if deployment.config.gateway else "JOYSTICK_TIMEOUT"
 
-    def fault(kind: str, claim: str, within_ns: int = tick, **how: Any) -> Fault:
+    def fault(
+        kind: str, claim: str, within_ns: int = tick, axes: tuple[str, ...] = axes, **how: Any
+    ) -> Fault:
         return Fault(f"{kind}:{of}", claim, axes, within_ns, **how)
 
-    yield fault("silent", timeout, lost_ns, alter=dropped(editor))
-    short = edited(editor, lambda frame: frame._replace(data=frame.data[:-1]))
-    yield fault("wrong_length", timeout, lost_ns, alter=short)
-    old = edited(editor, lambda frame: frame._replace(data=bytes(frame.data)))
-    yield fault("old_stamp", timeout, lost_ns, alter=old, age_ns=2 * config.timeout_ms * MS)
-    once, protection = short, joystick.protection
+    lost, wrong = (
+        make.dropped(editor.has),
+        make.edited(editor, lambda f: f._replace(data=f.data[:-1])),
+    )
+    yield fault("silent", timeout, lost_ns, alter=lost)
+    yield fault("wrong_length", timeout, lost_ns, alter=wrong)
+    same = make.edited(editor, lambda frame: frame._replace())
+    yield fault("old_stamp", timeout, lost_ns, alter=same, age_ns=2 * config.timeout_ms * MS)
     if protection.counts:
-        half = protection.counts // 2
-        first: dict[int, int] = {}
-        counts = edited(editor, lambda f: editor.counted(f, first.setdefault(0, editor.count(f))))
-        yield fault("frozen_counter", "JOYSTICK_UNTRUSTED", lost_ns, alter=counts)
-        jumping = edited(
-            editor, lambda f: editor.counted(f, editor.count(f) + half * (editor.count(f) % 2))
-        )
+        half, first = protection.counts // 2, dict[int, int]()
+        frozen = make.edited(editor, lambda f: editor.counted(f, lambda n: first.setdefault(0, n)))
+        yield fault("frozen_counter", "JOYSTICK_UNTRUSTED", lost_ns, alter=frozen)
+        jumping = make.edited(editor, lambda f: editor.counted(f, lambda n: n + half * (n % 2)))
         yield fault("jumping_counter", "JOYSTICK_UNTRUSTED", lost_ns, alter=jumping)
     if protection.check is not None:
-        once = edited(editor, editor.spoiled)
-        yield fault("wrong_checksum", "JOYSTICK_UNTRUSTED", lost_ns, alter=once)
-    yield fault("one_wrong_frame", "R7", alter=once, once=True, lasts_ns=S)
-    lost = dropped(editor)
-    reports = FrameFault.FRAMES_LOST
-    yield fault("frames_lost", "FRAMES_LOST", alter=lost, once=True, reports=reports, lasts_ns=S)
-    stuck_ns = round(config.stuck_s * S)
-    if stuck_ns < (LONGEST_S - 5) * S:
-        within_ns = stuck_ns + 2 * S
-        yield fault("frozen", "JOYSTICK_FROZEN", within_ns, alter=frozen(editor, joystick))
-    moved = _half(joystick)
-    for claim, reason in CODES.items():
-        if read := _codes(joystick, reason, moved):
-            these = tuple(n for n in axes if deployment.axes[n].config.command.signal in read)
-            coded = _coded(editor, joystick, reason)
-            yield Fault(f"{claim.lower()}:{joystick.name}", claim, these, tick, alter=coded)
+        wrong = make.edited(editor, editor.spoiled)
+        yield fault("wrong_checksum", "JOYSTICK_UNTRUSTED", lost_ns, alter=wrong)
+    yield fault("one_wrong_frame", "R7", alter=wrong, once=True, lasts_ns=S)
+    reported = make.reports(FrameFault.FRAMES_LOST)
+    yield fault("frames_lost", "FRAMES_LOST", alter=lost, once=True, begin=reported, lasts_ns=S)
+    if config.stuck_s < LONGEST_STUCK_S:
+        stuck_ns = round((config.stuck_s + 2) * S)
+        yield fault("frozen", "JOYSTICK_FROZEN", stuck_ns, alter=_frozen(editor, demands))
+    for reason, codes in fault_codes(joystick).items():
+        these = tuple(n for n in axes if deployment.axes[n].config.command.signal in codes)
+        raw = {name: code for one in codes.values() for name, code in one.items()}
+        kind = reason.name.lower()
+        yield fault(kind, reason.name, axes=these, alter=make.put(editor, raw))
     if joystick.any_source and not deployment.config.gateway:
-        yield fault("second_joystick", "R8", copy=_other_source(editor), lasts_ns=S)
-    if joystick.enable is not None:
-        yield fault("enable_off", "ENABLE_LOST", alter=put(editor, **{joystick.enable: 0}))
-        if _bits(joystick, joystick.enable) > 1:
-            invalid = put(editor, **{joystick.enable: 2})
+        yield fault("second_joystick", "R8", alter=_twice(editor), lasts_ns=S)
+    if enable := joystick.enable:
+        yield fault("enable_off", "ENABLE_LOST", alter=make.put(editor, {enable: 0}))
+        if joystick.message.get_signal_by_name(enable).length > 1:
+            invalid = make.put(editor, {enable: 2})
             yield fault("enable_invalid", "SWITCH_INVALID", alter=invalid)
 
 
-def _bits(bound: Bound[Any], name: str) -> int:
-    return next(s.length for s in bound.message.signals if s.name == name)
-
-
-def _signals(velocity: Any) -> list[str]:
-    """Signals that a velocity is read from."""
+def _parts(velocity: Velocity) -> list[VelocitySignal]:
+    """Signals of a velocity that have a size."""
     if isinstance(velocity, FlaggedVelocity):
-        return [velocity.magnitude.name, velocity.neutral, velocity.negative, velocity.positive]
+        return [velocity.magnitude]
     if isinstance(velocity, RockerVelocity):
-        return [velocity.positive.name, velocity.negative.name]
-    return [velocity.name]
+        return [velocity.positive, velocity.negative]
+    return [velocity]
 
 
-def _moving(joystick: BoundJoystick) -> list[str]:
-    """Signals that move something."""
-    return [name for one in joystick.velocities for name in _signals(one)]
+def _flags(velocity: Velocity) -> list[str]:
+    """Signals of a velocity that are flags."""
+    flagged = isinstance(velocity, FlaggedVelocity)
+    return [velocity.neutral, velocity.negative, velocity.positive] if flagged else []
 
 
-def frozen(editor: Editor, joystick: BoundJoystick) -> Callable[[Frame], Frame | None]:
+def _frozen(editor: Editor, demands: Demands) -> Alter:
     """Where a joystick was, or was nearer to neutral since: it never stands farther than it is."""
     kept: dict[str, Any] = {}
-    names = _moving(joystick)
+    velocities = editor.bound.velocities
+    names = [name for one in velocities for name in (*_flags(one), *(p.name for p in _parts(one)))]
 
     def frozen(frame: Frame) -> Frame:
-        raw = editor.raw(frame)
-        now = {one.name: one.read(raw) for one in joystick.velocities}
-        then = {one.name: one.read({**raw, **kept}) for one in joystick.velocities}
-        if not kept or not Demands.no_more(_numbers(then), _numbers(now)):
+        stands = editor.changed(frame, kept)
+        if not kept or not make.no_more(demands.read(stands), demands.read(frame)):
+            raw = editor.raw(frame)
             kept.update({name: raw[name] for name in names})
-        return editor.changed(frame, kept)
+            stands = frame._replace()
+        return stands
 
-    return edited(editor, frozen)
-
-
-def _numbers(read: Mapping[str, float | Reason]) -> Asked:
-    return {k: 0.0 if isinstance(v, Reason) else v for k, v in read.items()}
+    return make.edited(editor, frozen)
 
 
-CODES = {
-    name: Reason[name]
-    for name in (
-        "JOYSTICK_ERROR",
-        "JOYSTICK_NOT_AVAILABLE",
-        "JOYSTICK_OUT_OF_RANGE",
-        "JOYSTICK_NOT_A_NUMBER",
-        "JOYSTICK_CONTRADICTORY",
-    )
-}
-
-
-def _candidates(joystick: BoundJoystick, name: str) -> Iterator[Any]:
-    """Raw values of a signal that may be no measurement: the ends of its bits and of its range."""
-    signal = next(s for s in joystick.message.signals if s.name == name)
-    if signal.is_float:
-        yield from (float("nan"), 2.0 * (signal.maximum or 1.0) / signal.scale)
-        return
-    top = (1 << signal.length - signal.is_signed) - 1
-    low = -top - 1 if signal.is_signed else 0
-    yield from (top, top - (1 << max(0, signal.length - 8)), low, low + 1)
-    for value, step in ((signal.minimum, -1), (signal.maximum, 1)):
-        code = round(((value or 0) - signal.offset) / signal.scale)
-        yield from (one for one in (code + step, code + 2 * step, code) if low <= one <= top)
-    yield from (int(code) for code in signal.choices or {})
-
-
-def _codes(
-    joystick: BoundJoystick, reason: Reason, raw: Mapping[str, Any]
-) -> dict[str, dict[str, Any]]:
-    """By velocity, the change of one raw value of a frame by which it reads this reason."""
-    found: dict[str, dict[str, Any]] = {}
+def fault_codes(joystick: BoundJoystick) -> dict[Reason, dict[str, dict[str, Any]]]:
+    """Raw values by which its velocities have no measurement: by reason and velocity."""
+    found: dict[Reason, dict[str, dict[str, Any]]] = {}
     for velocity in joystick.velocities:
-        for name in _signals(velocity):
-            for code in _candidates(joystick, name):
-                if velocity.read({**raw, name: code}) is reason:
-                    found.setdefault(velocity.name, {name: code})
+        for part in _parts(velocity):
+            for code in _codes(part, joystick.message.get_signal_by_name(part.name)):
+                reason = part.read({part.name: code})
+                if isinstance(reason, Reason):
+                    found.setdefault(reason, {}).setdefault(velocity.name, {part.name: code})
+        both = dict.fromkeys(_flags(velocity), 1)
+        if isinstance(velocity, RockerVelocity):
+            both = {one.name: _full(one) for one in _parts(velocity)}
+        if both:
+            found.setdefault(Reason.JOYSTICK_CONTRADICTORY, {})[velocity.name] = both
     return found
 
 
-def _half(joystick: BoundJoystick) -> dict[str, Any]:
-    """Raw values of a frame with every velocity at about half."""
-    codes, raw = {s.name: s for s in joystick.message.signals}, dict[str, Any]()
-    for name in _moving(joystick):
-        signal = codes[name]
-        value = (signal.maximum or 1) / 2
-        raw[name] = value if signal.is_float else round((value - signal.offset) / signal.scale)
-    for one in joystick.velocities:
-        if isinstance(one, FlaggedVelocity):
-            raw |= {one.neutral: 0, one.negative: 0, one.positive: 1}
-        elif isinstance(one, RockerVelocity):
-            signal = codes[one.negative.name]
-            raw[signal.name] = round(-signal.offset / signal.scale)
-    return raw
+def _full(part: VelocitySignal) -> int:
+    return round((part.full - part.offset) / part.scale)
 
 
-def _coded(
-    editor: Editor, joystick: BoundJoystick, reason: Reason
-) -> Callable[[Frame], Frame | None]:
-    def coded(frame: Frame) -> Frame:
-        codes = _codes(joystick, reason, editor.raw(frame)).values()
-        return editor.changed(frame, {name: code for one in codes for name, code in one.items()})
-
-    return edited(editor, coded)
+def _codes(part: VelocitySignal, signal: Signal) -> list[Any]:
+    """Raw values that may be no measurement: with a name, or at or beyond an end."""
+    if signal.is_float:
+        return [float("nan"), 2.0 * part.full / part.scale]
+    top = (1 << signal.length - signal.is_signed) - 1
+    return [*part.special, -top - 1 if signal.is_signed else 0, min(_full(part) + 2, top), top]
 
 
-def _other_source(editor: Editor) -> Callable[[Frame], Frame | None]:
-    def copied(frame: Frame) -> Frame | None:
+def _twice(editor: Editor) -> Alter:
+    """Each frame comes from another address too."""
+
+    def twice(frame: Frame) -> tuple[Frame, ...]:
         other = frame._replace(can_id=with_source(frame.can_id, OTHER_SOURCE))
-        return other if editor.has(frame) and other.can_id != frame.can_id else None
+        return (other, frame) if editor.has(frame) and other != frame else (frame,)
 
-    return copied
+    return twice

@@ -6,6 +6,7 @@ from pathlib import Path
 from canshaper.commissioning.assumed import MEASURE, origins
 from canshaper.commissioning.procedure.files import shown
 from canshaper.commissioning.procedure.pictures import embedded
+from canshaper.commissioning.procedure.rehearsed import kept, table
 from canshaper.commissioning.procedure.state import (
     FILE,
     Context,
@@ -16,7 +17,6 @@ from canshaper.commissioning.procedure.state import (
     Step,
 )
 from canshaper.commissioning.procedure.steps.drive import DRIVE
-from canshaper.commissioning.rehearsal.run import kept, table
 from canshaper.machine.deployment import Deployment
 from canshaper.report import html
 from canshaper.report.console import new_table

@@ -1,1 +1,0 @@
-"""Faults rehearsed at the machine: what is expected, what happened, and the table to sign."""
