@@ -1,6 +1,5 @@
 """``canshaper fault``: its list, its questions, its table, and what it says when it cannot."""
 
-import json
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
 from canshaper.commissioning.procedure.files import Files
-from canshaper.commissioning.rehearsal.run import kept
+from canshaper.commissioning.procedure.rehearsed import kept
 from canshaper.daemon.control_server import ControlServer
 from tests.faults.rehearsed import slow_file
 
@@ -78,20 +77,33 @@ def test_a_fault_is_judged_shown_and_kept(
     with daemon(file, said(report)) as asked:
         done = canshaper(file, "--only", "enable_off:left")
     assert (done.exit_code, asked) == (code, ["enable_off:left"])
-    assert "move the joystick of slew or near_far to about half" in done.stdout
-    folder = Files(file).folder
-    (row,) = kept(folder)
+    assert "move slew or near_far to about half and hold it" in done.stdout
+    (row,) = kept(Files(file).folder)
     assert row["verdict"] == verdict
-    assert verdict in (folder / "faults.html").read_text(encoding="utf-8")
 
 
-def test_json_is_alone_and_rows_of_before_stay(file: Path) -> None:
+def test_rows_of_before_stay_and_the_same_fault_has_one(file: Path) -> None:
     with daemon(file, said(TRIPPED)):
-        for name in ("enable_off:left", "enable_off:right"):
-            done = canshaper(file, "--json", "--only", name)
-    begin = done.stdout.index("[\n")
-    assert [row["name"] for row in json.loads(done.stdout[begin:])] == ["enable_off:right"]
-    assert len(kept(Files(file).folder)) == 2
+        for name in ("enable_off:left", "enable_off:right", "enable_off:left"):
+            canshaper(file, "--only", name)
+    rows = kept(Files(file).folder)
+    assert [row["fault"] for row in rows] == ["enable_off:right", "enable_off:left"]
+
+
+@pytest.mark.parametrize(
+    ("report", "happened"),
+    [
+        ({**WENT_ON, "why": "the joystick was let go"}, "the joystick was let go"),
+        ({**WENT_ON, "made": False, "why": ""}, "the daemon has begun again"),
+    ],
+)
+def test_what_was_cut_short_is_not_done(
+    file: Path, report: Mapping[str, Any], happened: str
+) -> None:
+    with daemon(file, said(report)):
+        canshaper(file, "--only", "enable_off:left")
+    (row,) = kept(Files(file).folder)
+    assert (row["happened"], row["verdict"]) == (happened, "not done")
 
 
 def test_nothing_is_made_without_a_yes(file: Path) -> None:
@@ -117,18 +129,9 @@ def refuses(text: str) -> Answer:
     return answer
 
 
-@pytest.mark.parametrize(
-    ("answer", "line"),
-    [
-        ("expected every axis at rest, slew is ACTIVE: let go first",) * 2,
-        (
-            'expected {} or {"set": {KEY: VALUE}} or {"black_box": "write"}, got another object',
-            "the daemon is of an older version, which rehearses no faults: restart it",
-        ),
-    ],
-)
-def test_what_the_daemon_refuses_is_one_line(file: Path, answer: str, line: str) -> None:
-    with daemon(file, refuses(answer)):
+def test_what_the_daemon_refuses_is_one_line(file: Path) -> None:
+    line = "expected every axis at rest, slew is ACTIVE: let go first"
+    with daemon(file, refuses(line)):
         done = canshaper(file, "--only", "enable_off:left")
     assert (done.exit_code, done.stderr.strip()) == (1, line)
 

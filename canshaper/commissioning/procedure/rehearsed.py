@@ -23,7 +23,7 @@ HEADS = ("fault", "row", "expected", "happened", "neutral after, ms", "verdict")
 GOOD, WRONG, UNDONE = "as expected", "NOT as expected", "not done"
 STOP, TRIP, NONE = "shaped stop", "trip", "no stop"
 WORDS = {Reaction.SHAPED_STOP: STOP, Reaction.NEUTRAL: TRIP}
-STATES = {STOP: State.STOPPING.name, TRIP: State.TRIPPED.name}
+WORDS_OF = {State.STOPPING.name: STOP, State.TRIPPED.name: TRIP}
 SAID = {"R1": STOP, "R2": TRIP, "BUS_OFF": TRIP}
 """Reaction to what has no reason of its own, and stops; see docs/safety.md."""
 
@@ -66,8 +66,12 @@ def judged(fault: Fault, report: Mapping[str, Any], deployment: Deployment) -> R
     """Judge what the daemon reports of a fault, see ``Rehearsal``."""
     claim, reaction, within_ms = fault.claim, reaction_of(fault.claim), fault.within_ns / MS
     events, neutral_ms = report["events"], report["neutral_ms"]
-    stops = [event for event in events if event[2] in STATES.values()]
-    texts = [f"{e[2]} {e[3]}" for e in stops] or [str(e[3]) for e in events if not e[2]]
+    stops = [event for event in events if event[2] in WORDS_OF]
+    said: dict[str, str] = {}  # the first of each, and when
+    for ms, _, state, reason in stops:
+        of = "" if reason == claim else f" {reason}"
+        said.setdefault(f"{WORDS_OF[state]}{of}", f" after {ms:.0f} ms")
+    texts = [word + when for word, when in said.items()] or [e[3] for e in events if not e[2]]
     happened, verdict = ", ".join(dict.fromkeys(texts)) or NONE, WRONG
     if reaction == NONE or not fault.axes:
         verdict = WRONG if stops else GOOD
@@ -75,7 +79,7 @@ def judged(fault: Fault, report: Mapping[str, Any], deployment: Deployment) -> R
         stop_s = max(axis.config.limits.stop_s for axis in deployment.axes.values())
         most_ms = within_ms + (1000 * stop_s + 100 if reaction == STOP else 0)
         begun_ms, _, state, reason = stops[0]
-        right = state == STATES[reaction] and claim in (reason, *SAID)
+        right = WORDS_OF[state] == reaction and claim in (reason, *SAID)
         verdict = GOOD if right and begun_ms <= within_ms and neutral_ms <= most_ms else WRONG
     if not report["made"] or (verdict == WRONG and report["why"] != "its time is over"):
         verdict, happened = UNDONE, report["why"] or "the daemon has begun again"
@@ -133,10 +137,11 @@ def made(control: Path, fault: Fault, deployment: Deployment) -> Row:
 
 
 def table(rows: Iterable[Row]) -> "Table":
-    """Faults that were rehearsed, as a table."""
-    shown = new_table(*HEADS, title="Rehearsed faults")
+    """Faults that were rehearsed, as a table; it fits on A4 without the rows of the page."""
+    heads = [one for one in HEADS if one != "row"]
+    shown = new_table(*heads, title="Rehearsed faults")
     for row in rows:
-        shown.add_row(*row.values())
+        shown.add_row(*(row[one] for one in heads))
     return shown
 
 

@@ -131,11 +131,15 @@ class Demands:
       and in no other direction (``no_more``).
     - A frame that takes something back from what the controller was told, or holds, is never
       replaced, held or dropped: it passes as it is and ends the fault (``takes_back``).
-    - Where the controller refuses that frame, because frames before it were lost or had other
-      counts, and so holds more than it asks for, what moves trips.
+    - Where the controller does not follow that frame, what moves trips: it refuses the frame and so
+      holds more than it asks for, because frames before were lost or had other counts; or an axis
+      runs out against it, in a stop of the fault (``Rehearsal.receive``).
 
     Gate and controller get the same frames, behind the fault. The end of a release that was
     rehearsed is the edge of a switch: in neutral it resets, and moves nothing.
+
+    Attributes:
+        keys: by axis, the key of its demand.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -149,9 +153,10 @@ class Demands:
             self._inputs.append((str([*one.switches]), Editor(one), (), [*one.switches.values()]))
         if stop := deployment.emergency_stop:
             self._inputs.append(("emergency stop", Editor(stop), (), [(stop.config.signal, 0)]))
-        for axis in deployment.axes.values():
-            command = axis.config.command
-            key, band = f"{command.joystick} {command.signal}", command.neutral_pct / 100.0
+        commands = {name: axis.config.command for name, axis in deployment.axes.items()}
+        self.keys = {name: f"{one.joystick} {one.signal}" for name, one in commands.items()}
+        for name, one in commands.items():
+            key, band = self.keys[name], one.neutral_pct / 100.0
             self._bands[key] = min(band, self._bands.get(key, 1.0))
 
     def read(self, frame: Frame) -> Asked:

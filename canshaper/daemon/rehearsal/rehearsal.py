@@ -137,8 +137,8 @@ class Rehearsal(Recorder):
             return passed
         self._spoken |= fault.end is not None and frame[:3] == fault.end[:3]
         self._told.update(asked)
-        if self._phase in (MADE, OVER) and self._holds_more(asked, now_ns):
-            log.warning("fault=over name=%s its frame does not count: what moves trips", fault.name)
+        if self._phase in (MADE, OVER) and (self._holds_more(asked, now_ns) or self._runs(asked)):
+            log.warning("fault=over name=%s the joystick is not followed: it trips", fault.name)
             self.stalled()
         if passed is not None and self._phase == MADE and fault.unsent:
             self.send_failed(passed)  # of a gateway
@@ -147,6 +147,12 @@ class Rehearsal(Recorder):
     def _holds_more(self, asked: Asked, now_ns: int) -> bool:
         """Whether the controller goes by more than a frame asks for."""
         return bool(asked) and takes_back(asked, self._demands.held(self._controller, now_ns))
+
+    def _runs(self, asked: Asked) -> bool:
+        """Whether an axis runs out against what a frame asks for, in a stop."""
+        keys, axes = self._demands.keys, self._controller.axes
+        stopping = {n: one.axis for n, one in axes.items() if one.axis.state is State.STOPPING}
+        return any(axis.raw * asked.get(keys[name], 0.0) < 0.0 for name, axis in stopping.items())
 
     def _altered(self, frame: Frame, asked: Asked) -> tuple[Frame, ...]:
         """What is received in place of a frame: never one that asks for more than it does."""
