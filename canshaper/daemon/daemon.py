@@ -74,6 +74,7 @@ class Daemon:
         self._ports = opened_ports(deployment, self._on_fault, self._manager)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)
+        self._recorder: Recorder
         self._use(deployment)
         self._control = self._open_control(deployment)
 

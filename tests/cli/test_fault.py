@@ -13,7 +13,10 @@ from typer.testing import CliRunner, Result
 from canshaper.cli.app import app
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.rehearsed import kept
+from canshaper.commissioning.procedure.state import State
+from canshaper.commissioning.procedure.steps.report import document
 from canshaper.daemon.control_server import ControlServer
+from canshaper.machine.binding import load_deployment
 from tests.faults.rehearsed import slow_file
 
 OVER = {"phase": "done", "made": True, "neutral_ms": 18.0, "why": "its time is over"}
@@ -104,6 +107,18 @@ def test_what_was_cut_short_is_not_done(
         canshaper(file, "--only", "enable_off:left")
     (row,) = kept(Files(file).folder)
     assert (row["happened"], row["verdict"]) == (happened, "not done")
+
+
+@pytest.mark.parametrize(("report", "verdict"), [(TRIPPED, "Fit to sign"), (WENT_ON, "NOT FIT")])
+def test_the_report_of_the_day_has_the_table(
+    file: Path, report: Mapping[str, Any], verdict: str
+) -> None:
+    with daemon(file, said(report)):
+        canshaper(file, "--only", "enable_off:left")
+    shown = document(load_deployment(file), State(), {}, Files(file).folder)
+    assert verdict in shown.split("<table")[0]
+    assert "Rehearsed faults" in shown
+    assert "enable_off:left" in shown
 
 
 def test_nothing_is_made_without_a_yes(file: Path) -> None:

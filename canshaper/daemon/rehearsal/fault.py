@@ -155,8 +155,8 @@ class Demands:
             self._inputs.append(("emergency stop", Editor(stop), (), [(stop.config.signal, 0)]))
         commands = {name: axis.config.command for name, axis in deployment.axes.items()}
         self.keys = {name: f"{one.joystick} {one.signal}" for name, one in commands.items()}
-        for name, one in commands.items():
-            key, band = self.keys[name], one.neutral_pct / 100.0
+        for name, command in commands.items():
+            key, band = self.keys[name], command.neutral_pct / 100.0
             self._bands[key] = min(band, self._bands.get(key, 1.0))
 
     def read(self, frame: Frame) -> Asked:

@@ -55,7 +55,7 @@ def joystick_faults(
     yield fault("frames_lost", "FRAMES_LOST", alter=lost, once=True, begin=reported, lasts_ns=S)
     if config.stuck_s < LONGEST_STUCK_S:
         stuck_ns = round((config.stuck_s + 2) * S)
-        yield fault("frozen", "JOYSTICK_FROZEN", stuck_ns, alter=_frozen(editor, demands))
+        yield fault("frozen", "JOYSTICK_FROZEN", stuck_ns, alter=_frozen(editor, joystick, demands))
     for reason, codes in fault_codes(joystick).items():
         these = tuple(n for n in axes if deployment.axes[n].config.command.signal in codes)
         raw = {name: code for one in codes.values() for name, code in one.items()}
@@ -81,15 +81,19 @@ def _parts(velocity: Velocity) -> list[VelocitySignal]:
 
 def _flags(velocity: Velocity) -> list[str]:
     """Signals of a velocity that are flags."""
-    flagged = isinstance(velocity, FlaggedVelocity)
-    return [velocity.neutral, velocity.negative, velocity.positive] if flagged else []
+    if isinstance(velocity, FlaggedVelocity):
+        return [velocity.neutral, velocity.negative, velocity.positive]
+    return []
 
 
-def _frozen(editor: Editor, demands: Demands) -> Alter:
+def _frozen(editor: Editor, joystick: BoundJoystick, demands: Demands) -> Alter:
     """Where a joystick was, or was nearer to neutral since: it never stands farther than it is."""
     kept: dict[str, Any] = {}
-    velocities = editor.bound.velocities
-    names = [name for one in velocities for name in (*_flags(one), *(p.name for p in _parts(one)))]
+    names = [
+        name
+        for one in joystick.velocities
+        for name in (*_flags(one), *(p.name for p in _parts(one)))
+    ]
 
     def frozen(frame: Frame) -> Frame:
         stands = editor.changed(frame, kept)
