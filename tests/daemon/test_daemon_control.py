@@ -132,7 +132,7 @@ def test_a_fault_is_armed_for_who_asks_and_ends_when_he_asks_no_more(
     path = tmp_path / "c.sock"
     rehearsing(bench, path)
     asks = ask(path, {"fault": "silent:left", "by": "anna"})
-    at(bench, {3: asks, 15: lambda: clients.pop().close()}, last=70)
+    at(bench, {3: asks, 15: lambda: clients.pop().close()}, last=170)
     assert loaded()
     armed, over = [line for line in log() if " fault=" in line]
     assert armed.startswith("WARNING fault=armed name=silent:left by=anna uid=")

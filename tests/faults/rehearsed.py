@@ -157,7 +157,7 @@ class Rehearsed:
             self.report = dict(self.ask("report"))
             while self.report["phase"] != "done":
                 world.healthy = self._hand(self, world.now_ns / 1e9 - since_s)
-                yield 0.0 if self.present else 2.0
+                yield 0.0 if self.present else 4.0
                 self.report = dict(self.ask("report"))
             self.answers[name] = self.report
             self.present = True

@@ -25,7 +25,7 @@ log = logging.getLogger("canshaper")
 ARMED_NS, HELD_NS = 60 * S, S // 2
 LEAST_DEMAND = 0.2
 # A client that has not asked for so long is gone.
-GONE_NS = S
+GONE_NS = 3 * S
 # How long is looked at after it is over, beyond the timeout of a joystick; and where the reaction
 # is not over by then.
 AFTER_NS, LONGEST_AFTER_NS = 300 * MS, 5 * S
@@ -64,7 +64,7 @@ class Rehearsal(Recorder):
         """Begin a fault by its name, or say what has become of it.
 
         Args:
-            what: name of a fault, ``report`` or ``end``; who asks nothing for a second is gone.
+            what: name of a fault, ``report`` or ``end``; who asks nothing for some seconds is gone.
             who: who asks, for the log.
 
         Raises:
