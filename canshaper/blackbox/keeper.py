@@ -17,7 +17,6 @@ from typing import NamedTuple, NoReturn
 from canshaper.blackbox.recorder import Recorder
 from canshaper.blackbox.ring import Ring, Segment
 from canshaper.blackbox.state import States
-from canshaper.blackbox.write import last_number, write_box
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
@@ -108,6 +107,8 @@ class BlackBox:
         except StateError as error:  # of a filter of another package
             log.warning("black-box=none %s", error)
         if self._folder:
+            from canshaper.blackbox.write import last_number
+
             self._number = max(self._number, last_number(self._folder, deployment.path.stem))
         self._recorder = kind(guarded, controller, self._ring)
         return self._recorder
@@ -219,6 +220,8 @@ class BlackBox:
         """Write what was put aside; an error number, 0 for none."""
         assert self._folder is not None
         assert self._kept is not None
+        from canshaper.blackbox.write import write_box
+
         deployment, number, why, segments, _ = self._kept
         try:
             write_box(self._folder, deployment, segments, why, number)

@@ -9,30 +9,22 @@ import errno
 import os
 import re
 import socket
-import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from canshaper.bus.netlink import ACKNOWLEDGE, attributes, request
+from canshaper.bus.netlink import KindAndBitrates, kind_and_bitrates
 from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
 
 ROOT = Path("/")
 IFF_ECHO = 1 << 18  # linux/if.h: the driver hands a frame back once it is on the bus
-# linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
-GET_LINK = 18
 FD_MTU = 72  # linux/can.h, CANFD_MTU
-LINK_INFO, INFO_KIND, INFO_DATA, CAN_BIT_TIMING, CAN_DATA_BIT_TIMING = 18, 1, 2, 1, 9
-_LINK = struct.Struct("=BxHiII")  # ifinfomsg
-_BITRATE = struct.Struct("=I")  # the first member of can_bittiming
 # What two places in the tree of devices are called, and which of their parents they stand for; as
 # the builtin path_id of udev makes ID_PATH.
 _USB_PORT = re.compile(r"\d+-(.+)")
 _CHIP_SELECT = re.compile(r"spi\d+\.(\d+)")
 
-
-KindAndBitrates = tuple[str | None, int | None, int | None]
 LinkQuery = Callable[[int], KindAndBitrates]
 
 
@@ -59,21 +51,6 @@ class Device:
     bitrate: int | None
     channels: int = 1
     data_bitrate: int | None = None
-
-
-def kind_and_bitrates(index: int) -> KindAndBitrates:
-    """Ask the kernel for kind, bit rate and that of the data of an interface.
-
-    Raises:
-        OSError: there is no such interface, or netlink is not permitted.
-    """
-    (body,) = request(GET_LINK, ACKNOWLEDGE, _LINK.pack(socket.AF_UNSPEC, 0, index, 0, 0))
-    info = dict(attributes(dict(attributes(body[_LINK.size :])).get(LINK_INFO, b"")))
-    kind = info.get(INFO_KIND, b"").rstrip(b"\0").decode() or None
-    data = dict(attributes(info.get(INFO_DATA, b""))) if kind == "can" else {}
-    timings = (data.get(CAN_BIT_TIMING), data.get(CAN_DATA_BIT_TIMING))
-    rates = [_BITRATE.unpack_from(timing)[0] if timing else None for timing in timings]
-    return kind, rates[0], rates[1]
 
 
 def read_device(

@@ -10,6 +10,12 @@ _HEADER = struct.Struct("=IHHII")  # nlmsghdr
 _ATTRIBUTE = struct.Struct("=HH")  # rtattr
 TYPE_MASK = 0x3FFF  # NLA_TYPE_MASK: without the flags for nested and for the byte order
 ROOM = 1 << 16
+# linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
+GET_LINK = 18
+LINK_INFO, INFO_KIND, INFO_DATA, CAN_BIT_TIMING, CAN_DATA_BIT_TIMING = 18, 1, 2, 1, 9
+_LINK = struct.Struct("=BxHiII")  # ifinfomsg
+_BITRATE = struct.Struct("=I")  # the first member of can_bittiming
+KindAndBitrates = tuple[str | None, int | None, int | None]
 
 
 def attribute(kind: int, payload: bytes) -> bytes:
@@ -56,3 +62,18 @@ def request(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
                     return
                 yield content
                 at += -(-length // 4) * 4
+
+
+def kind_and_bitrates(index: int) -> KindAndBitrates:
+    """Ask the kernel for kind, bit rate and that of the data of an interface.
+
+    Raises:
+        OSError: there is no such interface, or netlink is not permitted.
+    """
+    (body,) = request(GET_LINK, ACKNOWLEDGE, _LINK.pack(socket.AF_UNSPEC, 0, index, 0, 0))
+    info = dict(attributes(dict(attributes(body[_LINK.size :])).get(LINK_INFO, b"")))
+    kind = info.get(INFO_KIND, b"").rstrip(b"\0").decode() or None
+    data = dict(attributes(info.get(INFO_DATA, b""))) if kind == "can" else {}
+    timings = (data.get(CAN_BIT_TIMING), data.get(CAN_DATA_BIT_TIMING))
+    rates = [_BITRATE.unpack_from(timing)[0] if timing else None for timing in timings]
+    return kind, rates[0], rates[1]

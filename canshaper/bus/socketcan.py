@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.bus.device import ROOT, check_device, check_mtu, has_echo, interface_index
-from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
-from canshaper.codec.identifier import SERVICES, group_mask
+from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SERVICES, SFF_MASK, group_mask
 from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes

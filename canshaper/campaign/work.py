@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from canshaper.campaign.draw import driven_axes
 from canshaper.campaign.run import Source
-from canshaper.design.comparison.candidates import Candidate, with_candidate
+from canshaper.design.comparison.manoeuvres import Candidate, with_candidate
 from canshaper.design.lockstep import DriveOptions, OnFrame, Simulation
 from canshaper.design.profiles import choosing
 from canshaper.errors import CampaignError

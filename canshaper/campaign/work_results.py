@@ -220,7 +220,7 @@ def table(done: Done) -> Table:
 def figure(source: Source, works: Sequence[Work]) -> "Figure":
     """Picture of the first two moves of two works, anti-sway off and on."""
     from canshaper.report import style  # noqa: PLC0415  (an extra)
-    from canshaper.report.top_view import draw_top_views  # noqa: PLC0415  (the same)
+    from canshaper.report.style import draw_top_views  # noqa: PLC0415  (the same)
 
     fig = style.new_figure(style.WIDTH_PX, 1200, dpi=style.PRINT_DPI)
     drives: list[tuple[CraneTrace, Sequence[range]]] = []

@@ -7,7 +7,7 @@ the kernel may send instead of us.
 
 import binascii
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
@@ -237,19 +237,6 @@ def package_line(kind: str) -> str | None:
     if kind not in _SHA256:
         return None
     return f"checksum=sha256:{_SHA256[kind]} kind={kind} package={_owner(_packages()[kind][0])}"
-
-
-def checksum_table() -> Iterator[str]:
-    """The table of all kinds in Markdown, line by line.
-
-    Raises:
-        ValueError: as ``known_checksum``.
-    """
-    yield "| kind | bits | what it is | can-gw of the kernel makes it |"
-    yield "|---|---|---|---|"
-    for name in checksum_names():
-        kind = CHECKSUMS[known_checksum(name)]
-        yield f"| `{name}` | {kind.bits} | {kind.text} | {'yes' if kind.kernel else 'no'} |"
 
 
 @cache

@@ -17,8 +17,7 @@ from canshaper.cli.common import loader
 from canshaper.errors import CanshaperError, UsageError
 from canshaper.recording.log import READERS, LogFile
 from canshaper.recording.shift import day_of
-from canshaper.report.console import SafeConsole, new_table
-from canshaper.report.table import NOTHING
+from canshaper.report.console import NOTHING, SafeConsole, new_table
 
 EXIT_NOT_READ = 1
 _HEADS = ("min", "raw deg", "left deg", "dip %", "stops", "trips")
@@ -105,8 +104,7 @@ def _one(work: Callable[[Path], list[Row]], log: tuple[str, Path]) -> Log:
 def replayed(configs: tuple[str, ...], channels: Mapping[str, str], path: Path) -> list[Row]:
     """Drive each deployment with a log; return a row for each axis that moved."""
     from canshaper.recording.replay import Replay, look
-    from canshaper.recording.report import Replayed
-    from canshaper.recording.trace import Trace
+    from canshaper.recording.report import Replayed, Trace
 
     rows: list[Row] = []
     for config in configs:

@@ -72,7 +72,7 @@ def _log(
     window: "Window",
     changes: Sequence[str],
 ) -> "Choice":
-    from canshaper.recording.bundle import unpack
+    from canshaper.recording.record import unpack
     from canshaper.report.console import progress_bar
     from canshaper.studio.playback import play_log
     from canshaper.studio.playback_app import Choice

@@ -1,7 +1,10 @@
-"""A CAN frame as the pure part of canshaper sees it."""
+"""A CAN frame as the pure part of canshaper sees it; identifiers as CANopen and J1939 use them."""
 
 from enum import Enum, IntEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from canshaper.config.bus import J1939Name
 
 
 class Frame(NamedTuple):
@@ -86,3 +89,162 @@ def id_of(word: int) -> tuple[int, bool]:
     if word & EFF_FLAG:
         return word & EFF_MASK, True
     return word & SFF_MASK, False
+
+
+GLOBAL = 0xFF  # as destination: everybody
+NULL = 0xFE  # as source: a node without an address; in DBC files: any
+DEFAULT_PRIORITY, LOWEST_PRIORITY = 6, 7
+
+WITHOUT_PRIORITY = 0x03FFFFFF
+_PAGES_AND_FORMAT = 0x03FF0000
+_GROUP_OF_PDU2 = 0x03FFFF00
+
+
+def has_destination(can_id: int) -> bool:
+    """Whether messages of its group are sent to one node, or to all where that says so."""
+    return (can_id >> 16) & 0xFF < 240
+
+
+def group_mask(can_id: int) -> int:
+    """Bits of an identifier that give its group."""
+    return _PAGES_AND_FORMAT if has_destination(can_id) else _GROUP_OF_PDU2
+
+
+def group_of(can_id: int) -> int:
+    """Group of an identifier of 29 bits."""
+    return can_id & group_mask(can_id)
+
+
+def identifier(
+    pgn: int, source: int, destination: int = GLOBAL, priority: int = DEFAULT_PRIORITY
+) -> int:
+    """Identifier of a message.
+
+    Args:
+        pgn: parameter group number.
+        source: source address.
+        destination: only for groups that have one.
+        priority: 0 to 7, the lower the sooner.
+    """
+    specific = 0 if (pgn >> 8) & 0xFF >= 240 else destination << 8
+    return priority << 26 | pgn << 8 | specific | source
+
+
+def pgn_of(can_id: int) -> int:
+    """Parameter group number of an identifier."""
+    return group_of(can_id) >> 8
+
+
+def with_source(can_id: int, source: int) -> int:
+    """Return the identifier with another source address."""
+    return can_id & ~0xFF | source
+
+
+def at_every_priority(can_id: int) -> list[int]:
+    """The identifiers that a message may come with: its priority says nothing of what it is."""
+    return [priority << 26 | can_id & WITHOUT_PRIORITY for priority in range(8)]
+
+
+NMT = 0x000
+EMERGENCY = 0x080  # and the node id
+HEARTBEAT = 0x700  # and the node id
+
+# Identifiers of 11 bits of its other services, as (id, mask, name): no PDO may have one.
+SERVICES = (
+    (0x000, 0x7FF, "NMT"),
+    (0x080, 0x7FF, "SYNC"),
+    (0x080, 0x780, "EMCY"),
+    (0x100, 0x7FF, "TIME"),
+    (0x580, 0x780, "SDO"),
+    (0x600, 0x780, "SDO"),
+    (0x700, 0x780, "heartbeat"),
+    (0x7E4, 0x7FE, "LSS"),
+)
+
+
+def service_of(can_id: int) -> str | None:
+    """Service that an identifier of 11 bits belongs to; None where that is no such one."""
+    return next((name for base, mask, name in SERVICES if can_id & mask == base), None)
+
+
+START = 1  # NMT command: go to operational
+NO_EMERGENCY = 0x0000
+GENERIC_ERROR = 0x1000
+
+STATE_MASK = 0x7F
+"""State bits of a heartbeat; the bit above is that of node guarding."""
+
+
+class NodeState(IntEnum):
+    """State of a node in its heartbeat."""
+
+    BOOT_UP = 0
+    STOPPED = 4
+    OPERATIONAL = 5
+    PRE_OPERATIONAL = 127
+
+
+class ValveState(IntEnum):
+    """Low four bits of the control word that asks for a state, and of the status word in it."""
+
+    INIT = 0x8
+    DISABLED = 0x9
+    HOLD = 0xB
+    ACTIVE = 0xF
+
+
+STATE_BITS = 4
+"""State bits of control and status word."""
+READY_BIT = 0x8
+"""Bit of the status word that a valve with a fault clears."""
+RESET_FAULT = 0x3
+"""Control word that resets a fault."""
+
+
+REQUEST = 0xEA00  # PGN 59904
+CLAIMED = 0xEE00  # PGN 60928, address claimed or cannot claim
+ACKNOWLEDGE = 0xE800  # PGN 59392
+TRANSPORT = 0xEC00  # PGN 60416, connection management
+TRANSPORT_DATA = 0xEB00  # PGN 60160
+DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
+
+
+def claims_of(address: int) -> list[int]:
+    """Identifiers of what a node says about its address: that it claims it, or cannot."""
+    return [identifier(CLAIMED, source) for source in (address, NULL)]
+
+
+def sent_by(address: int) -> list[int]:
+    """Identifiers of what a node sends besides its claims, commands and status."""
+    low = LOWEST_PRIORITY
+    return [
+        identifier(ACKNOWLEDGE, address),
+        identifier(DM1, address),
+        identifier(TRANSPORT, address, priority=low),
+        identifier(TRANSPORT_DATA, address, priority=low),
+    ]
+
+
+def name_bytes(name: "J1939Name") -> bytes:
+    """The NAME as it is sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
+
+    The bit for a node that may choose another address stays 0: our address is the one that
+    valves are set to listen to.
+    """
+    fields = (
+        (name.identity_number, 21),
+        (name.manufacturer_code, 11),
+        (name.ecu_instance, 3),
+        (name.function_instance, 5),
+        (name.function, 8),
+        (0, 1),
+        (name.vehicle_system, 7),
+        (name.vehicle_system_instance, 4),
+        (name.industry_group, 3),
+        (0, 1),
+    )
+    value = at = 0
+    for number, bits in fields:
+        value |= number << at
+        at += bits
+    return value.to_bytes(8, "little")

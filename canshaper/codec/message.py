@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from cantools.database.can import Message, Signal
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.frame import Frame, FrameFault, new_frame
-from canshaper.codec.identifier import with_source
+from canshaper.codec.frame import Frame, FrameFault, new_frame, with_source
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import raw_limits
 

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.config.load import load_config
-from canshaper.config.origin import Origin
 from canshaper.config.schema import DeploymentConfig
-from canshaper.config.section import Section, sections
+from canshaper.config.section import Origin, Section, sections
 from canshaper.config.source import Place
 from canshaper.edit.edit import Change, change, sections_of
 from canshaper.machine.used_message import key_path

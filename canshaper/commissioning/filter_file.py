@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from canshaper.config.origin import note, written_by
 from canshaper.config.schema import AxisSection
 from canshaper.config.source import Place
-from canshaper.edit.edit import Change, FileValue, change, of_limits
+from canshaper.edit.edit import Change, FileValue, change, note, of_limits, written_by
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
 

@@ -12,7 +12,6 @@ from canshaper.commissioning.filter_file import write_filters
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import Filter, designed, filter_of
 from canshaper.config.limits import Sway
-from canshaper.config.section import shortened
 from canshaper.config.source import Place
 from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.evaluate import (
@@ -27,6 +26,7 @@ from canshaper.design.tuning.formulation import check_swing
 from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual
 from canshaper.design.tuning.robust import LEAST_TAP, RobustShaper, least_residual, shortest
 from canshaper.design.tuning.verdict import GOOD, Verdict, judge
+from canshaper.edit.edit import shortened
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis

@@ -1,10 +1,15 @@
-"""Stopping distances of a deployment as a table: what the tip travels after each event."""
+"""Stopping distances of a deployment as a table: what the tip travels after each event.
 
+Travel is in seconds of full speed: times the speed of the tip it is metres, times the angular speed
+of a slewing axis radians. It is that of the commands; the valve adds its own lag.
+"""
+
+import copy
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
@@ -16,15 +21,54 @@ from canshaper.config.schema import AxisSection
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import FullSpeed, full_speed, output_limits, stop_fault, when
+from canshaper.machine.stopping import (
+    FullSpeed,
+    allowed_s,
+    full_speed,
+    output_limits,
+    stop_fault,
+    when,
+)
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.stopping import Travel, allowed_s, needed_s, travel
+from canshaper.shaping.states import MOVING, CommandInput, Reason
 
 # Of a proportional valve with a first-order lag: that of the simulated crane, typical of pilot
 # stages. The tip travels on for so long at its last speed, whatever the commands did before.
 VALVE_LAG_S = 0.1
 _AXES_A_TABLE = 3  # as many as fit 80 columns
+# Until a filter of the schema gives full speed: five times the longest time constant.
+WARM_UP_S = 25.0
+# Releases that are tried: up to so long a stroke, at such intervals.
+LONGEST_PULSE_S = 4.0
+RELEASES_S = 0.1
+# Longer than the longest tail and the slowest fall of the schema.
+LONGEST_STOP_S = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """Travel after each event, seconds of full speed; and time.
+
+    Attributes:
+        release: the joystick goes to neutral.
+        reversal: the joystick goes to full speed the other way; what is still travelled in the old
+            direction.
+        lost: the joystick's frames end.
+        enable: enable released, or emergency stop.
+        reversal_s: how long it moves in the old direction after that reversal, s.
+    """
+
+    release: float
+    reversal: float
+    lost: float
+    enable: float
+    reversal_s: float
+
+    @classmethod
+    def worst(cls, travels: "list[Travel]") -> Self:
+        """The longest after each event."""
+        return cls(*(max(getattr(t, f.name) for t in travels) for f in fields(cls)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,3 +218,74 @@ def _motion_notes(deployment: Deployment) -> Iterator[RenderableType]:
                 " that one adds to the other comes on top.",
                 "dim",
             )
+
+
+def travel(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> Travel:
+    """Travel of an axis with its filter, computed by letting it run, in the worse direction.
+
+    Args:
+        new_axis: makes the axis.
+        timeout_s: age at which the joystick counts as lost.
+        period_s: time between two calls of ``ShapedAxis.tick``.
+    """
+    return Travel.worst([_travel(new_axis(), sign, timeout_s, period_s) for sign in (1.0, -1.0)])
+
+
+def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) -> Travel:
+    axis.tick(CommandInput())
+    for _ in range(round(WARM_UP_S / period_s)):
+        axis.tick(CommandInput(sign))
+    # An event waits for the next tick, and silence for the timeout before; until then it goes on.
+    full = sign * axis.sent
+
+    def after(joystick: CommandInput, wait_s: float = period_s) -> float:
+        return full * wait_s + _way(axis, joystick, sign, period_s)[0]
+
+    way, ticks = _way(axis, CommandInput(-sign), sign, period_s)
+    return Travel(
+        release=after(CommandInput()),
+        reversal=full * period_s + way,
+        lost=after(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), timeout_s + period_s),
+        enable=after(CommandInput(enabled=False)),
+        reversal_s=ticks * period_s,
+    )
+
+
+def needed_s(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> float:
+    """Travel to which an axis can be bounded without cutting the run-on of its filter short.
+
+    Of all strokes at full speed the worst one counts, and the wait for a lost joystick.
+
+    Args:
+        new_axis: makes the axis, with ``OutputLimits.run_on`` that bounds nothing.
+        timeout_s, period_s: as of ``travel``.
+    """
+    most = 0.0
+    ticks = max(round(RELEASES_S / period_s), 1)
+    for sign in (1.0, -1.0):
+        axis, way = new_axis(), 0.0
+        axis.tick(CommandInput())
+        for _ in range(round(LONGEST_PULSE_S / RELEASES_S)):
+            for _ in range(ticks):
+                axis.tick(CommandInput(sign))
+            way = max(way, _way(axis, CommandInput(), sign, period_s)[0])
+        most = max(most, sign * axis.sent * (timeout_s + 2.0 * period_s) + way)
+    return most
+
+
+def _way(
+    steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float
+) -> tuple[float, int]:
+    """How far the axis gets in the old direction, and for how many ticks it moves there."""
+    axis = copy.deepcopy(steady)
+    way_s = most_s = 0.0
+    last = 0
+    for tick in range(1, round(LONGEST_STOP_S / period_s) + 1):
+        axis.tick(joystick)
+        if axis.state not in MOVING:
+            break
+        velocity = sign * axis.sent
+        way_s += velocity * period_s
+        most_s = max(most_s, way_s)
+        last = tick if velocity > 0.0 else last
+    return most_s, last

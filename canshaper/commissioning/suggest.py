@@ -156,10 +156,7 @@ def counter(message: Message) -> str | None:
 def joysticks(messages: Sequence[Message]) -> list[Message]:
     """Messages that can be of a joystick, the likely ones first."""
     possible = [m for m in messages if not is_status(m) and (velocities(m) or one_sided(m))]
-    return sorted(
-        possible,
-        key=lambda m: (*_rank(m, possible), not _JOYSTICK.search(m.name)),
-    )
+    return sorted(possible, key=lambda m: (*_rank(m, possible), not _JOYSTICK.search(m.name)))
 
 
 def likely_joysticks(messages: Sequence[Message]) -> list[Message]:

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.limits import Sway
-from canshaper.config.origin import Origin
-from canshaper.config.section import RUN, Section, expanded, number
+from canshaper.config.objective import Objective
+from canshaper.config.section import RUN, Origin, Section, expanded, number
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 from canshaper.shaping.sway import SwayMode
@@ -33,30 +33,6 @@ class SecondMode(Section):
     length_range_pct: Annotated[
         float, number(0, 60, "%", "error of the pendulum length that it covers, +-")
     ]
-
-
-_Weight = Annotated[float, number(0, 1e6, "", "weight, as of the option of tune")]
-
-
-class Objective(Section):
-    """Objective by which the poles of a G_FF were chosen (Eq. 14-15); ``tune`` reads it again."""
-
-    q: list[Annotated[float, number(-1e6, 1e6, "", "weight")]] = Field(
-        [1.0, 1.0], max_length=4, description="Q: one number, its diagonal, or the matrix by rows"
-    )
-    r: _Weight = 1.0
-    s: _Weight = 3.0
-    p: _Weight = 1.0
-    states: str = Field("sway", description="what Q weighs")
-    preference: Annotated[float, number(0, 1, "", "instead: 0 quickest, 1 calmest")] | None = None
-    pole_distance: Annotated[
-        str, BeforeValidator(lambda word: "off" if word is False else word)  # as YAML 1.1 reads it
-    ] = Field("text", description="sense of Eq. 14e")
-    horizon_s: Annotated[float, number(0.2, 60, "s", "how long a step is watched")] = 3.0
-    third_pole: bool = Field(False, description="three poles")
-    within_command: bool | None = Field(None, description="the output never passes the command")
-    max_jump: Annotated[float, number(0.01, 100, "", "most that comes at once")] | None = None
-    max_run_on_s: Annotated[float, number(0.05, 20, "s", "longest run-on to 5 %")] | None = None
 
 
 class DesignedFor(Section):

@@ -1,13 +1,167 @@
-"""Sections of inputs besides joysticks: switches, enables, sensors."""
+"""Sections of inputs besides joysticks, and how a message is protected.
 
-from typing import Annotated, Any, Literal
+A message has an alive counter and a checksum, or a profile of AUTOSAR E2E.
+"""
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from canshaper.config.origin import Origin
-from canshaper.config.protection import Protected
-from canshaper.config.section import Section, number
-from canshaper.shaping.sway_sensor import Measured
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+
+from canshaper.checksums.kinds import checksum_names, known_checksum
+from canshaper.config.section import Origin, Section, number
+from canshaper.shaping.sway import Measured
+
+
+def _kinds(schema: dict[str, Any]) -> None:
+    """Names of the kinds into the JSON schema, when that is made."""
+    schema["enum"] = checksum_names()
+
+
+class Checksum(Section):
+    """Checksum of a message, over all its bits but its own."""
+
+    signal: str
+    """Signal that holds it, unsigned: half a byte, a byte, or two bytes in the byte order of the
+    DBC."""
+    kind: Annotated[str, BeforeValidator(known_checksum)] | None = Field(
+        None,
+        description="how it is computed",
+        examples=["crc8_sae_j1850"],
+        json_schema_extra=_kinds,
+    )
+    polynomial: Annotated[int, number(1, 0xFFFF, "", "polynomial")] | None = None
+    """Instead of a kind: polynomial, without its highest bit, of a CRC of as many bits as its
+    signal has, 8 or 16."""
+    start: Annotated[int, number(0, 0xFFFF, "", "register before the first byte")] = 0
+    end: Annotated[int, number(0, 0xFFFF, "", "what changes the register after the last byte")] = 0
+    reflected: bool = Field(False, description="the lowest bit of each byte comes first")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.kind is None) == (self.polynomial is None):
+            got = "neither" if self.kind is None else "both"
+            raise ValueError(f"expected one of kind and polynomial, got {got}")
+        if self.kind is not None and (self.start or self.end or self.reflected):
+            raise ValueError("start, end and reflected: expected with polynomial, got kind")
+        return self
+
+
+class Profile(NamedTuple):
+    """A profile of AUTOSAR E2E.
+
+    Attributes:
+        needs: keys that say which message it is.
+        header: where CRC, counter and all else stand.
+        counter: its values.
+        crc: how it is computed.
+    """
+
+    needs: tuple[str, ...]
+    header: str
+    counter: str
+    crc: str
+
+
+_MODE = ("data_id", "data_id_mode")
+_HEADER = "CRC in byte 0, counter in the lower half of byte 1"
+_CRC_1 = "SAE J1850, polynomial 0x1D, starts with 0, not inverted; data ID by its mode first"
+_CRC_2 = "polynomial 0x2F, starts with 0xFF, inverted; the data ID of the counter last"
+PROFILES = {
+    "p01": Profile(_MODE, _HEADER, "0 to 14 (15 is invalid)", _CRC_1),
+    "p02": Profile(("data_ids",), _HEADER, "0 to 15", _CRC_2),
+    "p04": Profile(
+        ("data_id",),
+        "of CAN FD: 12 bytes, high bytes first: length, counter, data ID of 32 bits, CRC-32",
+        "0 to 65535",
+        "polynomial 0xF4ACFB13",
+    ),
+    "p05": Profile(
+        ("data_id",),
+        "CRC-16 in bytes 0 and 1, low byte first, counter in byte 2",
+        "0 to 255",
+        "polynomial 0x1021, starts with 0xFFFF; data ID of 16 bits last, low byte first",
+    ),
+    "p06": Profile(
+        ("data_id",),
+        "as p05 with high bytes first; bytes 2 and 3 are the length, byte 4 the counter",
+        "0 to 255",
+        "as p05 with high bytes first",
+    ),
+    "p07": Profile(
+        ("data_id",),
+        "of CAN FD: 20 bytes: CRC-64, then length, counter and data ID of 32 bits each",
+        "of 32 bits",
+        "polynomial 0x42F0E1EBA9EA3693",
+    ),
+    "p11": Profile(_MODE, "as p01", "0 to 14 (15 is invalid)", "as p01, both or nibble"),
+    "p22": Profile(("data_ids",), "as p02", "0 to 15", "as p02"),
+}
+"""Profiles by their names in the file; docs/deployment.md has them as a table."""
+
+
+class E2e(Section):
+    """A profile of AUTOSAR E2E: CRC and counter in the first bytes of the message."""
+
+    profile: Literal["p01", "p02", "p04", "p05", "p06", "p07", "p11", "p22"] = Field(
+        description="profile of AUTOSAR E2E"
+    )
+    data_id: Annotated[int, number(0, 0xFFFF_FFFF, "", "data ID of the message")] | None = None
+    """Data ID of the message: of 32 bits in profiles 4 and 7, else of 16."""
+    data_id_mode: Literal["both", "low", "alternating", "nibble"] | None = None
+    """Which bytes of the data ID enter the CRC, profiles 1 and 11: both, the low byte, then the
+    high byte; low, the low byte; alternating, the low byte with even counters, the high byte with
+    odd ones; nibble, the low byte, then zero, of 12 bits, whose upper four are sent in the upper
+    half of byte 1. Profile 11 has both and nibble only."""
+    data_ids: (
+        Annotated[
+            list[Annotated[int, number(0, 0xFF, "", "data ID")]],
+            Field(min_length=16, max_length=16, description="data IDs by the counter"),
+        ]
+        | None
+    ) = None
+    """Profiles 2 and 22: 16 data IDs, of which the counter chooses one."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        needs = [*PROFILES[self.profile].needs]
+        given = [k for k in ("data_id", "data_id_mode", "data_ids") if getattr(self, k) is not None]
+        if given != needs:
+            got = " and ".join(given) or "no data ID"
+            expected = " and ".join(needs)
+            raise ValueError(f"expected {expected} with profile {self.profile}, got {got}")
+        if self.profile == "p11" and self.data_id_mode not in ("both", "nibble"):
+            text = "expected both or nibble with profile p11"
+            raise ValueError(f"data_id_mode: {text}, got {self.data_id_mode}")
+        if (self.data_id or 0) > 0xFFFF and self.profile not in ("p04", "p07"):
+            text = f"data_id: expected up to 0xffff with profile {self.profile}"
+            raise ValueError(f"{text}, got {self.data_id:#x}")
+        if self.data_id_mode == "nibble" and (self.data_id or 0) > 0xFFF:
+            raise ValueError(f"data_id: expected up to 0xfff in mode nibble, got {self.data_id:#x}")
+        return self
+
+
+class Protected(Section):
+    """A message that is received or sent, and its protection."""
+
+    bus: str = Field(description="name of the bus of the message")
+    message: str = Field(description="message in the DBC files")
+    alive_counter: str | None = None
+    """Unsigned signal that counts up with every message and begins again at 0."""
+    checksum: Checksum | None = None
+    """Checksum of the message."""
+    e2e: E2e | None = None
+    """Instead of both: a profile of AUTOSAR E2E."""
+    cycle_ms: (
+        Annotated[int, number(1, 60_000, "ms", "its period, instead of GenMsgCycleTime")] | None
+    ) = None
+    """Its period instead of GenMsgCycleTime, where the DBC has none or a wrong one."""
+    multiplexor: Annotated[int, number(0, 2**32, "", "value of the multiplexor")] | None = None
+    """Value of the multiplexor with which the message is meant; what we send carries it. Of frames
+    with another value only checksum and counter are checked, where they have them too."""
+
+
+class Status(Protected):
+    """A status message for displays and tools."""
 
 
 class InputSection(Protected):

@@ -4,10 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from canshaper.config.inputs import InputSection, NamedCodes
-from canshaper.config.origin import Origin
-from canshaper.config.protection import Status
-from canshaper.config.section import Section, number
+from canshaper.config.inputs import InputSection, NamedCodes, Status
+from canshaper.config.section import Origin, Section, number
 from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.sway import SwayMode
 

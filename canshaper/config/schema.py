@@ -16,12 +16,13 @@ from canshaper.config.filters import (
 from canshaper.config.inputs import (
     InputSection,
     NamedCodes,
+    Protected,
+    Status,
     SwaySensorSection,
     SwitchNames,
     SwitchSection,
 )
 from canshaper.config.limits import Hydraulics, Limits, Motion, Slewing, Sway
-from canshaper.config.protection import Protected, Status
 from canshaper.config.section import VERSION, Section, number
 from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.shaping.registry import KINDS

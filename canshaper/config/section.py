@@ -1,14 +1,15 @@
-"""Parts of which every configuration file is made."""
+"""Parts of which every configuration file is made: sections, and origins of measured numbers."""
 
 import ast
 import inspect
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from datetime import date
 from functools import cache
-from itertools import groupby, pairwise
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -102,15 +103,6 @@ _RUN = re.compile(RUN)
 _MOST = 10_000  # far above any list's own limit: what a few runs could make is not made
 
 
-def shortened(numbers: Sequence[float]) -> list[float | str]:
-    """The list as it is written; ``expanded`` gives the same numbers back, to the last bit."""
-    runs: list[float | str] = []
-    for number, equal in groupby(numbers):
-        count = len([*equal])
-        runs.append(number if count == 1 else f"{count} x {number!r}".removesuffix(".0"))
-    return runs
-
-
 def expanded(entries: Any) -> Any:
     """The list as it is meant; what is no run of a number stays for others to judge."""
     if not isinstance(entries, list):
@@ -122,3 +114,33 @@ def expanded(entries: Any) -> Any:
         if len(numbers) > _MOST:
             break
     return numbers
+
+
+class Origin(Section):
+    """Where numbers come from; written with them."""
+
+    date: str = Field(
+        description="day on which they were written", json_schema_extra={"format": "date"}
+    )
+    log: str | None = Field(
+        None, description="what they were computed from: name of the log, stopwatch"
+    )
+    by: str = Field(description="verb and version that wrote them")
+    source: Literal["machine", "simulated"] | None = Field(
+        None, description="measured on the machine or on a simulated crane; none where not known"
+    )
+
+    @model_validator(mode="after")
+    def _a_day(self) -> Self:
+        try:
+            date.fromisoformat(self.date)
+        except ValueError:
+            raise ValueError(f"date: expected one such as 2026-11-23, got {self.date!r}") from None
+        return self
+
+
+def simulated(part: Any, place: Place = ()) -> Iterator[Place]:
+    """Where a part of a deployment has numbers that were measured on a simulated crane."""
+    for where, section in sections(part, place):
+        if isinstance(section, Origin) and section.source == "simulated":
+            yield where

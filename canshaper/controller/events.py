@@ -13,10 +13,7 @@ from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 if TYPE_CHECKING:
     from canshaper.shaping.swing_length import SwingLength
 
-FAULT_OF = {
-    Following.NO: FrameFault.NOT_FOLLOWING,
-    Following.LOST: FrameFault.FEEDBACK_LOST,
-}
+FAULT_OF = {Following.NO: FrameFault.NOT_FOLLOWING, Following.LOST: FrameFault.FEEDBACK_LOST}
 
 
 @dataclass(frozen=True, slots=True)

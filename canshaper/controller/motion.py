@@ -90,9 +90,7 @@ class MotionRunner:
         if self._near_far:
             self._near_far.bound(config)
         self._motion = TwoAxisMotion(
-            turning.moving,
-            self._near_far.moving if self._near_far else None,
-            config.max_path_m,
+            turning.moving, self._near_far.moving if self._near_far else None, config.max_path_m
         )
 
     def adjust(self) -> None:

@@ -85,11 +85,7 @@ class SetChooser:
     """
 
     def __init__(
-        self,
-        bound: BoundAxis,
-        axis: ShapedAxis,
-        load: Load | None,
-        profile: ProfileChoice | None,
+        self, bound: BoundAxis, axis: ShapedAxis, load: Load | None, profile: ProfileChoice | None
     ) -> None:
         config = bound.config
         self.number = 0

@@ -10,8 +10,7 @@ from canshaper.codec.status import StatusCodec
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.controller.valve_messages import Counters
-from canshaper.machine.deployment import Deployment
-from canshaper.machine.motion import BoundMotion
+from canshaper.machine.deployment import BoundMotion, Deployment
 from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.demands import RunOn
 from canshaper.shaping.states import State, Trust

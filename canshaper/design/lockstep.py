@@ -239,12 +239,7 @@ class Simulation:
             hands = [*map(disturb, hands)]
         guarded = Guarded(self.controller)
         self._lock_step = LockStep(
-            deployment,
-            guarded,
-            self.plant,
-            hands,
-            on_frame,
-            received=deployment.routing.received,
+            deployment, guarded, self.plant, hands, on_frame, received=deployment.routing.received
         )
         self._loads = [*options.get("loads", ())]
         self._end_ms = round(script.duration_s * 1000.0)

@@ -13,7 +13,9 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from difflib import unified_diff
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +26,9 @@ from canshaper.config.schema import AxisSection
 from canshaper.config.section import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source, read_bounded
 from canshaper.edit.spans import Edit
-from canshaper.errors import ConfigError, Problem
+from canshaper.errors import ConfigError, Problem, printable
 from canshaper.machine.binding import load_deployment
+from canshaper.shipped import version
 
 # Text that is read as itself: a path, a word, several, a run of numbers, a date.
 _PLAIN = re.compile(
@@ -245,3 +248,34 @@ def _check(path: Path, temporary: Path, expected: Any) -> None:
 def _failed(path: Path, error: OSError) -> ConfigError:
     text = f"not written, the file is as it was: {error.strerror or error}"
     return ConfigError([Problem(str(path), None, "", text)])
+
+
+def shortened(numbers: Sequence[float]) -> list[float | str]:
+    """The list as it is written; ``config.section.expanded`` gives it back to the last bit."""
+    runs: list[float | str] = []
+    for number, equal in groupby(numbers):
+        count = len([*equal])
+        runs.append(number if count == 1 else f"{count} x {number!r}".removesuffix(".0"))
+    return runs
+
+
+def written_by(verb: str, *, simulated: bool | None, log: str | None = None) -> dict[str, Any]:
+    """Origin of numbers that are written now, by key.
+
+    Args:
+        verb: that writes them.
+        simulated: whether they were measured on a simulated crane; None where it is not known.
+        log: name of the log they were computed from.
+    """
+    values: dict[str, Any] = {"date": f"{datetime.now(UTC).date()}"}
+    if log is not None:
+        values["log"] = printable(log)
+    values["by"] = f"canshaper {verb} {version()}"
+    if simulated is not None:
+        values["source"] = "simulated" if simulated else "machine"
+    return values
+
+
+def note(verb: str) -> str:
+    """Return the comment that replaces those on numbers that a verb has written."""
+    return f"Written by canshaper {verb}."

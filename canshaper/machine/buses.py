@@ -14,9 +14,8 @@ from canshaper.codec.layout import is_fd
 from canshaper.codec.message import SentMessage
 from canshaper.config.bus import LAST_SPN, Bus, Gateway, J1939Name
 from canshaper.config.schema import DeploymentConfig
-from canshaper.config.source import Place
+from canshaper.config.source import Diagnostics, Place
 from canshaper.errors import did_you_mean
-from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.lookup import Lookup
 
 # Characters of the name of an interface (linux/if.h, IFNAMSIZ less the end).

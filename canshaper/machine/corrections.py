@@ -13,7 +13,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.layout import Chosen, frame_length
 from canshaper.codec.signals import STEP_ROUNDING, raw_limits
-from canshaper.config.protection import Protected
+from canshaper.config.inputs import Protected
 from canshaper.config.schema import DeploymentConfig, Scaling
 from canshaper.config.section import sections
 from canshaper.machine.named_codes import Listing

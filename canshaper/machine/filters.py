@@ -3,13 +3,11 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from canshaper.config.adjust import Key, adjusted, faults
 from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.filters import Breakpoint, Filter, Profile
 from canshaper.config.limits import Sway
 from canshaper.config.schema import AxisSection, DeploymentConfig
-from canshaper.config.source import Place
-from canshaper.machine.diagnostics import Diagnostics
+from canshaper.config.source import Diagnostics, Place
 from canshaper.machine.lookup import Lookup
 from canshaper.shaping.registry import KINDS, STEPS_BETWEEN, ParameterSet, at_position, build_shaper
 from canshaper.shaping.sway import SwayMode, SwayModel
@@ -44,7 +42,11 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: flo
 def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -> None:
     """Check that the filter runs, scaled to each end of an adjustable number of the swing."""
     control, rate = lookup.config.control, axis.limits.slowest_per_s
-    for text, ends in (control.adjustable if control else {}).items():
+    if control is None:
+        return
+    from canshaper.config.adjust import Key, adjusted, faults
+
+    for text, ends in control.adjustable.items():
         key = Key.parsed(text)
         if key is None or (key.axis, key.section) != (name, "sway") or [*faults(key, axis, *ends)]:
             continue
@@ -103,9 +105,12 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
     """Check that every adjustable number can be changed in motion, and speed while faults are."""
-    add, adjustable = diagnostics.add, config.control.adjustable if config.control else {}
-    slow = config.control is not None and config.control.rehearse_faults
-    for text, (low, high) in adjustable.items():
+    if config.control is None:
+        return
+    from canshaper.config.adjust import Key, faults
+
+    add, slow = diagnostics.add, config.control.rehearse_faults
+    for text, (low, high) in config.control.adjustable.items():
         place = ("control", "adjustable", text)
         key = Key.parsed(text)
         if key is None:
@@ -115,11 +120,11 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
                 add(place, fault)
             if slow and key.name == "max_pct" and high > REDUCED_PCT:
                 add(place, f"expected up to {REDUCED_PCT:g} with rehearse_faults, got {high:g}")
-    fast: dict[Place, float] = {}
-    if slow:
-        fast = {("axes", n, "limits", "max_pct"): a.limits.max_pct for n, a in config.axes.items()}
-        fast |= {("motion", n, "max_pct"): one.max_pct for n, one in config.motion.items()}
-    for where, most in fast.items():
+    if not slow:
+        return
+    fast = {("axes", n, "limits", "max_pct"): a.limits.max_pct for n, a in config.axes.items()}
+    motions = {("motion", n, "max_pct"): one.max_pct for n, one in config.motion.items()}
+    for where, most in (fast | motions).items():
         if most > REDUCED_PCT:
             text = f"expected up to {REDUCED_PCT:g} with control.rehearse_faults"
             add(where, f"{text}, got {most:g}")

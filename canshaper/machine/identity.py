@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from canshaper.codec.status import DIGEST_BITS, Source, StatusCodec, StatusField, status_faults
-from canshaper.config.protection import Status
+from canshaper.config.inputs import Status
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection

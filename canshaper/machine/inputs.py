@@ -6,7 +6,7 @@ from typing import Any, Generic, TypeVar
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
+from canshaper.codec.frame import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.message import Protection
 from canshaper.codec.signals import ends_fault, find_signal, radius_range

@@ -18,8 +18,7 @@ from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, VelocitySi
 from canshaper.config.enable import conditions, named_by
 from canshaper.config.inputs import SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
-from canshaper.config.source import Place
-from canshaper.machine.diagnostics import Diagnostics
+from canshaper.config.source import Diagnostics, Place
 from canshaper.machine.inputs import OF_MESSAGE, Bound, BoundJoystick, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import SWITCH, SWITCHES, UsedMessage, flag_of

@@ -7,7 +7,7 @@ from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     NULL,
     WITHOUT_PRIORITY,
     group_of,
@@ -17,14 +17,13 @@ from canshaper.codec.identifier import (
 )
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, is_fd, is_j1939
 from canshaper.codec.message import Protection, SentMessage
-from canshaper.config.protection import Protected
+from canshaper.config.inputs import Protected
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import sections
-from canshaper.config.source import Place
+from canshaper.config.source import Diagnostics, Place
 from canshaper.machine.corrections import bit_names, chosen, corrected, scalings
 from canshaper.machine.database import MOST_BYTES, Messages, load_dbc, too_many
 from canshaper.machine.dbc_parse import MOST_PARSED
-from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.named_codes import Listing, check_codes, listings
 from canshaper.machine.used_message import NamedCode, StartValue, UsedMessage, key_path
 

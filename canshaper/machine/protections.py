@@ -7,8 +7,8 @@ from cantools.database.can import Signal
 
 from canshaper.checksums.kinds import CHECKSUMS, CRC_WIDTHS, Checksum, crc_kind
 from canshaper.codec.message import UNPROTECTED, Protection
-from canshaper.config.protection import Checksum as ChecksumConfig
-from canshaper.config.protection import Protected
+from canshaper.config.inputs import Checksum as ChecksumConfig
+from canshaper.config.inputs import Protected
 from canshaper.config.source import Place
 from canshaper.machine.used_message import UsedMessage
 

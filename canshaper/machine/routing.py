@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     CLAIMED,
     EMERGENCY,
     HEARTBEAT,

@@ -5,12 +5,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TypedDict
 
-from canshaper.config.origin import simulated
 from canshaper.config.schema import AxisSection, DeploymentConfig
+from canshaper.config.section import simulated
 from canshaper.config.source import Place
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.stopping import allowed_s
 
 # Farthest that limits allow without a word of the file: what a tip at 1 m/s, a usual speed of
 # near-far, travels in the default tail of 2 s. A person next to the load needs to know of more.
@@ -52,6 +51,32 @@ def output_limits(axis: AxisSection, *, timeout_ms: int, period_s: float) -> Out
         return limits
     waits = limits.maximum * (timeout_ms / 1000.0 + 2.0 * period_s)
     return replace(limits, run_on=stated / speed - waits)
+
+
+def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s: float) -> float:
+    """Travel that the limits allow after release or a lost joystick, whatever the filter does.
+
+    Full speed until the event is seen, full speed for the whole tail, then the slowest fall; where
+    the run-on is bounded no farther than that, and a period for the tick in which it ends.
+
+    Args:
+        limits: limits of the axis.
+        stop_s: longest duration of STOPPING.
+        timeout_s: age at which the joystick counts as lost.
+        period_s: time between two commands to the valve; an event waits so long at most.
+
+    Returns:
+        Seconds of full speed.
+    """
+    full, fall = limits.maximum, limits.fall_per_s
+    # Durations are whole ticks; the longest that rounding makes of them.
+    tail_s, stop_s = limits.tail_s + 0.5 * period_s, max(stop_s + 0.5 * period_s, period_s)
+    falling_s = min(full / fall, max(0.0, stop_s - tail_s))
+    stop = full * min(tail_s, stop_s) + (full - 0.5 * fall * falling_s) * falling_s
+    release = full * tail_s + 0.5 * full * full / fall
+    run_on = limits.run_on + full * period_s
+    stop, release = min(stop, run_on), min(release, run_on)
+    return max(full * (timeout_s + period_s) + stop, full * period_s + release)
 
 
 def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float | None:

@@ -14,8 +14,7 @@ from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
 from canshaper.shaping.free_swing import SensorGains, sensor_gains
 from canshaper.shaping.registry import KINDS
-from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming, SwayMode
 
 _ANGLES = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3}
 UNITS = {

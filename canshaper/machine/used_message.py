@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.identifier import STATE_BITS
+from canshaper.codec.frame import STATE_BITS
 from canshaper.codec.layout import Chosen, is_j1939
 from canshaper.codec.sense import contrary, shows_sway_control
 from canshaper.codec.signals import code_fault, find_signal, names_broken, raw_fault, raw_limits
-from canshaper.config.source import Place
+from canshaper.config.source import Diagnostics, Place
 from canshaper.errors import there_are
 from canshaper.machine.database import DbcFile
-from canshaper.machine.diagnostics import Diagnostics
 
 _OTHER = "name another signal, or correct VAL_ where the DBC is wrong or says neither"
 

@@ -12,8 +12,7 @@ from pathlib import Path
 from cantools.database.can import Message, Signal
 
 from canshaper.bus.packet import FDF
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import NULL, with_source
+from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.layout import CLASSICAL_BYTES, Layout, layout_fault
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
@@ -33,9 +32,7 @@ MOST_CODE_BITS = 8  # of a signal whose values are names
 
 @contextmanager
 def exporting(
-    path: Path | None,
-    deployment: Deployment,
-    parameters: CraneParameters | None = None,
+    path: Path | None, deployment: Deployment, parameters: CraneParameters | None = None
 ) -> Iterator["Export | None"]:
     """Write a drive into a file of one of ``EXTRAS``; without a path there is none.
 

@@ -14,23 +14,23 @@ from typing import Any
 
 from canshaper.config.source import encoding_of
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording import asc, binary, blf, loggers, mcap_read, pcap, tables, trc
+from canshaper.recording import asc, binary, candump, captures, tables
 from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 
 READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
-    ".log": loggers.log,
+    ".log": candump.log,
     ".asc": asc.asc,
-    ".blf": blf.blf,
+    ".blf": captures.blf,
     ".csv": tables.csv,
     ".db": binary.database,
-    ".mcap": mcap_read.mcap,
+    ".mcap": binary.mcap,
     ".mf4": binary.mf4,
-    ".trc": trc.trc,
-    ".txt": loggers.kvaser,
-    ".pcap": pcap.pcap,
-    ".pcapng": pcap.pcap,
+    ".trc": asc.trc,
+    ".txt": candump.kvaser,
+    ".pcap": captures.pcap,
+    ".pcapng": captures.pcap,
 }
 BINARY = frozenset((".blf", ".db", ".mcap", ".mf4", ".pcap", ".pcapng"))
 # Two sockets of one logger are not read in the order in which their frames came.

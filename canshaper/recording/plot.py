@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from canshaper.recording.report import Replayed
 from canshaper.recording.ticks import STATE_CHANGE
+from canshaper.report.console import axis_title
 from canshaper.report.style import (
     DASHED,
     JOYSTICK_COLOUR,
@@ -30,7 +31,6 @@ from canshaper.report.style import (
     titled,
     zero_line,
 )
-from canshaper.report.table import axis_title
 from canshaper.shaping.reasons import REASON_TEXTS
 from canshaper.shaping.states import MOVING, Reason, State
 from canshaper_sim.recording import Recording

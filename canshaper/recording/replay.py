@@ -7,8 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from canshaper.blackbox.file import SUFFIX, Box, read_box
-from canshaper.codec.frame import Frame, new_frame
-from canshaper.codec.identifier import group_of
+from canshaper.codec.frame import Frame, group_of, new_frame
 from canshaper.controller.controller import Controller
 from canshaper.errors import BoxError, CutOffError, LogError, StateError
 from canshaper.machine.deployment import Deployment

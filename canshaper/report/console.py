@@ -1,6 +1,6 @@
-"""Text on a terminal: names of others are text, one look of tables, one bar."""
+"""Text on a terminal: names of others are text, one look of tables, one bar, drives compared."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -9,8 +9,10 @@ from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
 from rich.table import Table
+from rich.text import Text
 
 from canshaper.errors import printable
+from canshaper.report.metrics import HORIZONTAL_DEG, MIN_RAW_DEG
 
 MOST_COLUMNS = 10_000  # of a terminal that takes any table
 
@@ -112,3 +114,137 @@ def progress_bar(what: str, total: float = 1.0, *, refresh_hz: float = 10) -> It
             bar.update(task, completed=min(done, total), description=what)
 
         yield on_progress
+
+
+PairRow = tuple[str, str, float, int]  # words, name of the measure, scale, digits
+
+NOTHING = "-"
+_DRIVES = {"filters off": "raw", "filters on": "shaped"}
+_AXES_A_TABLE = 3  # as many as fit 80 columns
+_SWAY_ROWS = (
+    ("peak sway, deg", "peak"),
+    ("RMS sway, deg", "rms"),
+    ("residual sway, deg", "residual"),
+)
+STILL_S = "still_s"
+_STILL: PairRow = ("still after, s", STILL_S, 1.0, 1)
+_CRANE_ROWS: Sequence[PairRow] = (
+    ("run-on, s", "run_on_s", 1.0, 2),
+    ("run-on, m", "run_on_m", 1.0, 2),
+)
+_PAIR_ROWS: Sequence[PairRow] = (
+    ("time to 95 %, s", "time_to_95_s", 1.0, 2),
+    ("run-on, s", "run_on_s", 1.0, 2),
+    ("dip after press, %", "dip", 100.0, 0),
+    ("re-rise, %", "re_rise", 100.0, 0),
+)
+
+
+def print_report(report: Mapping[str, Any], console: Console) -> None:
+    """Print a report of ``metrics.report_dict``; it fits in 80 columns.
+
+    Sway is given in degrees, raw then shaped, and the reduction; dip and re-rise in percent of
+    full command. A row is what the drive has at least one measure of; "-" where an axis has none.
+    """
+    arrow = "→" if (console.encoding or "").lower().startswith("utf") else "->"
+    if crane := report["crane"]:
+        peaks = {name: crane[one]["peak_deg"] or 0.0 for name, one in _DRIVES.items()}
+        if over := [name for name, peak in peaks.items() if peak > HORIZONTAL_DEG]:
+            text = f"The grapple swung above the horizontal with {' and '.join(over)}"
+            console.print(Text(f"{text}: these figures say nothing", "bold red"))
+        console.print(_table({"whole crane": crane}, _CRANE_ROWS, arrow))
+    axes = list(report["axes"].items())
+    for first in range(0, len(axes), _AXES_A_TABLE):
+        table = _table(dict(axes[first : first + _AXES_A_TABLE]), _PAIR_ROWS, arrow)
+        if table.row_count:
+            console.print(table)
+    same = f"raw {arrow} shaped: the same script with filters off, then on; still: below"
+    console.print(Text(f"{same} {report['still_deg']:g} deg", "dim"))
+    for name, axis in report["axes"].items():
+        line = _cross_line(name, axis, arrow)
+        if line is not None:
+            console.print(line)
+    console.print(_drive_line(report))
+
+
+def axis_title(name: str) -> str:
+    """Name of an axis as a reader expects it: ``near_far`` becomes ``Near-far``."""
+    return name.replace("_", "-").capitalize()
+
+
+def _table(axes: Mapping[str, Any], pairs: Sequence[PairRow], arrow: str) -> Table:
+    """One column an axis, one row a measure: fits a narrow terminal."""
+    table = new_table("", *map(axis_title, axes))
+    title, key, scale, digits = _STILL
+    rows = [(title, [_pair_cell(axis, key, scale, digits, arrow) for axis in axes.values()])]
+    rows += [
+        (title, [_sway_cell(axis, measure, arrow) for axis in axes.values()])
+        for title, measure in _SWAY_ROWS
+    ] + [
+        (title, [_pair_cell(axis, key, scale, digits, arrow) for axis in axes.values()])
+        for title, key, scale, digits in pairs
+    ]
+    for title, cells in rows:
+        if any(cell.plain != NOTHING for cell in cells):
+            table.add_row(title, *cells)
+    return table
+
+
+def _sway_cell(axis: Mapping[str, Any], measure: str, arrow: str) -> Text:
+    cell = _pair_cell(axis, f"{measure}_deg", 1.0, 1, arrow)
+    reduction = axis[f"{measure}_reduction_pct"]
+    if reduction is not None:
+        change, style = _change(reduction)
+        cell.append(f"  {change:>5}", style)
+    return cell
+
+
+def _pair_cell(axis: Mapping[str, Any], key: str, scale: float, digits: int, arrow: str) -> Text:
+    values = [axis[drive][key] for drive in ("raw", "shaped")]
+    if values == [None, None]:
+        return Text(NOTHING, style="dim")
+    numbers = [_number(None if v is None else scale * v, digits) for v in values]
+    if key == STILL_S:  # of a drive that ended before only a lower bound is known
+        on = (axis[drive]["swings_on"] for drive in ("raw", "shaped"))
+        numbers = [f">{one}" if more else one for one, more in zip(numbers, on, strict=True)]
+    return Text(f" {arrow} ".join(numbers))
+
+
+def _cross_line(name: str, axis: Mapping[str, Any], arrow: str) -> Text | None:
+    """Say what swing is left in the other plane; None where there is none to speak of."""
+    raw, shaped = axis["raw"]["cross_residual_deg"], axis["shaped"]["cross_residual_deg"]
+    if max(raw or 0.0, shaped or 0.0) < MIN_RAW_DEG:
+        return None
+    line = Text(
+        f"After {axis_title(name).lower()}, residual sway in the other plane: "
+        f"{_number(raw, 1)} {arrow} {_number(shaped, 1)} deg"
+    )
+    reduction = axis["cross_residual_reduction_pct"]
+    if reduction is not None:
+        line.append("  ").append(*_change(reduction))
+    return line
+
+
+def _drive_line(report: Mapping[str, Any]) -> Text:
+    missed = report["missed_deadlines"]
+    line = Text("Missed deadlines: ")
+    line.append(NOTHING if missed is None else str(missed), style="bold red" if missed else "bold")
+    line.append(f"   transport: {report['transport']}   drive: {report['duration_s']:.1f} s")
+    return line
+
+
+def change_text(reduction_pct: float) -> str:
+    """A reduction as a change with its sign: of 97 % it reads "-97 %", nearly all is not all."""
+    change = round(-reduction_pct)
+    if change == -100 and reduction_pct < 100.0:
+        return f"{-reduction_pct:+.1f} %" if reduction_pct < 99.95 else "-99.9 %"
+    return f"{change:+d} %" if change else "0 %"
+
+
+def _change(reduction_pct: float) -> tuple[str, str]:
+    """Return the change, and a style that says whether it is one for the better."""
+    return change_text(reduction_pct), "bold red" if round(-reduction_pct) > 0 else "bold green"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return NOTHING if value is None else f"{value:.{digits}f}"

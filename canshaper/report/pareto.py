@@ -10,17 +10,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from canshaper.report.style import (
-    HEAD_PT,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_PT,
-    TITLE_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-)
+from canshaper.report import style
 
 LIMIT_COLOUR = "#555555"
 _HEIGHT_PX = 2040
@@ -58,15 +48,15 @@ class Limits:
 
 def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
     """The picture: run-on above, rise below; direct labels."""
-    drawn = new_figure(
-        WIDTH_PX, _HEIGHT_PX, dpi=PRINT_DPI, layout=ConstrainedLayoutEngine(rect=_RECT)
+    drawn = style.new_figure(
+        style.WIDTH_PX, _HEIGHT_PX, dpi=style.PRINT_DPI, layout=ConstrainedLayoutEngine(rect=_RECT)
     )
-    drawn.suptitle(title, x=0.01, ha="left", fontsize=HEAD_PT, fontweight="bold")
+    drawn.suptitle(title, x=0.01, ha="left", fontsize=style.HEAD_PT, fontweight="bold")
     panels = drawn.subplots(2, 1, sharey=True)
     panels[0].set_title(
         "blue dots: ours, orange squares: the others; further down and left is better",
         loc="left",
-        fontsize=TITLE_PT,
+        fontsize=style.TITLE_PT,
     )
     values = [p.worst_deg for p in points]
     for axes, label, seconds in (
@@ -81,11 +71,11 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_xlabel(label, fontsize=TEXT_PT)
+        axes.set_xlabel(label, fontsize=style.TEXT_PT)
         axes.set_ylabel(
-            "largest residual swing at\n±30 % pendulum length, degrees", fontsize=TEXT_PT
+            "largest residual swing at\n±30 % pendulum length, degrees", fontsize=style.TEXT_PT
         )
-        plain(axes, size=TEXT_PT)
+        style.plain(axes, size=style.TEXT_PT)
         axes.set_xlim(0.0, max(seconds) * 1.3)
         axes.set_ylim(0.5 * min(values), 1.5 * max(values))
     _limits(panels[0], limits)
@@ -103,13 +93,13 @@ def _limits(axes: Axes, limits: Limits) -> None:
         axes.plot(x, y, color=LIMIT_COLOUR, linestyle="--", linewidth=1.2)
         axes.annotate(
             "limit of every shaper\nwithin the valve's rate,\nnear-far alone",
-            (x[3], y[3]),
-            xytext=(-6, -4),
+            (x[1], y[1]),
+            xytext=(6, 0),
             textcoords="offset points",
-            va="top",
-            ha="right",
+            va="bottom",
+            ha="left",
             color=LIMIT_COLOUR,
-            fontsize=TEXT_PT,
+            fontsize=style.TEXT_PT,
         )
     axes.axvline(limits.time_optimal_s, color=LIMIT_COLOUR, linestyle=":", linewidth=1.2)
     axes.annotate(
@@ -122,7 +112,7 @@ def _limits(axes: Axes, limits: Limits) -> None:
         ha="right",
         rotation=90,
         color=LIMIT_COLOUR,
-        fontsize=TEXT_PT,
+        fontsize=style.TEXT_PT,
     )
 
 
@@ -140,7 +130,7 @@ def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> No
 
     for i in sorted(range(len(points)), key=room):  # the most crowded first
         point, (x, y) = points[i], places[i]
-        colour, marker = (SHAPED_COLOUR, "o") if point.ours else (RAW_COLOUR, "s")
+        colour, marker = (style.SHAPED_COLOUR, "o") if point.ours else (style.RAW_COLOUR, "s")
         axes.plot(*spots[i], marker, color=colour, markersize=4.5)
         others = [*names, *dots[:i], *dots[i + 1 :]]
         tries = [_Try(x, y, dx, h * _LINE_PX, point.name) for h in _HEIGHTS for dx in _ASIDE_PX]
@@ -160,7 +150,7 @@ def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> No
             ha="left" if chosen.dx > 0 else "right",
             va="center",
             color=colour,
-            fontsize=TEXT_PT,
+            fontsize=style.TEXT_PT,
             arrowprops=_line(colour, chosen.dx) if chosen.line else None,
         )
 

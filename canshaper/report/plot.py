@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from canshaper.report.console import NOTHING, axis_title, change_text
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,
@@ -34,13 +35,12 @@ from canshaper.report.style import (
     WIDTH_PX,
     coloured_words,
     command_scale,
+    draw_top_views,
     new_figure,
     plain,
     titled,
     zero_line,
 )
-from canshaper.report.table import NOTHING, axis_title, change_text
-from canshaper.report.top_view import draw_top_views
 from canshaper_sim.recording import Recording
 
 WINDOW_COLOUR = "#FBE5A6"

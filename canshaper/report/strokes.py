@@ -145,10 +145,7 @@ def _spans(joystick: list[float]) -> list[tuple[int, int]]:
 
 
 def _stroke(
-    recording: Recording,
-    spans: dict[str, list[tuple[int, int]]],
-    axis: str,
-    span: tuple[int, int],
+    recording: Recording, spans: dict[str, list[tuple[int, int]]], axis: str, span: tuple[int, int]
 ) -> Stroke:
     joystick = recording.axes[axis].joystick
     press, end = span

@@ -1,6 +1,8 @@
-"""Common style of all pictures: colours, figures and panels."""
+"""Common style of all pictures: colours, figures, panels, and a crane seen from above."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,6 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
+from PIL import Image
+
+import canshaper
+from canshaper.machine.deployment import Deployment
+from canshaper.report import html
+from canshaper_sim.recording import CraneTrace, Point
 
 # Vermilion and blue of Okabe and Ito: distinct for colour-blind eyes too.
 RAW_COLOUR: Final = "#D55E00"
@@ -89,3 +97,109 @@ def coloured_words(
             pad=0,
         )
     )
+
+
+_LEGEND_IN = 0.36  # below the lower view: under its scale
+_MARGIN = 0.08  # of the drawn square, free around the paths
+
+
+def draw_top_views(
+    fig: Figure,
+    drives: Sequence[tuple[CraneTrace, Sequence[range]]],
+    box: tuple[float, float, float, float],
+    *,
+    sizes: tuple[float, float],
+) -> None:
+    """Draw two views, raw above shaped, on one scale.
+
+    Args:
+        fig: where.
+        drives: of raw and shaped the crane, and the rests: samples in which no joystick is moved
+            and the tip runs on.
+        box: left, bottom, right and top, fractions of the figure.
+        sizes: of letters and of titles, points.
+    """
+    left, bottom, right, top = box
+    grid = fig.add_gridspec(2, 1, left=left, bottom=bottom, right=right, top=top, hspace=0.24)
+    span = _square([p for crane, _ in drives for p in (*crane.tip_m, *crane.grapple_m)])
+    looks = (("filters off", RAW_COLOUR), ("filters on", SHAPED_COLOUR))
+    for row, ((crane, rests), (words, colour)) in enumerate(zip(drives, looks, strict=True)):
+        panel = fig.add_subplot(grid[row])
+        titled(panel, f"From above, {words}", sizes[1])
+        plain(panel, size=sizes[0])
+        _draw(panel, crane, rests, colour)
+        panel.set_aspect("equal", adjustable="box")
+        panel.set(xlim=span[0], ylim=span[1])
+    panel.set_xlabel("m from the pillar", fontsize=sizes[0], color=TEXT_COLOUR)
+    fig.legend(
+        *panel.get_legend_handles_labels(),
+        loc="upper right",
+        bbox_to_anchor=(right + 0.01, bottom - _LEGEND_IN / fig.get_figheight()),
+        ncols=3,
+        frameon=False,
+        fontsize=sizes[0],
+        handlelength=1.4,
+        handletextpad=0.5,
+        columnspacing=1.0,
+    )
+
+
+def _draw(panel: Axes, crane: CraneTrace, rests: Sequence[range], colour: str) -> None:
+    for number, rest in enumerate(rests):
+        label = "tip runs on" if number == 0 else None
+        part = [crane.tip_m[k] for k in rest]
+        panel.plot(*_columns(part), color=JOYSTICK_COLOUR, linewidth=5.0, zorder=1.5, label=label)
+    panel.plot(*_columns(crane.tip_m), color=TEXT_COLOUR, linewidth=0.8, label="tip")
+    panel.plot(*_columns(crane.grapple_m), color=colour, linewidth=1.4, label="grapple")
+
+
+def _columns(points: Sequence[Point]) -> tuple[list[float], list[float]]:
+    return [x for x, _ in points], [y for _, y in points]
+
+
+def _square(points: Sequence[Point]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Limits of x and y of a square that holds all points."""
+    columns = _columns(points)
+    low, high = [min(c) for c in columns], [max(c) for c in columns]
+    half = (0.5 + _MARGIN) * max(b - a for a, b in zip(low, high, strict=True))
+    middle = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
+    return (middle[0] - half, middle[0] + half), (middle[1] - half, middle[1] + half)
+
+
+# All of a report are to stay below 2 MB; a drawing that takes more is a picture of dots there.
+MOST_SVG_BYTES = 90_000
+COLOURS = 64  # of such a picture
+
+
+def draw(figure: Callable[[], Figure], path: Path, deployment: Deployment) -> list[Path]:
+    """Draw, stamp and write a picture.
+
+    Args:
+        figure: draws it.
+        path: without its suffix.
+        deployment: what it is of.
+
+    Returns:
+        The picture (PNG), and where that is small the drawing (SVG).
+    """
+    drawn = figure()
+    date = f"{datetime.now().astimezone():%Y-%m-%d}"
+    stamp(drawn, f"{deployment.path.name}, canshaper {canshaper.__version__}, {date}")
+    picture, drawing = (path.with_name(f"{path.name}{suffix}") for suffix in (".png", ".svg"))
+    save(drawn, picture)
+    save(drawn, drawing)
+    if drawing.stat().st_size > MOST_SVG_BYTES:
+        drawing.unlink()
+        return [picture]
+    return [picture, drawing]
+
+
+def embedded(path: Path) -> str:
+    """A picture inside the report: a drawing as it is, dots with fewer colours."""
+    if path.suffix == ".svg":
+        return html.picture(path.read_bytes(), "svg+xml", path.stem)
+    file = BytesIO()
+    with Image.open(path) as dots:
+        few = dots.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+        few.save(file, "png", optimize=True)
+    return html.picture(file.getvalue(), "png", path.stem)

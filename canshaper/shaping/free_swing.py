@@ -6,8 +6,14 @@ from dataclasses import replace
 from operator import mul
 from typing import NamedTuple
 
-from canshaper.shaping.sway import SwayMode, swing_over
-from canshaper.shaping.sway_sensor import TICK_OF_NOISE_S, Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import (
+    TICK_OF_NOISE_S,
+    Measured,
+    SensorLimits,
+    SensorTiming,
+    SwayMode,
+    swing_over,
+)
 
 # After so many steps, some 10 ms, the gains are within a thousandth of the steady ones.
 MOST_STEPS = 5000

@@ -3,8 +3,7 @@
 from canshaper.shaping.free_swing import FreeSwing, SensorGains
 from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.states import Trust
-from canshaper.shaping.sway import SwayModel
-from canshaper.shaping.sway_sensor import SensorLimits, SensorTiming
+from canshaper.shaping.sway import SensorLimits, SensorTiming, SwayModel
 from canshaper.shaping.swing_length import SwingLengthEstimate
 from canshaper.shaping.trust import (
     LATCHED,

@@ -13,8 +13,7 @@ begins at rest, and is explained by own motion, counts.
 import math
 from dataclasses import dataclass
 
-from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
-from canshaper.shaping.sway_sensor import Measured, SensorLimits
+from canshaper.shaping.sway import GRAVITY_M_S2, Measured, SensorLimits, SwayMode
 
 # Measurements are averaged over this part of a swing, to save time; filter and averaging are the
 # same for angle and speed.

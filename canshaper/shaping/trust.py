@@ -9,7 +9,7 @@ from collections import deque
 
 from canshaper.shaping.observer import Errors
 from canshaper.shaping.states import Trust
-from canshaper.shaping.sway_sensor import TICK_OF_NOISE_S, Measured
+from canshaper.shaping.sway import TICK_OF_NOISE_S, Measured
 
 LATCHED = (Trust.JUMP, Trust.RESTLESS)
 """States that stay until the axis is at rest."""

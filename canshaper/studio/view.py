@@ -6,14 +6,13 @@ from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import NULL, with_source
+from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.status import StatusCodec
-from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
+from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
 from canshaper.studio.axis_view import AxisView, rounded
 from canshaper.studio.sources import Sources

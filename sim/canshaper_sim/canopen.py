@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import HEARTBEAT, NMT, START, NodeState, ValveState
+from canshaper.codec.frame import HEARTBEAT, NMT, START, Frame, NodeState, ValveState
 from canshaper.codec.message import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis

@@ -8,8 +8,7 @@ none. With joint commands the three boom joints thus show the same sway, each wi
 import math
 from collections.abc import Callable, Mapping
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import NULL, with_source
+from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.message import FieldSet
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick

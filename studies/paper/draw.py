@@ -10,8 +10,8 @@ from typing import Any, Final
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from canshaper.report.console import axis_title
 from canshaper.report.style import new_figure, zero_line
-from canshaper.report.table import axis_title
 from studies.paper.runs import METRICS, TRACE_OF, Plane, Run
 from studies.paper.style import (
     JOYSTICK_COLOUR,

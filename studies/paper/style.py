@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from canshaper.report.console import change_text
 from canshaper.report.style import (
     JOYSTICK_COLOUR,
     MINUS,
@@ -13,7 +14,6 @@ from canshaper.report.style import (
     coloured_words,
     plain,
 )
-from canshaper.report.table import change_text
 
 __all__ = ["JOYSTICK_COLOUR", "MINUS", "NONE_COLOUR", "PLANT_COLOUR", "TEXT_COLOUR", "plain"]
 

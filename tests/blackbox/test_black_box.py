@@ -342,9 +342,7 @@ def test_frames_that_were_not_sent_are_not_sent_again(
 
     monkeypatch.setattr(bench, "joysticks", before)
     monkeypatch.setattr(
-        FakePort,
-        "send",
-        lambda port, frame: port.state is BusState.UP and send(port, frame),
+        FakePort, "send", lambda port, frame: port.state is BusState.UP and send(port, frame)
     )
     drive(bench, folder, 8 * SECOND, trips=())
     assert len(off) == 10

@@ -33,10 +33,7 @@ def kept(name: str, seed: int) -> list[tuple[bytes, bytes]]:
         made.append(Kept(folder))
         return made[-1]
 
-    with (
-        patch.object(daemon, "BlackBox", make),
-        patch.object(keeper, "STATE_NS", 700_000_000),
-    ):
+    with patch.object(daemon, "BlackBox", make), patch.object(keeper, "STATE_NS", 700_000_000):
         Sequence(name, seed).run()
     return [box for one in made for box in one.boxes]
 

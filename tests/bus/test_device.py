@@ -104,10 +104,7 @@ def test_a_name_that_changes_hands_while_it_is_read(here: FakeDevices) -> None:
             bus("can3", bitrate=250_000, path="pci-0000:00:04.0"),
             "expected bit rate 250000, but can3 has bit rate 500000",
         ),
-        (
-            bus("vcan0", driver="can327"),
-            "expected driver can327, but vcan0 has driver vcan",
-        ),
+        (bus("vcan0", driver="can327"), "expected driver can327, but vcan0 has driver vcan"),
         (
             Bus(interface="socketcan", channel="vcan0", match=Match(bitrate=250_000)),
             "expected bit rate 250000, but vcan0 has no bit rate",

@@ -7,9 +7,7 @@ from typing import Any
 import pytest
 
 from canshaper.bus import device as module
-from canshaper.bus.device import (
-    check_device,
-)
+from canshaper.bus.device import check_device
 from canshaper.bus.port import open_port
 from canshaper.bus.socketcan import open_sockets
 from canshaper.config.bus import Bus
@@ -37,9 +35,7 @@ def test_bound_sockets_of_the_right_device(here: FakeDevices) -> None:
     check(bus("can0", serial="0A17", port=0), Bound("can0"), Bound("can0"))
 
 
-def test_where_the_sockets_are_bound_counts_and_not_the_name_of_the_file(
-    here: FakeDevices,
-) -> None:
+def test_where_the_sockets_are_bound_counts_and_not_the_name_of_the_file(here: FakeDevices) -> None:
     """Bound to can0, which got another name meanwhile: the device is the one that was meant."""
     check(bus("can0", serial="0B99"), Bound("can2"))
     with pytest.raises(WrongDeviceError, match="expected serial number 0A17, but can2 has"):

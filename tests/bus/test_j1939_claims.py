@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from canshaper.bus.socketcan import MOST_FILTERS, set_filters
-from canshaper.codec.frame import BusState, Frame
-from canshaper.codec.identifier import CLAIMED, claims_of
+from canshaper.codec.frame import CLAIMED, BusState, Frame, claims_of
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, VALVE, Line, message
 

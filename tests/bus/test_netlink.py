@@ -9,11 +9,7 @@ import pytest
 
 from canshaper.bus import device as module
 from canshaper.bus import netlink
-from canshaper.bus.device import (
-    Device,
-    kind_and_bitrates,
-    read_device,
-)
+from canshaper.bus.device import Device, kind_and_bitrates, read_device
 
 
 def field(kind: int, payload: bytes) -> bytes:

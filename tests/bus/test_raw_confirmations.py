@@ -6,17 +6,7 @@ from canshaper.bus import raw
 from canshaper.bus.packet import SIZE
 from canshaper.bus.raw import PROBE_NS
 from canshaper.codec.frame import BusState, FrameFault
-from tests.bus.raw_line import (
-    IDS,
-    MARK_AT,
-    OTHER,
-    SENT_BACK,
-    STATUS,
-    TICK_NS,
-    VALVE,
-    Line,
-    message,
-)
+from tests.bus.raw_line import IDS, MARK_AT, OTHER, SENT_BACK, STATUS, TICK_NS, VALVE, Line, message
 
 
 def test_own_frames_are_not_handed_on_but_those_of_another_sender_are(line: Line) -> None:

@@ -4,11 +4,7 @@ import pytest
 
 from canshaper.bus.raw import PROBE_NS
 from canshaper.codec.frame import BusState, FrameFault
-from tests.bus.raw_line import (
-    VALVE,
-    Line,
-    message,
-)
+from tests.bus.raw_line import VALVE, Line, message
 
 # linux/can/error.h
 BUS_OFF, RESTARTED, CONTROLLER = 0x40, 0x100, 0x4

@@ -10,16 +10,7 @@ from canshaper.bus.raw import PROBE_NS, REOPEN_NS, RawPort
 from canshaper.codec.frame import BusState, FrameFault
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
-from tests.bus.raw_line import (
-    IDS,
-    RECEIVED,
-    SENT_BACK,
-    TICK_NS,
-    UNKNOWN,
-    VALVE,
-    Line,
-    message,
-)
+from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, TICK_NS, UNKNOWN, VALVE, Line, message
 
 
 def down(line: Line) -> None:

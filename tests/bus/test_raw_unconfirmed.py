@@ -10,13 +10,7 @@ import pytest
 from canshaper.bus import raw, socketcan
 from canshaper.bus.device import has_echo
 from canshaper.bus.raw import MOST_ERRORS, PROBE_NS, QUIET_NS, REOPEN_NS
-from canshaper.bus.socketcan import (
-    ERROR_CLASSES,
-    STATE_CLASSES,
-    carrier,
-    open_sockets,
-    renamed,
-)
+from canshaper.bus.socketcan import ERROR_CLASSES, STATE_CLASSES, carrier, open_sockets, renamed
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.fake_sockets import BUS, IDS, Made
 from tests.bus.raw_line import RECEIVED, SENT_BACK, VALVE, Line, message

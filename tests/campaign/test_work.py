@@ -28,7 +28,7 @@ from canshaper.campaign.work_results import (
 )
 from canshaper.cli.app import app
 from canshaper.config.filters import filter_of
-from canshaper.design.comparison.candidates import Candidate
+from canshaper.design.comparison.manoeuvres import Candidate
 from canshaper.errors import CampaignError
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator_model import Known, Operators, Skill

@@ -108,9 +108,7 @@ def test_check_counts_what_a_sway_sensor_moves_it_besides(tmp_path: Path, name: 
 
 
 @pytest.mark.slow
-def test_check_says_where_a_filter_no_longer_fits(
-    tmp_path: Path,
-) -> None:
+def test_check_says_where_a_filter_no_longer_fits(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     text = ROBUST.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     assert "designed" not in invoke("check", str(ROBUST)).stdout

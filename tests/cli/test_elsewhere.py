@@ -87,10 +87,7 @@ def test_what_is_found_is_written_on_any_system(tmp_path: Path) -> None:
 @pytest.mark.parametrize("verb", sorted(LINUX_ONLY))
 def test_what_needs_linux_says_so(verb: str) -> None:
     done = called(verb, "config/forwarder.yaml")
-    assert (done.returncode, done.stderr) == (
-        2,
-        f"canshaper {verb}: expected Linux, got darwin\n",
-    )
+    assert (done.returncode, done.stderr) == (2, f"canshaper {verb}: expected Linux, got darwin\n")
     assert called(verb, "--help").returncode == 0
 
 

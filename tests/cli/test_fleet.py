@@ -24,9 +24,7 @@ FIRST_DAY_S = 1_780_000_000  # 2026-05-28 in UTC
 
 # Full strokes, each with a rest of seven swings.
 SCRIPT = Script(
-    "swings",
-    (Stroke("slew", 0.5, 0.6, 0.6, 0.1), Stroke("near_far", 22.0, 0.6, 0.8, 0.1)),
-    44.0,
+    "swings", (Stroke("slew", 0.5, 0.6, 0.6, 0.1), Stroke("near_far", 22.0, 0.6, 0.8, 0.1)), 44.0
 )
 
 

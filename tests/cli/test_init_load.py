@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.cli.interview.answers import answered_by
 from canshaper.cli.interview.first import FirstAxis, FirstLoad, Stopwatch
-from canshaper.cli.interview.load import load_of
+from canshaper.cli.interview.swing import load_of
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.database import load_dbc

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.shaping.sway_sensor import Measured
+from canshaper.shaping.sway import Measured
 from tests.rigs.sensed import LENGTH_M, SCRIPTS, Setup
 
 ENCODER, GYRO = Setup(), Setup(measured=Measured.RATE)

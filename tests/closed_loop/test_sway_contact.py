@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.shaping.sway_sensor import Measured
+from canshaper.shaping.sway import Measured
 from canshaper_sim.crane import CraneState
 from canshaper_sim.sway_sensor import SwaySensorParameters
 from tests.rigs.sensed import LENGTH_M, TICK_S, Drive, Setup, script

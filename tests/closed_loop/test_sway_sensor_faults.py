@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.shaping.sway_sensor import Measured
+from canshaper.shaping.sway import Measured
 from canshaper_sim.sway_sensor import SwaySensorParameters
 from tests.closed_loop.sensor_drives import KINDS, PLAIN, residuals
 from tests.rigs.sensed import LENGTH_M, MODE, SCRIPTS, Setup

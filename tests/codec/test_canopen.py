@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.codec.identifier import service_of
+from canshaper.codec.frame import service_of
 
 
 @pytest.mark.parametrize(

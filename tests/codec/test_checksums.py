@@ -18,10 +18,10 @@ from canshaper.checksums.kinds import (
     Checksum,
     ChecksumKind,
     checksum_names,
-    checksum_table,
     known_checksum,
     package_line,
 )
+from canshaper.cli.verbs.config_schema import checksum_table
 from canshaper.machine.identity import Identity
 from tests.codec.checksum_reference import REFERENCE
 

@@ -7,8 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.frame import id_of
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     CLAIMED,
     DM1,
     at_every_priority,
@@ -16,6 +15,7 @@ from canshaper.codec.identifier import (
     group_mask,
     group_of,
     has_destination,
+    id_of,
     identifier,
     name_bytes,
     pgn_of,

@@ -72,10 +72,7 @@ def test_what_is_put_is_read(steps: int) -> None:
     """As a valve, in a gateway: both signals hold what one command says."""
     codec = ValveCodec(SentMessage("b", ROCKER), LEFT, negative=RIGHT)
     raw = command_raw(codec, steps)
-    assert (raw["RotateLeft"], raw["RotateRight"]) == (
-        max(steps, 0),
-        max(-steps, 0),
-    )
+    assert (raw["RotateLeft"], raw["RotateRight"]) == (max(steps, 0), max(-steps, 0))
     assert codec.read(raw) == steps
     assert read(raw["RotateLeft"], raw["RotateRight"]) == pytest.approx(steps / 250)
 

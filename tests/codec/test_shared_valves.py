@@ -28,10 +28,7 @@ def test_three_axes_in_one_message(machine: Machine) -> None:
     joystick: Any = {m.name: m for m in deployment.messages.all()}
     moved: list[Any] = []
     for n in range(60):
-        for side, command in (
-            ("Left", {"Slew": 900, "NearFar": -400}),
-            ("Right", {"Lift": -600}),
-        ):
+        for side, command in (("Left", {"Slew": 900, "NearFar": -400}), ("Right", {"Lift": -600})):
             message = joystick[f"Joystick{side}"]
             raw = dict.fromkeys((s.name for s in message.signals), 0)
             raw |= {"Enable": 1, "AliveCounter": n % 256, **(command if n > 4 else {})}
@@ -72,11 +69,7 @@ def test_a_frame_that_is_not_sent_trips_all_of_its_axes(machine: Machine) -> Non
             "signal: Count",
             "expected a free signal, got 'Count', which is alive_counter already",
         ),
-        (
-            "signal: Second",
-            "signal: Second, alive_counter: null",
-            "",
-        ),
+        ("signal: Second", "signal: Second, alive_counter: null", ""),
     ],
 )
 def test_no_signal_serves_two(machine: Machine, old: str, new: str, says: str) -> None:

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.commissioning.identification.commands import Commands
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper.recording.channels import InputFinder
 from tests.rigs.j1939 import JOYSTICK, OTHER, OWN, ROOT, bjm
 
 MS = 1_000_000

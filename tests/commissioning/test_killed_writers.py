@@ -16,8 +16,7 @@ from canshaper.commissioning.assumed import write_numbers
 from canshaper.commissioning.calibration.write import write_curve
 from canshaper.commissioning.filter_file import write_filters
 from canshaper.commissioning.identification.report import write_sway
-from canshaper.config.origin import written_by
-from canshaper.edit.edit import replace_text, set_values
+from canshaper.edit.edit import replace_text, set_values, written_by
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -19,7 +19,7 @@ OWN = "filter: { kind: moving_average, window_s: %s }"
 WORK = """
 import json, pickle, sys
 from pathlib import Path
-from canshaper.design.comparison.candidates import candidates
+from canshaper.design.comparison.manoeuvres import candidates
 from canshaper.design.comparison.manoeuvres import manoeuvres
 from canshaper.design.comparison.measure import measure
 from canshaper.design.comparison.summary import rows

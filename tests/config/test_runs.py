@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.config.section import expanded, shortened
+from canshaper.config.section import expanded
+from canshaper.edit.edit import shortened
 from tests.config.conftest import Load, Problems
 
 TAPS = st.lists(st.floats(0, 1) | st.sampled_from([0.0, 0.1, 1e-7]), max_size=50)

@@ -8,7 +8,7 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from canshaper.protocols.canopen.cia408 import ValveControl
+from canshaper.protocols.canopen.network import ValveControl
 from canshaper.shaping.states import State
 from tests.rigs import canopen, j1939
 from tests.rigs.forwarder import Rig

@@ -7,7 +7,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.config.bus import CanopenNode
-from canshaper.protocols.canopen.nodes import NodeGate, RemoteNode
+from canshaper.protocols.canopen.network import NodeGate
+from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import Reason, State
 from tests.rigs.canopen import BOOT_UP, HOLD, OPERATIONAL, STOPPED, CanopenRig
 from tests.rigs.emergency import PRESSED, STOP, Machine

@@ -52,7 +52,7 @@ BUDGET = {
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
-    "docs/tuning.md": 754,
+    "docs/tuning.md": 780,
     "docs/work.md": 435,
     "studies/README.md": 760,
 }
@@ -61,14 +61,14 @@ BUDGET = {
 LINES = {
     "canshaper/gate": (2_291, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_815,
+        4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (62_935, "a new ability takes the room of an old one"),
-    "tests": (96_602, "one level for each behaviour"),
+    "canshaper": (61_132, "a new ability takes the room of an old one"),
+    "tests": (95_596, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (369, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (331, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

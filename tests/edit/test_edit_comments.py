@@ -49,10 +49,7 @@ SWAY: dict[str, FileValue] = {"period_s": 2.5, "full_speed_m_s": 1.0}
             "    # of another\n# of all\n  sway: { period_s: 2.5, full_speed_m_s: 1.0 }"
             f" # {NOTE}\n  # below\n",
         ),
-        (
-            "  sway: { period_s: 2.3 }\n",
-            "  sway: { period_s: 2.5, full_speed_m_s: 1.0 }\n",
-        ),
+        ("  sway: { period_s: 2.3 }\n", "  sway: { period_s: 2.5, full_speed_m_s: 1.0 }\n"),
         (
             "  # tool and load\n  sway: { mass_kg: 3, period_s: 2.3 } # heavy\n",
             "  # tool and load\n"

@@ -8,7 +8,7 @@ import pytest
 
 from canshaper.checksums.kinds import CHECKSUMS, Checksum, crc_kind
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
-from canshaper.config.protection import Protected
+from canshaper.config.inputs import Protected
 from canshaper.gate.build import protection_of, record_of
 from canshaper.gate.checks import crc_of
 from canshaper.gate.record import Protection

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.controller.controller import Controller
 from tests.rigs.files import Machine
 
 VALVE = """VERSION ""
@@ -206,16 +205,3 @@ def test_a_bus_that_is_no_multicast_is_not_shared(machine: Machine) -> None:
         f"machine.yaml:{line}: buses.crane.network: expected true with udp_multicast only, got it"
         " with socketcan"
     ]
-
-
-def test_no_binding_problem_reaches_the_controller(machine: Machine) -> None:
-    Controller(machine.load())
-
-
-def test_an_age_limit_of_less_than_two_ticks_would_make_each_tick_a_standstill(
-    machine: Machine,
-) -> None:
-    machine.in_yaml("tick_ms: 20", "tick_ms: 50")
-    line = machine.in_yaml("timeout_ms: 100", "timeout_ms: 99")
-    says = "joysticks.left.timeout_ms: expected 100 ms or more, twice tick_ms, got 99"
-    assert [p for p in machine.problems() if p.endswith(says)] == [f"machine.yaml:{line}: {says}"]

@@ -8,7 +8,7 @@ from cantools.database.can.formats.dbc import DbcSpecifics
 from cantools.database.conversion import LinearConversion
 
 from canshaper.codec.layout import Chosen
-from canshaper.config.protection import Checksum, Protected
+from canshaper.config.inputs import Checksum, Protected
 from canshaper.config.schema import DeploymentConfig, DirectionFlags, Scaling
 from canshaper.machine.corrections import Correction, chosen, corrected, scalings
 from tests.machine.gateway_files import load

@@ -64,22 +64,6 @@ def test_a_dbc_file_without_messages(machine: Machine) -> None:
     assert all(p.endswith("; there are none") for p in problems)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "number"),
-    [
-        ("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft : 2147483920", "2147483920"),
-        ("SG_ Slew : 0|16@1-", "SG_ Slew : 100000000|16@1-", "100000000"),
-        ("SG_ Slew : 0|16@1-", "SG_ Slew m0: 0 | 100000@1-", "100000"),
-    ],
-)
-def test_sizes_that_no_memory_holds(machine: Machine, old: str, new: str, number: str) -> None:
-    line = machine.in_dbc(old, new)
-    assert machine.problems() == [
-        f"machine.dbc:{line}: not a DBC file that can be used:"
-        f" expected 99999 bytes or bits at most, got {number}"
-    ]
-
-
 def test_overlapping_signals_are_reported_at_their_message(machine: Machine) -> None:
     machine.in_dbc("NearFar : 16|16@1-", "NearFar : 8|16@1-")
     line = machine.in_dbc("BO_ 272", "BO_ 272")
@@ -111,24 +95,6 @@ def test_a_type_without_its_signal_is_reported_at_the_type(machine: Machine) -> 
     )
 
 
-def test_one_id_twice_in_one_file(machine: Machine) -> None:
-    line = machine.in_dbc("BO_ 513 NearFarCommand", "BO_ 512 NearFarCommand")
-    machine.in_dbc("CM_ SG_ 513", "CM_ SG_ 512")
-    assert f"machine.dbc:{line}: NearFarCommand: has the id 0x200 of SlewCommand" in (
-        machine.problems()
-    )
-
-
-def test_one_message_in_two_files(machine: Machine) -> None:
-    line = machine.in_yaml("[machine.dbc]", "[machine.dbc, other.dbc]") + 5
-    other = 'VERSION ""\n\nBU_: A\n\nBO_ 7 JoystickLeft: 1 A\n SG_ S : 0|8@1- (1,0) [0|0] "" A\n'
-    (machine.directory / "other.dbc").write_text(other, encoding="cp1252")
-    assert machine.problems() == [
-        f"machine.yaml:{line}: joysticks.left.message: 'JoystickLeft' stands more than once in the"
-        " DBC files: machine.dbc, other.dbc"
-    ]
-
-
 def test_every_file_is_looked_at(machine: Machine) -> None:
     machine.in_yaml("[machine.dbc]", "[none.dbc, machine.dbc, text.dbc]")
     (machine.directory / "text.dbc").write_text("hello", encoding="cp1252")
@@ -136,21 +102,3 @@ def test_every_file_is_looked_at(machine: Machine) -> None:
     assert len(problems) == 2
     assert problems[0].endswith("dbc.0: expected a file, got 'none.dbc': No such file or directory")
     assert problems[1].startswith("text.dbc:1: not a DBC file")
-
-
-def test_messages_of_several_files_come_together(machine: Machine) -> None:
-    head, rest = machine.dbc.split("BO_ 1024 GrappleSway", 1)
-    body, tail = rest.split("CM_ ", 1)
-    machine.dbc = (
-        head
-        + "CM_ "
-        + "\n".join(
-            r for r in tail.splitlines() if not any(f"BO_ {n} " in r for n in (1024, 1025, 1026))
-        )
-    )
-    other = 'VERSION ""\n\nBU_: PLANT SHAPER\n\nBO_ 1024 GrappleSway' + body
-    (machine.directory / "other.dbc").write_text(other, encoding="cp1252")
-    machine.in_yaml("[machine.dbc]", "[other.dbc, machine.dbc]")
-    entry = machine.load().messages.find("GrappleSway")
-    assert not isinstance(entry, str)
-    assert entry[0].path.name == "other.dbc"

@@ -1,18 +1,10 @@
 """DBC files with more than any machine has: what is limited, and that it costs no time."""
 
-from pathlib import Path
-
 import pytest
 
-from canshaper.machine import database, dbc_parse, dbc_text, lookup
-from canshaper.machine.database import load_dbc
+from canshaper.machine import database, dbc_parse, lookup
 from tests.machine.plain_dbc import OTHER
 from tests.rigs.files import Machine
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    return tmp_path / "one.dbc"
 
 
 def test_only_what_is_used_is_limited(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,20 +52,6 @@ def test_more_than_any_machine_has(
     assert problem == f"machine.yaml:{line}: dbc: {says}"
     monkeypatch.setattr(database, most, sum(counts))
     machine.load()
-
-
-@pytest.mark.parametrize(("most", "count"), [("MOST_MESSAGES", 50), ("MOST_STATEMENTS", 51)])
-def test_more_than_any_file_has(
-    file: Path, monkeypatch: pytest.MonkeyPatch, most: str, count: int
-) -> None:
-    rows = "".join(OTHER.replace("5 O", f"{i} O{i}") for i in range(50))
-    file.write_text(rows + 'CM_ BO_ 5 "text";', encoding="cp1252")
-    monkeypatch.setattr(dbc_text, most, count)
-    assert load_dbc(file, ())[0]
-    monkeypatch.setattr(dbc_text, most, count - 1)
-    loaded, (problem,) = load_dbc(file, ())
-    assert not loaded
-    assert "not a DBC file that can be used: more than" in str(problem)
 
 
 def test_wrong_files_take_no_more_than_good_ones(

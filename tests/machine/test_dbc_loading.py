@@ -56,15 +56,3 @@ def test_too_many_messages_are_refused_before_the_next_file(
     assert machine.problems() == [
         f"machine.yaml:{line}: dbc: expected 14 messages in all at most, got 16"
     ]
-
-
-def test_all_of_one_limit_is_of_all_files(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    line = machine.in_yaml("[machine.dbc]", "[machine.dbc, other.dbc]")
-    other = 'VERSION ""\n\nBU_: A\n\nBO_ 7 Other: 1 A\n SG_ S : 0|8@1- (1,0) [0|0] "" A\n'
-    (machine.directory / "other.dbc").write_text(other, encoding="cp1252")
-    monkeypatch.setattr("canshaper.machine.database.MOST_MESSAGES", 15)
-    assert machine.problems() == [
-        f"machine.yaml:{line}: dbc: expected 15 messages in all at most, got 16"
-    ]

@@ -9,7 +9,6 @@ from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.dbc_parse import letters
 from canshaper.machine.dbc_text import Entry
 from tests.machine.plain_dbc import OTHER
-from tests.rigs.files import Machine
 
 HEAD = 'VERSION "1"\n\nBU_: A\n\n'
 WIDE = OTHER.replace("BO_ 5 Other", "BO_ 2147483653 Wide")
@@ -55,15 +54,6 @@ def test_a_problem_is_at_the_line_of_its_message(tmp_path: Path) -> None:
     (moved,) = elsewhere.messages
     assert file.problem(moved, "x") == Problem(str(path), None, "Other", "x")
     assert elsewhere.problem(moved, "x").line == 5
-
-
-def test_text_that_is_none_is_a_problem_without_a_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("canshaper.machine.dbc_text.MOST_MESSAGES", 1)
-    path = written(tmp_path, HEAD + OTHER + WIDE)
-    text = "not a DBC file that can be used: more than 1 messages or 300000 statements"
-    assert load_dbc(path) == (None, [Problem(str(path), None, "", text)])
 
 
 def test_the_size_of_one_file_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,14 +157,6 @@ def test_a_message_that_cannot_be_read_any_more(tmp_path: Path) -> None:
     assert answer.startswith(f"{path}:5: not a DBC file that can be used: The signal Two does")
 
 
-def test_only_the_first_warnings_are_kept(machine: Machine) -> None:
-    rows = "".join(OTHER.replace("5 O", f"{n} O{n}").replace("8|8", "9|8") for n in range(1, 121))
-    file, _ = load_dbc(written(machine.directory, HEAD + rows), ())
-    assert file is not None
-    assert (file.count, len(file.warnings)) == (120, 100)
-    assert file.warnings[-1].where == "O100ther"
-
-
 def test_every_problem_of_a_message_is_a_line_of_the_answer(tmp_path: Path) -> None:
     path = written(tmp_path, HEAD + OTHER + OTHER.replace("Other", "Again") + PG)
     file, _ = load_dbc(path, ())
@@ -186,34 +168,6 @@ def test_every_problem_of_a_message_is_a_line_of_the_answer(tmp_path: Path) -> N
         f"{path}:5: Other: {NARROW}",
         f"{path}:8: Again: {NARROW}",
     ]
-
-
-@pytest.mark.parametrize(
-    ("dbc", "line", "where", "text"),
-    [
-        (
-            HEAD + OTHER.replace("8|8", "9|8") + WIDE,
-            5,
-            "Other",
-            "has 2 bytes, and the signal Two is not within them",
-        ),
-        (
-            HEAD + OTHER + WIDE + "SIG_VALTYPE_ 5 None : 1;\n",
-            11,
-            "",
-            "SIG_VALTYPE_ 5 None is of a signal that there is not",
-        ),
-    ],
-)
-def test_what_cannot_be_loaded_is_left_out_of_all(
-    tmp_path: Path, dbc: str, line: int, where: str, text: str
-) -> None:
-    path = written(tmp_path, dbc)
-    file, problems = load_dbc(path)
-    assert file is not None
-    assert problems == []
-    assert [message.name for message in file.messages] == ["Wide"]
-    assert file.warnings == [Problem(str(path), line, where, text)]
 
 
 def test_a_file_that_the_parser_gets_as_a_whole(tmp_path: Path) -> None:

@@ -81,11 +81,6 @@ def test_a_message_too_long_for_any_protocol_is_not_compared(machine: Machine) -
         assert machine.load().messages.warnings()[0] == 1, count
 
 
-def test_an_id_that_a_used_message_has_is_a_problem(machine: Machine) -> None:
-    line = machine.in_dbc("CM_ ", OTHER.replace("BO_ 5", "BO_ 272") + "\nCM_ ")
-    assert machine.problems() == [f"machine.dbc:{line}: Other: has the id 0x110 of JoystickLeft"]
-
-
 def test_all_warnings_are_counted_and_the_first_kept(machine: Machine) -> None:
     rows = "".join(f'VAL_ {n} None 1 "on" ;\n' for n in range(2000, 2150))
     machine.in_dbc("CM_ ", f"{rows}{OTHER.replace('8|8', '9|8')}\nCM_ ")
@@ -150,11 +145,3 @@ def test_another_message_that_cannot_be_used(machine: Machine) -> None:
     result = machine.load().messages.find("Other")
     assert isinstance(result, str)
     assert "The signal Two does not fit in message Other" in result
-
-
-def test_a_file_that_has_changed_is_not_mixed_with_what_was_read(machine: Machine) -> None:
-    messages = machine.load().messages
-    machine.in_dbc("BO_ 1025", "BO_ 1055")
-    path = machine.directory / "machine.dbc"
-    path.write_text(machine.dbc.split("CM_ ")[0], encoding="cp1252")
-    assert messages.find("TipPosition") == f"{path}: has changed since it was read"

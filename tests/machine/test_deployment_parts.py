@@ -100,31 +100,6 @@ def test_a_status_message_that_there_is_not(machine: Machine, section: str, mess
     )
 
 
-def test_a_profile_that_there_is_not(machine: Machine) -> None:
-    gff = "    filter: { kind: gff, a1: 0.708, a2: 0.12 } # near-far"
-    machine.in_yaml(gff, f"    profiles: {{ calm: {{ filter: {{ kind: zv }} }} }}\n{gff}")
-    assert [problem.partition(": ")[2] for problem in machine.problems()] == [
-        "axes.near_far.profiles.calm: expected a profile, got 'calm'; there are none: there is no"
-        " profile at the top level"
-    ]
-
-
-def test_a_button_for_the_next_profile_needs_profiles(machine: Machine) -> None:
-    line = machine.in_yaml("anti_sway_off: AntiSwayOff", "next_profile: AntiSwayOff")
-    assert machine.problems() == [
-        f"machine.yaml:{line}: joysticks.left.next_profile: expected an axis with profiles, got"
-        " none"
-    ]
-
-
-def test_a_profile_is_chosen_in_one_way(chosen: Machine) -> None:
-    line = chosen.in_yaml("anti_sway_off: AntiSwayOff", "next_profile: AntiSwayOff")
-    assert chosen.problems() == [
-        f"machine.yaml:{line}: joysticks.left.next_profile: expected one of profile and"
-        " next_profile, got both"
-    ]
-
-
 def test_ticks_follow_a_joystick_that_there_is(machine: Machine) -> None:
     line = machine.in_yaml("tick_ms: 20", "tick: { follow: mid }\ntick_ms: 20")
     assert machine.problems() == [

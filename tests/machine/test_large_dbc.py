@@ -39,24 +39,6 @@ def test_only_its_messages_are_parsed(machine: Machine, text: str) -> None:
     assert (0x0CF00000 + COUNT - 1, True) in messages.ids()
 
 
-@pytest.mark.slow
-def test_a_fault_is_at_its_line(machine: Machine, text: str) -> None:
-    machine.dbc = text
-    line = machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 1")
-    assert line > COUNT * 10
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: The signal")
-    machine.dbc = text
-    machine.in_dbc("BO_ 512 20;", "BO_ 512 50;")
-    line = machine.in_dbc("BO_ 512 Slew", "BO_ 512 Slew")
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: SlewCommand: GenMsgCycleTime: expected")
-    machine.dbc = text
-    line = machine.in_dbc("VAL_ 272", "VAL_ 272 1")
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: Invalid")
-
-
 @pytest.mark.parametrize(
     "path",
     [p for p in sorted((ROOT / "config").glob("*.yaml")) if not p.name.startswith("crane-")],

@@ -210,19 +210,6 @@ def test_a_radius_on_change_has_a_timeout_of_two_ticks(machine: Machine) -> None
     ) in machine.problems()
 
 
-@pytest.mark.parametrize(("number", "cycle"), [(512, 0), (512, 50), (768, 110)])
-def test_a_cycle_of_no_ticks_is_named(machine: Machine, number: int, cycle: int) -> None:
-    before = {512: 20, 768: 100}[number]
-    machine.in_dbc(f"BO_ {number} {before};", f"BO_ {number} {cycle};")
-    name = {512: "SlewCommand", 768: "SlewStatus"}[number]
-    line = machine.in_dbc(f"BO_ {number} {name}", f"BO_ {number} {name}")
-    got = f"{cycle} ms" if cycle else "none"
-    assert machine.problems() == [
-        f"machine.dbc:{line}: {name}: GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got"
-        f" {got}"
-    ]
-
-
 def test_a_timeout_is_not_compared_with_a_cycle_that_is_none(machine: Machine) -> None:
     machine.in_dbc("BO_ 512 20;", "BO_ 512 0;")
     machine.in_yaml("signal: Velocity, timeout_ms: 200", "signal: Velocity, timeout_ms: 50")

@@ -8,7 +8,7 @@ import pytest
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.sway_sensor import sensor_timing
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming
 from tests.rigs.files import ROOT, Machine
 
 ALONG = "bus: crane, message: GrappleSway, signal: SwayParallel, kind: angle, timeout_ms: 80"

@@ -22,7 +22,7 @@ from canshaper.recording.log import READERS, LogFile
 Row = tuple[int, bool, bytes]
 Timed = tuple[Decimal, Row]
 KNOWN = {
-    "sources/test_CanMessage.asc": "python-can passes over its first frame: no header before it",
+    "sources/test_CanMessage.asc": "python-can passes over its first frame: no header before it"
 }
 """What differs because python-can is wrong: folder and name of the log, and why."""
 ROUNDING_S = Decimal("0.000002")

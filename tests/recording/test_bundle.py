@@ -11,8 +11,8 @@ import pytest
 
 from canshaper.errors import LogError
 from canshaper.machine.binding import load_deployment
-from canshaper.recording.bundle import history_lines, pack, unpack
 from canshaper.recording.history import History, HistoryEvent
+from canshaper.recording.record import history_lines, pack, unpack
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,8 +15,7 @@ from tests.recording.writing import messages, written
 
 
 @pytest.mark.parametrize(
-    ("suffix", "first"),
-    [("log", 0), ("asc", 1), ("blf", 1), ("csv", 0), ("db", 0), ("trc", 1)],
+    ("suffix", "first"), [("log", 0), ("asc", 1), ("blf", 1), ("csv", 0), ("db", 0), ("trc", 1)]
 )
 def test_every_format_gives_the_frames_that_were_written(
     tmp_path: Path, suffix: str, first: int

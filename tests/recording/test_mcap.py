@@ -19,8 +19,7 @@ from canshaper.errors import CutOffError, LogError
 from canshaper.recording.form import Channel, Group
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.recording.log import LogFile, read_log
-from canshaper.recording.mcap_schemas import FRAME, Schema
-from canshaper.recording.mcap_write import McapWriter
+from canshaper.recording.mcap_write import FRAME, McapWriter, Schema
 from tests.recording.exports import (
     START_NS,
     exported_drive,

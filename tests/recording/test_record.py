@@ -19,9 +19,8 @@ from typer.testing import CliRunner
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
-from canshaper.recording.bundle import unpack
 from canshaper.recording.listen import Listener
-from canshaper.recording.record import Recording
+from canshaper.recording.record import Recording, unpack
 
 # Of this process alone: two runs of the tests on one machine must not receive each other's frames.
 GROUP = f"239.74.{os.getpid() // 256 % 256}.{os.getpid() % 256}"

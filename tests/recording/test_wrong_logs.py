@@ -77,11 +77,7 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
             "(1.0) can0 FFF#\n",
             "expected an id of 11 bits in 3 digits, or of 29 in 8, got id 0xfff",
         ),
-        (
-            "a.log",
-            "",
-            "expected a log with frames, its suffix that of its format, got no frame",
-        ),
+        ("a.log", "", "expected a log with frames, its suffix that of its format, got no frame"),
         (
             "a.log",
             "(1.0) can0 110#R\n" * 2 + "(1.0) can0 20000080#\n",
@@ -137,11 +133,7 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
             "expected the suffix .log, .asc, .blf, .csv, .db, .mcap, .mf4, .trc, .txt, .pcap,"
             " .pcapng, each also with .gz behind, got '.xyz'",
         ),
-        (
-            "drive",
-            "",
-            "each also with .gz behind, got none",
-        ),
+        ("drive", "", "each also with .gz behind, got none"),
     ],
 )
 def test_what_is_no_log_is_reported_with_its_place(

@@ -142,7 +142,7 @@ def test_realistic_pair(pair: tuple[Recording, Recording]) -> None:
 
 def test_measures_and_table_need_neither_matplotlib_nor_numpy() -> None:
     code = (
-        "import sys, canshaper.report.metrics, canshaper.report.table; "
+        "import sys, canshaper.report.metrics, canshaper.report.console; "
         "sys.exit(bool({'matplotlib', 'numpy'} & sys.modules.keys()))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -71,9 +71,7 @@ def test_residual_and_run_on_after_both_joysticks(hand_made: HandMade) -> None:
     )
 
 
-def test_run_on_is_the_farthest_from_where_the_tip_was_at_the_release(
-    hand_made: HandMade,
-) -> None:
+def test_run_on_is_the_farthest_from_where_the_tip_was_at_the_release(hand_made: HandMade) -> None:
     recording = both(hand_made, still)
     # Half a metre on after the release, and 0.4 m back.
     after = [max(0.0, t - NEAR_FAR[1]) for t in recording.t_s]

@@ -77,9 +77,7 @@ def test_residual_windows_begin_after_the_dwell_and_end_at_the_next_move(
     assert residual_windows(recording, strokes["lift"]) == []  # 0.5 s to the end
 
 
-def test_aligned_drives_press_at_the_same_time_and_cover_the_same_span(
-    hand_made: HandMade,
-) -> None:
+def test_aligned_drives_press_at_the_same_time_and_cover_the_same_span(hand_made: HandMade) -> None:
     raw = drive(hand_made, 12.0, slew=held((1.0, 3.0, 1.0)))
     shaped = drive(hand_made, 19.0, 0.0203, slew=held((1.6, 3.6, 1.0)))
     a, b = aligned(raw, shaped)

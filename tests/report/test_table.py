@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from canshaper.report.console import print_report
 from canshaper.report.metrics import report_dict
-from canshaper.report.table import print_report
 from canshaper_sim.recording import CraneTrace, Recording
 
 

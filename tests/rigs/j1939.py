@@ -5,8 +5,7 @@ from typing import Any
 
 import cantools
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import GLOBAL, name_bytes
+from canshaper.codec.frame import GLOBAL, Frame, name_bytes
 from canshaper.controller.controller import Controller
 from canshaper.shaping.states import State
 from tests.rigs.files import read

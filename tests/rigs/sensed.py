@@ -14,8 +14,7 @@ from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.fir import zv_taps
 from canshaper.shaping.states import CommandInput, Trust
-from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming, SwayMode, SwayModel
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.strokes import Script, Stroke

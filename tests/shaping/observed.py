@@ -3,8 +3,7 @@
 from canshaper.shaping.free_swing import sensor_gains
 from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.sensed import SensedSway
-from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming, SwayMode, SwayModel
 
 TICK_S = 0.02
 MODE = SwayMode(2.86, 0.05)

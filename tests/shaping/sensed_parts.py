@@ -9,8 +9,7 @@ from canshaper.shaping import sensed
 from canshaper.shaping.free_swing import FreeSwing, sensor_gains
 from canshaper.shaping.observer import Errors
 from canshaper.shaping.states import Trust
-from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming, SwayMode, SwayModel
 
 # Times that are sums of these have no rounding error.
 TICK_S, LOST_S = 1.0 / 64.0, 4.0 / 64.0

@@ -6,8 +6,7 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput, Trust
-from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming, SwayMode, SwayModel
 from tests.shaping.observed import sensed_sway
 
 TICK_S = 0.02

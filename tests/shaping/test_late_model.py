@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from canshaper.shaping.late_model import LateModel
-from canshaper.shaping.sway import SwayModel
-from canshaper.shaping.sway_sensor import Measured
+from canshaper.shaping.observer import LateModel
+from canshaper.shaping.sway import Measured, SwayModel
 from tests.shaping.observed import MODE, TICK_S, pulses, timing
 
 

@@ -14,8 +14,7 @@ from canshaper.shaping.free_swing import (
     TwoFreeSwings,
     observer_gains,
 )
-from canshaper.shaping.sway import SwayMode, SwayModel, swing_over
-from canshaper.shaping.sway_sensor import Measured, SensorLimits
+from canshaper.shaping.sway import Measured, SensorLimits, SwayMode, SwayModel, swing_over
 from tests.shaping.observed import MODE, TICK_S, observer_of, pulses, timing
 
 SCALE = 0.8

@@ -14,8 +14,7 @@ from canshaper.shaping.free_swing import (
     FreeSwing,
     observer_gains,
 )
-from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.sway_sensor import Measured, SensorLimits
+from canshaper.shaping.sway import Measured, SensorLimits, SwayMode, SwayModel
 from tests.shaping.observed import MODE, TICK_S, observer_of, timing
 
 SCALE, TICKS = 0.8, 5

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from canshaper.commissioning.stopping import needed_s, travel
+from canshaper.machine.stopping import allowed_s
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.states import CommandInput, Reason, State
-from canshaper.shaping.stopping import allowed_s, needed_s, travel
 from tests.shaping.test_stopping import axis_with
 
 DriveWith = Callable[..., Any]

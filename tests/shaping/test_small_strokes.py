@@ -13,7 +13,7 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.small_strokes import SMALL_S, SmallStrokes, least_velocity
 from canshaper.shaping.states import CommandInput
-from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming
 from tests.shaping.observed import sensed_sway
 from tests.shaping.taps import LIMITS, MODE, TICK_S, axis_with, tapped
 

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canshaper.commissioning.stopping import Travel, travel
+from canshaper.machine.stopping import allowed_s
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.stopping import Travel, allowed_s, travel
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 MODE = SwayMode(2.7, 0.04)

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.sway_sensor import Measured, SensorLimits
+from canshaper.shaping.sway import Measured, SensorLimits, SwayMode
 from canshaper.shaping.swing_length import Derivatives, SwingLength, SwingLengthEstimate
 
 TICK_S = 0.02

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.sway_sensor import Measured, SensorLimits
+from canshaper.shaping.sway import Measured, SensorLimits, SwayMode
 from canshaper.shaping.swing_length import Derivatives, SwingLength, SwingLengthEstimate
 
 G = 9.81

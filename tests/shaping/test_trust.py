@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from canshaper.shaping.sway_sensor import Measured
+from canshaper.shaping.sway import Measured
 from canshaper.shaping.trust import (
     BOUND,
     Evidence,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import expect
 
+from canshaper.config.load import load_config
 from tests.studio.browser import WAIT_MS
 from tests.studio.conftest import ROOT, Studio
 from tests.studio.languages import texts
@@ -44,6 +45,33 @@ def test_a_step_is_run_and_accepted(chromium: "Browser", machine: Path) -> None:
         assert width <= 390
         tab.locator("#pictures img").wait_for()
         assert faults == []
+        tab.close()
+    finally:
+        studio.stop()
+
+
+def test_both_filters_are_offered_and_the_chosen_one_is_written(
+    chromium: "Browser", machine: Path
+) -> None:
+    studio = Studio(file=str(machine))
+    try:
+        tab = chromium.new_page(viewport={"width": 1440, "height": 900})
+        tab.set_default_timeout(WAIT_MS)
+        tab.goto(f"{studio.url}commission")
+        tab.locator("#steps button", has_text="filter").click()
+        tab.locator("#run:not([disabled])").click()
+        choice = tab.locator("#choice:not([disabled])")
+        choice.wait_for()
+        recommended = choice.input_value()
+        other = "gff" if recommended == "robust" else "robust"
+        offered = tab.locator("#choice option").all_inner_texts()
+        assert sorted(offered) == sorted([f"{recommended} (recommended)", other])
+        choice.select_option(other)
+        tab.locator("#parts", has_text=f"Recommended: {recommended}. Chosen: {other}").wait_for()
+        tab.locator("#accept:not([hidden]):not([disabled])").click()
+        tab.locator("#steps .done", has_text="filter").wait_for()
+        axes = load_config(machine.with_name("machine.rehearsal.yaml"))[0].axes
+        assert {axes[name].filter.kind for name in ("slew", "near_far")} == {other}
         tab.close()
     finally:
         studio.stop()

@@ -17,9 +17,8 @@ from canshaper.cli.interview.answers import (
     whole,
 )
 from canshaper.cli.interview.axes import add_axes
-from canshaper.cli.interview.load import load_of
 from canshaper.cli.interview.nodes import Nodes, uses_of
-from canshaper.cli.interview.swing import motion_of
+from canshaper.cli.interview.swing import load_of, motion_of
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
@@ -96,9 +95,7 @@ def machine_of(
 
 
 def _meanings(
-    joysticks: "Sequence[FirstJoystick]",
-    axes: "Sequence[FirstAxis]",
-    motion: "FirstMotion | None",
+    joysticks: "Sequence[FirstJoystick]", axes: "Sequence[FirstAxis]", motion: "FirstMotion | None"
 ) -> set[str]:
     """MESSAGE.SIGNAL of what was given a meaning."""
     used = {f"{one.switch or one.message}.{one.enable}" for one in joysticks}
@@ -138,7 +135,7 @@ def _chosen(messages: "list[Message]") -> list[str]:
 
 def _page(message: "Message") -> "tuple[Message, int | None]":
     """A message as it is with the multiplexor with which it is meant, and that."""
-    from canshaper.config.protection import Protected
+    from canshaper.config.inputs import Protected
     from canshaper.machine.corrections import corrected, multiplexor
 
     signal = multiplexor(message)

@@ -89,7 +89,7 @@ def calibrate(
     from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOGETHER_PER_S, Ramp, usual_top
     from canshaper.commissioning.calibration.run import run_live, run_simulated
     from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
-    from canshaper.config.origin import written_by
+    from canshaper.edit.edit import written_by
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-    from canshaper.design.comparison.candidates import Candidate
     from canshaper.design.comparison.limits import Least
+    from canshaper.design.comparison.manoeuvres import Candidate
     from canshaper.design.comparison.summary import Row
     from canshaper.machine.deployment import Deployment
 
@@ -79,9 +79,8 @@ def compare(
       canshaper compare --json --processes 1
     """
     from canshaper.cli.results import Results
-    from canshaper.design.comparison.candidates import candidates
     from canshaper.design.comparison.limits import AXIS, least, limits_for
-    from canshaper.design.comparison.manoeuvres import manoeuvres
+    from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
     from canshaper.design.profiles import swinging_axis

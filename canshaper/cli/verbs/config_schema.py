@@ -39,7 +39,6 @@ def config_schema(
 
       canshaper config-schema --checksums
     """
-    from canshaper.checksums.kinds import checksum_table
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
     from canshaper.config.section import VERSION
@@ -60,6 +59,21 @@ def config_schema(
     schema["$id"] = f"urn:canshaper:deployment:{VERSION}"
     schema["title"] = "canshaper deployment"
     echo(json.dumps(schema, indent=2))
+
+
+def checksum_table() -> Iterator[str]:
+    """The table of all kinds in Markdown, line by line.
+
+    Raises:
+        ValueError: as ``known_checksum``.
+    """
+    from canshaper.checksums.kinds import CHECKSUMS, checksum_names, known_checksum
+
+    yield "| kind | bits | what it is | can-gw of the kernel makes it |"
+    yield "|---|---|---|---|"
+    for name in checksum_names():
+        kind = CHECKSUMS[known_checksum(name)]
+        yield f"| `{name}` | {kind.bits} | {kind.text} | {'yes' if kind.kernel else 'no'} |"
 
 
 def filter_table(kinds: "Iterable[ShaperKind]") -> Iterator[str]:

@@ -107,8 +107,8 @@ def demo(
     """
     from canshaper.cli.results import Results
     from canshaper.design.processes import choose_transport
+    from canshaper.report.console import print_report
     from canshaper.report.metrics import report_dict
-    from canshaper.report.table import print_report
     from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.cranes import cranes, one_crane
     from canshaper_sim.operator import script_named

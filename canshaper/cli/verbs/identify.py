@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from canshaper.campaign.engine import Engine
     from canshaper.cli.fleet import Row
     from canshaper.cli.results import Results
-    from canshaper.commissioning.identification.recommend import Advice
+    from canshaper.commissioning.identification.report import Advice
     from canshaper.commissioning.identification.verdict import Finding
     from canshaper.machine.deployment import Deployment
 
@@ -121,8 +121,7 @@ def identify(
         signals_named,
         timed_by_hand,
     )
-    from canshaper.commissioning.identification.recommend import advice_on
-    from canshaper.commissioning.identification.report import as_dict, write_sway
+    from canshaper.commissioning.identification.report import advice_on, as_dict, write_sway
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)() if file else None
@@ -199,7 +198,7 @@ def _draw(
 
     def figure() -> "Figure":
         from canshaper.commissioning.identification.plot import figure as of_swings
-        from canshaper.commissioning.identification.recommend import headlines
+        from canshaper.commissioning.identification.report import headlines
 
         return of_swings(seen, headlines(findings, advice))
 

@@ -151,7 +151,7 @@ def _bundle(
     failure: CanshaperError | None,
 ) -> None:
     """Put everything into one file."""
-    from canshaper.recording.bundle import pack
+    from canshaper.recording.record import pack
 
     facts = {
         "seconds": round(recording.seconds, 3),

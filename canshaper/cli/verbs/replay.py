@@ -96,7 +96,7 @@ def replay(
     """
     from canshaper.cli.fleet import check_only_folders
     from canshaper.cli.results import Results
-    from canshaper.recording.bundle import unpack
+    from canshaper.recording.record import unpack
 
     results = Results(f"Replay of {log.name}", None, report, picture)
     if log.is_dir():
@@ -202,9 +202,8 @@ def _one(
     """Replay one deployment, and write its log and its events."""
     from canshaper.recording.export import exporting
     from canshaper.recording.replay import Replay
-    from canshaper.recording.report import Replayed
+    from canshaper.recording.report import Replayed, Trace
     from canshaper.recording.tables import LogWriter
-    from canshaper.recording.trace import Trace
 
     replay = Replay(deployment, drive)
     done = Replayed(name, deployment, replay, Trace(deployment, *window))

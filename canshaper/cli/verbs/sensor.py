@@ -150,8 +150,8 @@ def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
 
 def _simulate(deployment: "Deployment", axes: Sequence[str], log: Path, changes: list[str]) -> None:
     """Drive the simulated crane."""
+    from canshaper.commissioning.procedure.bench import log_simulated
     from canshaper.commissioning.sensor.fit import hand_driven
-    from canshaper.commissioning.simulated import log_simulated
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters
 

@@ -60,8 +60,7 @@ def shift(
     from canshaper.cli.fleet import logs_below
     from canshaper.cli.results import Results
     from canshaper.recording.shift import Shifts
-    from canshaper.report.console import new_table, progress_bar
-    from canshaper.report.table import NOTHING
+    from canshaper.report.console import NOTHING, new_table, progress_bar
 
     if wrong := [one for one in out or () if one.suffix not in SUFFIXES]:
         raise UsageError(f"--out: expected a file with {' or '.join(SUFFIXES)}, got {wrong[0]}")
@@ -113,7 +112,7 @@ def shift(
 def _opened(
     machine: str, path: Path, config: str | None, channel: list[str], folder: str
 ) -> "LogOfWork":
-    from canshaper.recording.bundle import unpack
+    from canshaper.recording.record import unpack
     from canshaper.recording.replay import look
     from canshaper.recording.shift import LogOfWork, first_ns
 

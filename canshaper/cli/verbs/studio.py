@@ -252,7 +252,7 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
     Raises:
         ValueError: a channel on which the joysticks might move a real machine.
     """
-    from canshaper.commissioning.doctor.link import read_link
+    from canshaper.commissioning.doctor.devices import read_link
     from canshaper.design.processes import Transport
     from canshaper.studio.crane import groups
 

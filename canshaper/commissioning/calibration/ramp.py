@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import NULL, group_of
+from canshaper.codec.frame import NULL, Frame, group_of
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, Layout
 from canshaper.codec.message import UNPROTECTED
 from canshaper.codec.signals import find_signal

@@ -7,8 +7,7 @@ from typing import Any
 from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.commissioning.calibration.together import KEPT, Drives, measured
-from canshaper.config.origin import note, written_by
-from canshaper.edit.edit import Change, change
+from canshaper.edit.edit import Change, change, note, written_by
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 

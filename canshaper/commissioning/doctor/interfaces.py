@@ -9,8 +9,7 @@ from canshaper.bus.apart import LOOK_S
 from canshaper.bus.device import FD_MTU
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import NEVER_BLOCK
-from canshaper.commissioning.doctor.devices import device_findings
-from canshaper.commissioning.doctor.link import Link, read_link
+from canshaper.commissioning.doctor.devices import Link, device_findings, read_link
 from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus
 

@@ -6,19 +6,13 @@ import time
 from collections.abc import Callable
 from itertools import pairwise
 
-from canshaper.bus.packet import (
-    ANCILLARY_BYTES,
-    FD_SIZE,
-    SO_TIMESTAMPNS,
-    frame_of,
-    stamp_ns,
-)
+from canshaper.bus.packet import ANCILLARY_BYTES, FD_SIZE, SO_TIMESTAMPNS, frame_of, stamp_ns
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.verdict import Finding, Level, summary
-from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper.recording.channels import InputFinder
 
 LOOK_S = 0.2
 

@@ -6,21 +6,11 @@ from matplotlib.figure import Figure
 
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.verdict import ENDS_US, histogram, summary
-from canshaper.report.style import (
-    HEAD_PT,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-)
+from canshaper.report import style
 
 _HEIGHT_PX = 900
 _FOOT = 0.19
-_LOOKS = ((SHAPED_COLOUR, ""), (RAW_COLOUR, "////"))
+_LOOKS = ((style.SHAPED_COLOUR, ""), (style.RAW_COLOUR, "////"))
 
 
 def figure(runs: Mapping[str, Run], tick_ms: float) -> Figure:
@@ -30,9 +20,9 @@ def figure(runs: Mapping[str, Run], tick_ms: float) -> Figure:
         runs: by their names.
         tick_ms: the tick; a tick as late as that has missed the next deadline.
     """
-    fig = new_figure(WIDTH_PX, _HEIGHT_PX, dpi=PRINT_DPI)
+    fig = style.new_figure(style.WIDTH_PX, _HEIGHT_PX, dpi=style.PRINT_DPI)
     panel = fig.add_axes((0.09, _FOOT, 0.9, 0.9 - _FOOT))
-    plain(panel, size=TEXT_PT)
+    style.plain(panel, size=style.TEXT_PT)
     limit_us = 1000.0 * tick_ms
     bins = {name: histogram(run.late_ns) for name, run in runs.items()}
     used = [end for counts in bins.values() for end in counts] or [ENDS_US[0]]
@@ -52,16 +42,18 @@ def figure(runs: Mapping[str, Run], tick_ms: float) -> Figure:
     panel.set_yticks([0.001, 0.01, 0.1, 1, 10, 100], ["0.001", "0.01", "0.1", "1", "10", "100"])
     # The limit stands after the last bin that ends at or before it.
     below = sum(end <= limit_us for end in ends)
-    panel.axvline(below - 0.5, color=TEXT_COLOUR, linestyle="--", linewidth=1.2)
+    panel.axvline(below - 0.5, color=style.TEXT_COLOUR, linestyle="--", linewidth=1.2)
     panel.text(
-        below - 0.55, 130.0, f"limit: one tick, {tick_ms:g} ms", ha="right", fontsize=TEXT_PT
+        below - 0.55, 130.0, f"limit: one tick, {tick_ms:g} ms", ha="right", fontsize=style.TEXT_PT
     )
     panel.set_xlim(-0.7, max(len(ends), below) - 0.3)
     panel.set_xticks(range(len(ends)), [_time(end) for end in ends])
-    panel.set_xlabel("lateness of a tick, up to", fontsize=TEXT_PT, color=TEXT_COLOUR)
-    panel.set_ylabel("ticks, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
-    fig.suptitle("How late the ticks came", x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
-    fig.legend(loc="lower left", bbox_to_anchor=(0.0, 0.0), fontsize=TEXT_PT, frameon=False)
+    panel.set_xlabel("lateness of a tick, up to", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+    panel.set_ylabel("ticks, %", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+    fig.suptitle(
+        "How late the ticks came", x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold"
+    )
+    fig.legend(loc="lower left", bbox_to_anchor=(0.0, 0.0), fontsize=style.TEXT_PT, frameon=False)
     return fig
 
 

@@ -10,14 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from canshaper.commissioning.doctor.measure import Run
-from canshaper.commissioning.doctor.verdict import (
-    Finding,
-    Level,
-    Summary,
-    fit,
-    histogram,
-    summary,
-)
+from canshaper.commissioning.doctor.verdict import Finding, Level, Summary, fit, histogram, summary
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.identifier import NULL, group_of
+from canshaper.codec.frame import NULL, group_of
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import find_signal, special_codes
 from canshaper.commissioning.identification.commands import Commands, Samples

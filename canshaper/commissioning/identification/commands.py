@@ -11,17 +11,11 @@ from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
-from canshaper.commissioning.frame_finder import InputFinder
-from canshaper.commissioning.identification.series import (
-    Array,
-    Command,
-    Span,
-    common,
-    runs,
-)
+from canshaper.commissioning.identification.series import Array, Command, Span, common, runs
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.machine.valves import BoundAxis
+from canshaper.recording.channels import InputFinder
 
 # Commands, part of full speed, below which an axis stands.
 STANDS = 0.01

@@ -25,11 +25,7 @@ TITLE_CHARACTERS = 88
 MOST_ROWS = 6
 _LABEL: dict[str, Any] = {"fontsize": style.TEXT_PT, "color": style.TEXT_COLOUR}
 _FIT: dict[str, Any] = {"color": style.SHAPED_COLOUR, "linewidth": 1.8}
-_NAME: dict[str, Any] = {
-    "color": style.SHAPED_COLOUR,
-    "fontsize": style.TEXT_PT,
-    "weight": "bold",
-}
+_NAME: dict[str, Any] = {"color": style.SHAPED_COLOUR, "fontsize": style.TEXT_PT, "weight": "bold"}
 _DATA: dict[str, Any] = {"color": "#8A8A8A", "markersize": 3.0}
 _UNITS = {
     Kind.ANGLE: "swing, degrees",

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from canshaper.commissioning.identification.data_quality import clipped, mixed
 from canshaper.commissioning.identification.decay import LARGEST_RAD, DecayFit, fit_decay
 from canshaper.commissioning.identification.driven import DrivenFit, fit_driven
 from canshaper.commissioning.identification.driven_data import driven_s
 from canshaper.commissioning.identification.segments import SETTLING_S, find_free
 from canshaper.commissioning.identification.series import Series, Value
-from canshaper.commissioning.identification.swing import SAMPLES
+from canshaper.commissioning.identification.swing import SAMPLES, clipped, mixed
 
 # Fewer full swings show no damping.
 LEAST_SWINGS = 3.0

@@ -8,9 +8,8 @@ from typing import NamedTuple
 from rich.text import Text
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.frame_finder import InputFinder
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key
+from canshaper.recording.channels import InputFinder, Key
 from canshaper.recording.history import AxisStatus, History, HistoryEvent
 from canshaper.recording.listen import ReceivedFrame
 

@@ -91,13 +91,7 @@ SLOW = 0.8
 
 
 def screen(
-    monitor: Monitor,
-    now_ns: int,
-    width: int,
-    height: int,
-    *,
-    plain: bool,
-    keys: Keys | None = None,
+    monitor: Monitor, now_ns: int, width: int, height: int, *, plain: bool, keys: Keys | None = None
 ) -> Text:
     """Everything at a moment, in as many lines as there are.
 

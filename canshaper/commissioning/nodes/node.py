@@ -5,9 +5,18 @@ from dataclasses import dataclass
 
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
 
-from canshaper.codec.identifier import service_of
+from canshaper.codec.frame import service_of
 from canshaper.commissioning.nodes.eds import Eds
 from canshaper.errors import ConfigError, Problem
+
+
+@dataclass(frozen=True)
+class MessageTiming:
+    """How a deployment uses a message: sent every so many ms, lost after so many."""
+
+    cycle_ms: int | None
+    timeout_ms: int
+
 
 MOST_PDOS = 512
 MOST_BITS = 64

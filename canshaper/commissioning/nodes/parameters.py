@@ -11,17 +11,17 @@ from canopen.sdo.exceptions import SdoError
 
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can, receive
-from canshaper.codec.identifier import EMERGENCY
+from canshaper.codec.frame import EMERGENCY
 from canshaper.commissioning.nodes.messages import ANALOGUE_INPUTS
 from canshaper.commissioning.nodes.node import (
     COB_ID,
     EVENT_TIMER,
     EXTENDED_BIT,
     TRANSMISSION,
+    MessageTiming,
     Node,
     Pdo,
 )
-from canshaper.commissioning.nodes.use import MessageTiming
 from canshaper.config.bus import Bus
 from canshaper.errors import NodeError
 

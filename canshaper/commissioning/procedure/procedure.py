@@ -8,7 +8,6 @@ from pathlib import Path
 
 from canshaper.commissioning.procedure.bench import Bench
 from canshaper.commissioning.procedure.files import Files, Part
-from canshaper.commissioning.procedure.pictures import draw
 from canshaper.commissioning.procedure.state import (
     FILE,
     Context,
@@ -25,6 +24,7 @@ from canshaper.commissioning.procedure.state import (
 from canshaper.edit.edit import replace_text
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment
+from canshaper.report.style import draw
 
 
 @dataclass
@@ -251,7 +251,5 @@ class Procedure:
 
 def _new_state(bench: Bench, origin: Path | None) -> State:
     return State(
-        simulated=bench.simulated,
-        changes=bench.changes,
-        origin=hash_of(origin) if origin else "",
+        simulated=bench.simulated, changes=bench.changes, origin=hash_of(origin) if origin else ""
     )

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from canshaper.commissioning.identification.data_quality import clipped
 from canshaper.commissioning.identification.driven_data import Driven, driven_s, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
+from canshaper.commissioning.identification.swing import clipped
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, MOST_DELAY
 from canshaper.machine.valves import BoundAxis

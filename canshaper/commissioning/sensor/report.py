@@ -9,12 +9,10 @@ from rich.table import Table
 from canshaper.commissioning.identification.canlog import is_simulated
 from canshaper.commissioning.identification.series import Value
 from canshaper.commissioning.sensor.finding import Finding, changes
-from canshaper.config.origin import note, written_by
-from canshaper.edit.edit import Change, FileValue, change
+from canshaper.edit.edit import Change, FileValue, change, note, written_by
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
-from canshaper.report.console import new_table
-from canshaper.report.table import axis_title
+from canshaper.report.console import axis_title, new_table
 
 
 def heading(finding: Finding) -> str:

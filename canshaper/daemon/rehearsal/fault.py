@@ -6,8 +6,7 @@ from typing import Any
 
 from canshaper.blackbox.recorder import Recorder
 from canshaper.codec.e2e import E2e
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import group_of
+from canshaper.codec.frame import Frame, FrameFault, group_of
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import Bound

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from canshaper.codec import identifier as ids
+from canshaper.codec import frame as ids
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.daemon.rehearsal import fault as make
 from canshaper.daemon.rehearsal.fault import MS, Demands, Editor, Fault, S

@@ -5,8 +5,7 @@ from typing import Any
 
 from cantools.database.can import Signal
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import with_source
+from canshaper.codec.frame import Frame, FrameFault, with_source
 from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, Velocity, VelocitySignal
 from canshaper.daemon.rehearsal import fault as make
 from canshaper.daemon.rehearsal.fault import MS, Alter, Demands, Editor, Fault, S

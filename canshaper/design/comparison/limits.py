@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-from canshaper.design.comparison.candidates import tick_s
+from canshaper.design.comparison.manoeuvres import tick_s
 from canshaper.design.comparison.measure import Outcome
 from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.modes import responses_of

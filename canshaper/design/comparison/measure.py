@@ -7,8 +7,14 @@ from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 
-from canshaper.design.comparison.candidates import AXES, Candidate, with_candidate
-from canshaper.design.comparison.manoeuvres import LOAD_M, LOAD_MASS, Manoeuvre
+from canshaper.design.comparison.manoeuvres import (
+    AXES,
+    LOAD_M,
+    LOAD_MASS,
+    Candidate,
+    Manoeuvre,
+    with_candidate,
+)
 from canshaper.design.lockstep import drive
 from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment

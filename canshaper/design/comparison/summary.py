@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from statistics import fmean
 
-from canshaper.design.comparison.candidates import Candidate
+from canshaper.design.comparison.manoeuvres import Candidate
 from canshaper.design.comparison.measure import Outcome
 
 # A filter that leaves more than this part of the unshaped swing, at lengths within 15 %, is not

@@ -1,4 +1,1 @@
-"""Tuning on the desk: the optimal tuner (Eq. 14-15), the manual rule, measures of a setting.
-
-Needs the ``tools`` extra; nothing of it is imported by the daemon.
-"""
+"""Tuning on the desk, with the extra tools: optimal tuner (Eq. 14-15), manual rule, measures."""

@@ -9,18 +9,11 @@ are fractions of full speed; u_max cancels, because the cost grows with its squa
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
+from canshaper.config.objective import PoleDistance, States, matrix, weights_fault
 from canshaper.errors import DesignError
 from canshaper.shaping.sway import SwayMode
-
-PoleDistance = Literal["text", "printed", "off"]
-"""Sense of Eq. 14e: "text", at least five times as far out as the sway pole; "printed", at most."""
-
-States = Literal["sway", "deviation", "companion", "none"]
-"""Quantity that Q weighs, of v = u / (a2 s^2 + a1 s + 1): "sway" (v'/w, v''/w^2), which is swing
-angle and rate in units of full speed times w/g; "deviation" (v - u, v'); "companion"
-(a2 v, a2 v'); or nothing."""
 
 # The paper's word for "sufficiently far from the imaginary axis".
 POLE_DISTANCE = 5.0
@@ -68,28 +61,15 @@ class Weights:
     p: float = 1.0
 
     def __post_init__(self) -> None:
-        if len(self.q) not in (1, 2, 4):
-            text = "1 number, 2 of the diagonal or 4 of the rows"
-            raise DesignError(f"weight Q: expected {text}, got {len(self.q)}")
-        q11, q12, q22 = self.matrix
-        named = (("Q", q11), ("Q", q22), ("R", self.r), ("S", self.s), ("P", self.p))
-        for name, value in named:
+        if fault := weights_fault(self.q, self.r, self.s):
+            raise DesignError(fault)
+        for name, value in (("R", self.r), ("S", self.s), ("P", self.p)):
             in_range(f"weight {name}", value, 0.0, 1e6)
-        if len(self.q) == 4 and q12 != self.q[2]:
-            raise DesignError(
-                f"weight Q: expected a symmetric matrix, got {q12:g} and {self.q[2]:g}"
-            )
-        most = math.sqrt(q11 * q22)
-        if not abs(q12) <= most * (1.0 + 1e-12):
-            text = f"{-most:g} to {most:g} beside the diagonal (positive semi-definite)"
-            raise DesignError(f"weight Q: expected {text}, got {q12:g}")
-        if self.r + self.s == 0.0:
-            raise DesignError("weights R and S: expected one above 0, got both 0")
 
     @property
     def matrix(self) -> tuple[float, float, float]:
         """Q as q11, q12, q22."""
-        return self.q[0], self.q[1] if len(self.q) == 4 else 0.0, self.q[-1]
+        return matrix(self.q)
 
 
 PAPER_SLEW = Weights()

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
 from canshaper.design.tuning.preference import Choice
+from canshaper.report.console import axis_title
 from canshaper.report.style import (
     JOYSTICK_COLOUR,
     MINUS,
@@ -22,7 +23,6 @@ from canshaper.report.style import (
     new_figure,
     plain,
 )
-from canshaper.report.table import axis_title
 from canshaper.shaping.sway import SwayMode
 
 SIZE_PX = (1500, 720)

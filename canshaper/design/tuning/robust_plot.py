@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from canshaper.design.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, step_response
+from canshaper.report.console import axis_title
 from canshaper.report.style import (
     DASHED,
     HEAD_PT,
@@ -25,7 +26,6 @@ from canshaper.report.style import (
     plain,
     titled,
 )
-from canshaper.report.table import axis_title
 from canshaper.shaping.sway import SwayMode
 
 _HEIGHT_PX = 1500

@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     EMERGENCY,
     GENERIC_ERROR,
     HEARTBEAT,
@@ -13,11 +12,11 @@ from canshaper.codec.identifier import (
     NO_EMERGENCY,
     START,
     STATE_MASK,
+    Frame,
+    FrameFault,
     NodeState,
 )
 from canshaper.config.bus import Canopen, CanopenNode
-from canshaper.protocols.canopen.cia408 import ValveControl
-from canshaper.shaping.states import Reason
 
 # Between two commands to start one node: what it needs to answer with a heartbeat.
 START_AGAIN_NS = 500_000_000
@@ -117,35 +116,6 @@ class RemoteNode:
     def works(self) -> bool:
         """Whether the node is operational without an emergency, so that its data count."""
         return self.state == NodeState.OPERATIONAL and self.emergency == NO_EMERGENCY
-
-
-class NodeGate:
-    """Interlock by the node of an axis' joystick or valve.
-
-    Args:
-        node: that node.
-        in_motion: reason for an axis in motion when it no longer works.
-        control: state machine of the valve, which begins again with a node that does.
-    """
-
-    def __init__(
-        self, node: RemoteNode, in_motion: Reason, control: ValveControl | None = None
-    ) -> None:
-        self._node = node
-        self._in_motion = in_motion
-        self._control = control
-        self._stops, self._alarms = node.stops, node.alarms
-
-    def __call__(self, neutral: bool, _now_ns: int) -> Reason | None:
-        """Return the reason, or None; a failure since the last call counts, however short."""
-        node = self._node
-        stopped, alarmed = node.stops != self._stops, node.alarms != self._alarms
-        self._stops, self._alarms = node.stops, node.alarms
-        if self._control is not None and (stopped or node.state != NodeState.OPERATIONAL):
-            self._control.resync()
-        if node.works and not (stopped or alarmed):
-            return None
-        return Reason.NODE_FAULT if neutral else self._in_motion
 
 
 class _NodeMessage:

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from canshaper.codec.frame import EFF_FLAG
-from canshaper.codec.identifier import NULL, WITHOUT_PRIORITY, group_mask, group_of
+from canshaper.codec.frame import EFF_FLAG, NULL, WITHOUT_PRIORITY, group_mask, group_of
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.rewrite import RewrittenMessage, kernel_check
 from canshaper.machine.deployment import Deployment
@@ -109,7 +108,4 @@ def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
     """Changes that make a frame of a joystick one with all its axes in neutral."""
     length = message.fields.message.length
     checks, clear = kernel_check(message.protection, length)
-    return (
-        *changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length),
-        *checks,
-    )
+    return (*changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length), *checks)

@@ -8,14 +8,15 @@ from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import Self
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     ACKNOWLEDGE,
     CLAIMED,
     DM1,
     GLOBAL,
     NULL,
     REQUEST,
+    Frame,
+    FrameFault,
     group_of,
     identifier,
     name_bytes,
@@ -208,12 +209,7 @@ class Node:
     """
 
     def __init__(
-        self,
-        bus: str,
-        config: J1939,
-        cyclic: frozenset[int] = frozenset(),
-        *,
-        guest: bool = False,
+        self, bus: str, config: J1939, cyclic: frozenset[int] = frozenset(), *, guest: bool = False
     ) -> None:
         answered = frozenset(() if guest else (DM1,))
         self._claim = AddressClaim(bus, config, answered, cyclic, guest=guest)

@@ -6,13 +6,13 @@ One fault fits into one frame, more of them are sent by the broadcast of SAE J19
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Self
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import (
+from canshaper.codec.frame import (
     DEFAULT_PRIORITY,
     DM1,
     LOWEST_PRIORITY,
     TRANSPORT,
     TRANSPORT_DATA,
+    Frame,
     identifier,
 )
 from canshaper.inputs.value import Following

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import GLOBAL
+from canshaper.codec.frame import GLOBAL, Frame, FrameFault
 from canshaper.inputs.input import Receiver
 from canshaper.protocols.interface import DrivenAxis
 

@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import CLAIMED, group_of, name_bytes, pgn_of
+from canshaper.codec.frame import CLAIMED, Frame, group_of, name_bytes, pgn_of
 from canshaper.config.bus import J1939
 from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.inputs.value import Following

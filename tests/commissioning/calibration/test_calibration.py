@@ -12,7 +12,8 @@ from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.run import run_simulated
-from canshaper.config.origin import Origin, written_by
+from canshaper.config.section import Origin
+from canshaper.edit.edit import written_by
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -11,7 +11,8 @@ import pytest
 from canshaper.commissioning.calibration.ramp import TOGETHER_PER_S, Ramp
 from canshaper.commissioning.calibration.together import Direction, Moment, measured
 from canshaper.commissioning.calibration.write import pump_lines
-from canshaper.config.origin import Origin, written_by
+from canshaper.config.section import Origin
+from canshaper.edit.edit import written_by
 from canshaper.errors import CalibrationError
 from canshaper.machine.binding import load_deployment
 

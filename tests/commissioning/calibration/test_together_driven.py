@@ -11,7 +11,7 @@ from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.together import Moment
-from canshaper.commissioning.simulated import log_simulated
+from canshaper.commissioning.procedure.bench import log_simulated
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

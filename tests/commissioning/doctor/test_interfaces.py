@@ -14,8 +14,8 @@ import pytest
 
 from canshaper.bus.port import not_opened
 from canshaper.commissioning.doctor import interfaces
+from canshaper.commissioning.doctor.devices import parse_ip, read_link, read_sys
 from canshaper.commissioning.doctor.interfaces import bus_findings, link_findings
-from canshaper.commissioning.doctor.link import parse_ip, read_link, read_sys
 from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus
 

@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
-from canshaper.config.origin import Origin, written_by
+from canshaper.config.section import Origin
+from canshaper.edit.edit import written_by
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.grapple import Sway
 from tests.commissioning.identification.machine import (

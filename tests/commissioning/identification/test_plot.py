@@ -7,7 +7,7 @@ import numpy as np
 
 from canshaper.commissioning.identification.data import timed_by_hand
 from canshaper.commissioning.identification.plot import figure
-from canshaper.commissioning.identification.recommend import advice_on, headlines
+from canshaper.commissioning.identification.report import advice_on, headlines
 from canshaper.commissioning.identification.series import Kind, Series, Unit
 from canshaper.commissioning.identification.verdict import Finding, identify
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from canshaper.commissioning.identification.phone import series_of
+from canshaper.commissioning.identification.data import series_of
 from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.identification.table import is_table, read_table
 from canshaper.commissioning.identification.verdict import identify

@@ -71,10 +71,7 @@ def test_the_node_is_the_same(tmp_path: Path, content: str | bytes, names: list[
     ("content", "text"),
     [
         ('<?xml version="1.0"?>\n<ISO15745ProfileContainer/>\n', ":1: expected an EDS or DCF, got"),
-        (
-            b"\xef\xbb\xbf<ISO15745ProfileContainer>",
-            " got XML; export an EDS of an XDD or XDC",
-        ),
+        (b"\xef\xbb\xbf<ISO15745ProfileContainer>", " got XML; export an EDS of an XDD or XDC"),
         (
             BEFORE + ARRAY.replace("=2", "=many") + BEHIND,
             "[6401]: CompactSubObj: expected a whole number, got 'many'",

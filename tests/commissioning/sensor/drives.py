@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from canshaper.commissioning.identification.series import Series
+from canshaper.commissioning.procedure.bench import log_simulated
 from canshaper.commissioning.sensor.finding import Finding, examine
 from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
-from canshaper.commissioning.simulated import log_simulated
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters

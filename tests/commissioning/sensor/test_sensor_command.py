@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
+from canshaper.commissioning.procedure.bench import log_simulated
 from canshaper.commissioning.sensor.fit import hand_driven
-from canshaper.commissioning.simulated import log_simulated
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.binding import load_deployment

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.design.comparison.candidates import Candidate, candidates
+from canshaper.design.comparison.manoeuvres import Candidate, candidates
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.design.comparison.candidates import FILE

@@ -12,8 +12,13 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.design.comparison.candidates import Candidate, candidates, with_candidate
-from canshaper.design.comparison.manoeuvres import RANDOM_SEEDS, manoeuvres
+from canshaper.design.comparison.manoeuvres import (
+    RANDOM_SEEDS,
+    Candidate,
+    candidates,
+    manoeuvres,
+    with_candidate,
+)
 from canshaper.design.comparison.measure import measure, measure_all
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.cli.verbs.compare import _WORKS
-from canshaper.design.comparison.candidates import candidates
 from canshaper.design.comparison.limits import least
-from canshaper.design.comparison.manoeuvres import manoeuvres
+from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
 from canshaper.design.comparison.measure import Outcome, measure
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

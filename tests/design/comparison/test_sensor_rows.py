@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.design.comparison.candidates import candidates, with_candidate
-from canshaper.design.comparison.manoeuvres import manoeuvres
+from canshaper.design.comparison.manoeuvres import candidates, manoeuvres, with_candidate
 from canshaper.design.comparison.measure import measure
 from canshaper.machine.binding import load_deployment
 

@@ -8,8 +8,8 @@ import pytest
 from matplotlib.text import Annotation, Text
 
 from canshaper.cli.verbs.compare import _felt, _limits, _residuals, _worst
-from canshaper.design.comparison.candidates import Candidate, candidates
 from canshaper.design.comparison.limits import Least, least, limits_for
+from canshaper.design.comparison.manoeuvres import Candidate, candidates
 from canshaper.design.comparison.measure import Outcome, measure
 from canshaper.design.comparison.summary import Row, beaten_by, recommendations, rows
 from canshaper.design.tuning.robust import least_residual

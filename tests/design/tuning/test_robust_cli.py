@@ -5,7 +5,8 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.config.filters import DesignedFor
-from canshaper.config.origin import Origin, written_by
+from canshaper.config.section import Origin
+from canshaper.edit.edit import written_by
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[3]

@@ -12,11 +12,10 @@ from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
 from canshaper.config.load import load_config
-from canshaper.config.origin import written_by
 from canshaper.design.tuning.deploy import deployed, setting
 from canshaper.design.tuning.evaluate import Machine
 from canshaper.design.tuning.optimal import Tuning, manual
-from canshaper.edit.edit import flow
+from canshaper.edit.edit import flow, written_by
 from canshaper.shaping.sway import SwayMode
 
 ROOT = Path(__file__).resolve().parents[3]

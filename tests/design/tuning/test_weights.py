@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from canshaper.commissioning.tuned import TunedDesign, design_tuned, write_tuned
-from canshaper.config.filters import Objective
 from canshaper.config.load import load_config
+from canshaper.config.objective import Objective
 from canshaper.design.tuning.formulation import Task, Weights
 from canshaper.design.tuning.optimal import tune
-from canshaper.errors import DesignError, UsageError
+from canshaper.errors import ConfigError, DesignError, UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.sway import SwayMode
 
@@ -79,6 +79,25 @@ def test_what_is_no_weight_says_what_is(name: str) -> None:
         Weights(q)
     assert text in str(caught.value).replace("got nan and nan", "beside the diagonal")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("aim", "text"),
+    [
+        ("q: [1, 5, 5, 1]", "weight Q: expected -1 to 1 beside the diagonal"),
+        ("q: []", "weight Q: expected 1 number, 2 of the diagonal or 4 of the rows, got 0"),
+        ("r: 0, s: 0", "weights R and S: expected one above 0, got both 0"),
+        ("states: angle", "expected 'sway', 'deviation', 'companion' or 'none', got 'angle'"),
+    ],
+)
+def test_a_file_with_what_is_no_objective_is_refused(file: Path, aim: str, text: str) -> None:
+    aims = f"period_s: 2.2, damping_ratio: 0.049, objective: {{ {aim} }}"
+    new = f"a1: 0.708, a2: 0.12, designed_for: {{ {aims} }} }} # near-far"
+    file.write_text(file.read_text().replace("a1: 0.708, a2: 0.12 } # near-far", new))
+    with pytest.raises(ConfigError) as caught:
+        load_config(file)
+    assert text in str(caught.value)
+    assert "designed_for.objective" in str(caught.value)
 
 
 @pytest.mark.slow

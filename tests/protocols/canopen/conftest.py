@@ -2,9 +2,7 @@
 
 import pytest
 
-from tests.rigs.canopen import (
-    CanopenRig,
-)
+from tests.rigs.canopen import CanopenRig
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from canshaper.protocols.canopen.cia408 import ValveControl
+from canshaper.protocols.canopen.network import ValveControl
 from tests.rigs.canopen import (
     ACTIVE,
     DISABLED,

@@ -5,16 +5,10 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.config.bus import CanopenNode
-from canshaper.protocols.canopen.nodes import NodeGate, RemoteNode
+from canshaper.protocols.canopen.network import NodeGate
+from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import Reason
-from tests.rigs.canopen import (
-    BOOT_UP,
-    INIT,
-    OPERATIONAL,
-    PRE_OPERATIONAL,
-    STOPPED,
-    CanopenRig,
-)
+from tests.rigs.canopen import BOOT_UP, INIT, OPERATIONAL, PRE_OPERATIONAL, STOPPED, CanopenRig
 
 MS = 1_000_000
 IN_TIME, TOO_LATE = 100 * MS, 100 * MS + 1

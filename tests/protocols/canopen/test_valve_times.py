@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.machine.binding import load_deployment
-from canshaper.protocols.canopen.cia408 import ValveControl
+from canshaper.protocols.canopen.network import ValveControl
 from canshaper.shaping.states import Reason
 from tests.rigs.canopen import ACTIVE, DISABLED, FILE, HOLD, INIT, RESET, ROOT
 
@@ -71,11 +71,7 @@ def valve() -> Valve:
             id="a state that is not reached is waited for two seconds",
         ),
         pytest.param(
-            [
-                (0, NOT_READY, INIT),
-                (2000 * MS, NOT_READY, INIT),
-                (2000 * MS + 1, NOT_READY, RESET),
-            ],
+            [(0, NOT_READY, INIT), (2000 * MS, NOT_READY, INIT), (2000 * MS + 1, NOT_READY, RESET)],
             id="a valve that is not ready boots for two seconds, then it has a fault",
         ),
         pytest.param(

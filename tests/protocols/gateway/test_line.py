@@ -88,9 +88,7 @@ def test_without_a_joystick_nothing_is_sent(rig: GatewayRig) -> None:
         assert rig.tick() == []
 
 
-def test_a_lost_joystick_ends_in_a_shaped_stop_of_our_own_and_then_silence(
-    rig: GatewayRig,
-) -> None:
+def test_a_lost_joystick_ends_in_a_shaped_stop_of_our_own_and_then_silence(rig: GatewayRig) -> None:
     rig.moving()
     before = rig.decoded(rig.left[-2])["AliveCounter"]
     own: list[Frame] = []

@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.identifier import name_bytes
+from canshaper.codec.frame import Frame, FrameFault, name_bytes
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput

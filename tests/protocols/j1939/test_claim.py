@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import CLAIMED, name_bytes
+from canshaper.codec.frame import CLAIMED, Frame, name_bytes
 from canshaper.config.bus import J1939, J1939Name
 from canshaper.protocols.j1939.claim import LEAST_BETWEEN_NS, AddressClaim, ClaimState
 from canshaper.shaping.states import State

@@ -2,8 +2,7 @@
 
 import pytest
 
-from canshaper.codec.frame import Frame
-from canshaper.codec.identifier import CLAIMED
+from canshaper.codec.frame import CLAIMED, Frame
 from canshaper.config.bus import J1939, J1939Name
 from canshaper.protocols.j1939.claim import AddressClaim, ClaimState
 from tests.rigs.j1939 import CLAIM, NACK, NO_CLAIM, OTHER, OWN, WHO_HAS_IT, request

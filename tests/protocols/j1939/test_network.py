@@ -94,10 +94,7 @@ def test_no_one_else_may_use_our_address(rig: Rig) -> None:
 
 
 def test_a_joystick_of_one_address_and_no_other(tmp_path: Path) -> None:
-    rig = variant(
-        tmp_path,
-        ("    message: BJM1\n", "    message: BJM1\n    source: 0x34\n"),
-    )
+    rig = variant(tmp_path, ("    message: BJM1\n", "    message: BJM1\n    source: 0x34\n"))
     for _ in range(20):
         rig.tick(bjm("BJM1"), bjm("BJM2"))
     assert rig.reason() == "JOYSTICK_TIMEOUT"

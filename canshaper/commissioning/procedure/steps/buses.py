@@ -12,17 +12,8 @@ from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import Traffic, read_traffic
 from canshaper.machine.deployment import Deployment
+from canshaper.report import style
 from canshaper.report.console import new_table
-from canshaper.report.style import (
-    HEAD_PT,
-    PRINT_DPI,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-)
 from canshaper_sim.strokes import Script
 
 LISTEN_S = 10.0
@@ -75,18 +66,18 @@ def figure(traffic: Traffic, deployment: Deployment) -> Figure:
     """Every frame of the first second, a row a message."""
     rows = _rows(traffic, deployment)[:MOST_ROWS]
     height = 330 + 45 * len(rows)
-    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
     panel = fig.add_axes((0.27, 190 / height, 0.7, 45 * len(rows) / height))
-    plain(panel, size=TEXT_PT)
+    style.plain(panel, size=style.TEXT_PT)
     for number, (_, times) in enumerate(rows):
         drawn = [time for time in times if time <= MOST_DRAWN_S]
-        panel.plot(drawn, [number] * len(drawn), "|", color=SHAPED_COLOUR, markersize=5)
+        panel.plot(drawn, [number] * len(drawn), "|", color=style.SHAPED_COLOUR, markersize=5)
     panel.set_yticks(range(len(rows)), [name for name, _ in rows])
     panel.set_ylim(len(rows) - 0.5, -0.5)
     panel.set_xlim(0.0, MOST_DRAWN_S)
-    panel.set_xlabel("time, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
     title = "The frames of the first second"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
+    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
     return fig
 
 

@@ -13,29 +13,11 @@ from canshaper.config.source import Source
 from canshaper.edit.edit import change, of_limits
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import rehearsed_valves, unstated
-from canshaper.report.style import (
-    HEAD_PT,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    TITLE_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-    titled,
-)
-from canshaper.report.table import axis_title
+from canshaper.report import style
+from canshaper.report.console import axis_title
 
 MOTION = "motion"  # the step of that name
-EVENTS = (
-    "joystick released",
-    "joystick reversed",
-    "joystick lost",
-    "enable lost",
-    "limits allow",
-)
+EVENTS = ("joystick released", "joystick reversed", "joystick lost", "enable lost", "limits allow")
 
 
 def run(context: Context) -> Outcome:
@@ -88,22 +70,22 @@ def _write(deployment: Deployment, fast: list[str], allowed: list[str]) -> list[
 def figure(axes: list[Stopping]) -> Figure:
     """How far each axis travels on after each event, and how far its limits allow."""
     height = 170 + 330 * len(axes)
-    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
     for number, axis in enumerate(axes):
         bottom = (height - 110 - 330 * (number + 1) + 75) / height
         panel = fig.add_axes((0.2, bottom, 0.76, 215 / height))
-        plain(panel, size=TEXT_PT)
+        style.plain(panel, size=style.TEXT_PT)
         unit, scale = ("s of full speed", 1.0) if axis.speed.m_s is None else ("m", axis.speed.m_s)
-        titled(panel, f"{axis_title(axis.name)}, {unit}", TITLE_PT)
+        style.titled(panel, f"{axis_title(axis.name)}, {unit}", style.TITLE_PT)
         ways = axis.travel
         events = (ways.release, ways.reversal, ways.lost, ways.enable, axis.allowed_s)
-        colours = [SHAPED_COLOUR] * (len(events) - 1) + [RAW_COLOUR]
+        colours = [style.SHAPED_COLOUR] * (len(events) - 1) + [style.RAW_COLOUR]
         panel.barh(EVENTS, [scale * way_s for way_s in events], color=colours, height=0.6)
         panel.invert_yaxis()
         if axis.stated_m is not None and axis.speed.m_s is not None:
-            panel.axvline(axis.stated_m, color=TEXT_COLOUR, linewidth=1.2)
+            panel.axvline(axis.stated_m, color=style.TEXT_COLOUR, linewidth=1.2)
     title = "Travel from full speed; the line is stop_distance_m"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
+    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
     return fig
 
 

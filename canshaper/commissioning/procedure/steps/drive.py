@@ -8,17 +8,21 @@ from typing import Any
 from canshaper.commissioning.identification.canlog import bind
 from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
-from canshaper.commissioning.procedure.recorded import machine_recording, simulated_recording
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.dry import figure as joysticks_figure
 from canshaper.commissioning.procedure.steps.motion import LEAST_MOVED
 from canshaper.commissioning.procedure.steps.swing import swinging
-from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
-from canshaper.report.console import new_table
+from canshaper.commissioning.procedure.traffic import (
+    AxisTraffic,
+    Traffic,
+    machine_recording,
+    read_traffic,
+    simulated_recording,
+)
+from canshaper.report.console import new_table, print_report
 from canshaper.report.metrics import MIN_RAW_DEG, report_dict
 from canshaper.report.plot import figure
 from canshaper.report.strokes import RESIDUAL_DWELL_S, RESIDUAL_WINDOW_MIN_S
-from canshaper.report.table import print_report
 from canshaper_sim.axes import ALL_AXES
 from canshaper_sim.operator import script_named
 from canshaper_sim.recording import Recording

@@ -8,24 +8,8 @@ from canshaper.commissioning.procedure.bench import STILL_MOVES, Mode, Task
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.joysticks import LEAST
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
-from canshaper.report.console import new_table
-from canshaper.report.style import (
-    DASHED,
-    HEAD_PT,
-    JOYSTICK_COLOUR,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    TITLE_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-    titled,
-    zero_line,
-)
-from canshaper.report.table import axis_title
+from canshaper.report import style
+from canshaper.report.console import axis_title, new_table
 from canshaper.shaping.states import Reason, State
 from canshaper_sim.strokes import Script, Stroke
 
@@ -107,36 +91,36 @@ def _reasons(axis: AxisTraffic) -> str:
 def figure(traffic: Traffic, title: str) -> Figure:
     """Joystick and valve of each axis over time, and when its joystick was enabled."""
     height = 190 + 300 * len(traffic.axes)
-    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
     for number, (name, axis) in enumerate(traffic.axes.items()):
         bottom = (height - 110 - 300 * (number + 1) + 95) / height
         panel = fig.add_axes((0.11, bottom, 0.86, 185 / height))
-        plain(panel, size=TEXT_PT)
-        titled(panel, axis_title(name), TITLE_PT)
-        zero_line(panel)
+        style.plain(panel, size=style.TEXT_PT)
+        style.titled(panel, axis_title(name), style.TITLE_PT)
+        style.zero_line(panel)
         enabled = [110.0 * value for value in axis.enabled.value]
         panel.fill_between(
-            axis.enabled.time_s, 0.0, enabled, color=JOYSTICK_COLOUR, alpha=0.4, label="enable",
-            linewidth=0, step="post",
+            axis.enabled.time_s, 0.0, enabled, color=style.JOYSTICK_COLOUR, alpha=0.4,
+            label="enable", linewidth=0, step="post",
         )  # fmt: skip
         panel.plot(
-            axis.joystick.time_s, _percent(axis.joystick.value), color=RAW_COLOUR, linewidth=1.2,
-            linestyle=DASHED, label="joystick",
+            axis.joystick.time_s, _percent(axis.joystick.value), color=style.RAW_COLOUR,
+            linewidth=1.2, linestyle=style.DASHED, label="joystick",
         )  # fmt: skip
         panel.plot(
-            axis.valve.time_s, _percent(axis.valve.value), color=SHAPED_COLOUR, linewidth=1.6,
+            axis.valve.time_s, _percent(axis.valve.value), color=style.SHAPED_COLOUR, linewidth=1.6,
             label="valve",
         )  # fmt: skip
         for time_s, state, _ in axis.states:
             if state == State.TRIPPED.name:
-                panel.axvline(time_s, color=TEXT_COLOUR, linewidth=0.8)
+                panel.axvline(time_s, color=style.TEXT_COLOUR, linewidth=0.8)
         panel.set_xlim(0.0, traffic.duration_s)
         panel.set_ylim(-110.0, 110.0)
-        panel.set_ylabel("%", fontsize=TEXT_PT, color=TEXT_COLOUR)
+        panel.set_ylabel("%", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
         if not number:
-            panel.legend(loc="upper right", fontsize=TEXT_PT, frameon=False, ncols=3)
-    panel.set_xlabel("time, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
-    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
+            panel.legend(loc="upper right", fontsize=style.TEXT_PT, frameon=False, ncols=3)
+    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
     return fig
 
 

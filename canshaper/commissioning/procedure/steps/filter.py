@@ -16,8 +16,7 @@ from canshaper.design.tuning.evaluate import evaluate, press
 from canshaper.design.tuning.verdict import Verdict, judged, on_axis
 from canshaper.errors import CanshaperError
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import new_table
-from canshaper.report.table import axis_title
+from canshaper.report.console import axis_title, new_table
 
 ROBUST, GFF = "robust", "gff"
 _NAMES = {ROBUST: "robust", GFF: "gff, of the paper"}

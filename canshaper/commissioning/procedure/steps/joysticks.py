@@ -9,21 +9,8 @@ from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
 from canshaper.edit.edit import change
 from canshaper.machine.deployment import Deployment
-from canshaper.report.console import new_table
-from canshaper.report.style import (
-    HEAD_PT,
-    PRINT_DPI,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    TITLE_PT,
-    WIDTH_PX,
-    new_figure,
-    plain,
-    titled,
-    zero_line,
-)
-from canshaper.report.table import axis_title
+from canshaper.report import style
+from canshaper.report.console import axis_title, new_table
 from canshaper_sim.strokes import Script, Stroke
 
 MOVE_S = 10.0
@@ -144,21 +131,21 @@ def _write(deployment: Deployment, wrong: dict[str, tuple[str, str]]) -> list[st
 def figure(axes: dict[str, AxisTraffic]) -> Figure:
     """The command of each axis over time, as the file reads it."""
     height = 150 + 260 * len(axes)
-    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
     for number, (name, axis) in enumerate(axes.items()):
         bottom = height - 90 - 260 * (number + 1) + 85
         panel = fig.add_axes((0.11, bottom / height, 0.86, 150 / height))
-        plain(panel, size=TEXT_PT)
-        titled(panel, axis_title(name), TITLE_PT)
-        zero_line(panel)
+        style.plain(panel, size=style.TEXT_PT)
+        style.titled(panel, axis_title(name), style.TITLE_PT)
+        style.zero_line(panel)
         values = [100.0 * value for value in axis.joystick.value]
-        panel.plot(axis.joystick.time_s, values, color=SHAPED_COLOUR, linewidth=1.4)
+        panel.plot(axis.joystick.time_s, values, color=style.SHAPED_COLOUR, linewidth=1.4)
         panel.set_xlim(0.0, MOVE_S)
         panel.set_ylim(-110.0, 110.0)
-        panel.set_ylabel("joystick, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
-    panel.set_xlabel("time, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
+        panel.set_ylabel("joystick, %", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
     title = "Each joystick, moved to both of its ends"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
+    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
     return fig
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from canshaper.commissioning.assumed import MEASURE, origins
 from canshaper.commissioning.procedure.files import shown
-from canshaper.commissioning.procedure.pictures import embedded
 from canshaper.commissioning.procedure.rehearsed import WRONG, Row, kept, table
 from canshaper.commissioning.procedure.state import (
     FILE,
@@ -20,6 +19,7 @@ from canshaper.commissioning.procedure.steps.drive import DRIVE
 from canshaper.machine.deployment import Deployment
 from canshaper.report import html
 from canshaper.report.console import new_table
+from canshaper.report.style import embedded
 
 NAME = "report"
 # What no program sees: tried by a person at the machine, and what should happen.

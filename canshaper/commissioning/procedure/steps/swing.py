@@ -15,8 +15,13 @@ from canshaper.commissioning.identification.data import (
     timed_by_hand,
 )
 from canshaper.commissioning.identification.plot import figure
-from canshaper.commissioning.identification.recommend import Advice, advice_on, headlines
-from canshaper.commissioning.identification.report import lines, write_sway
+from canshaper.commissioning.identification.report import (
+    Advice,
+    advice_on,
+    headlines,
+    lines,
+    write_sway,
+)
 from canshaper.commissioning.identification.table import is_table
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.commissioning.procedure.bench import Bench, Mode, Task
