@@ -106,7 +106,7 @@ class Recorder:
         raise ValueError("faults are rehearsed where the file has control.rehearse_faults")
 
     def reloads(self) -> None:
-        """Take note that another controller follows: nothing that is made ends later than here."""
+        """Take note that another controller follows."""
 
     def flush(self) -> None:
         """Write down what was noted."""

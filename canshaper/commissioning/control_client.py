@@ -57,11 +57,7 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
 
 
 def rehearse(path: Path, what: str) -> dict[str, Any]:
-    """Let a running daemon make a fault, or end it, or ask what has become of it.
-
-    Args:
-        path: its control socket.
-        what: name of a fault, ``report`` or ``end``.
+    """Let a running daemon make a fault, by its name, ``end`` it, or ``report`` of it.
 
     Raises:
         ControlError: no daemon answers, or it refuses.

@@ -261,16 +261,16 @@ def gone(run: Rehearsed) -> None:
 
 
 @pytest.mark.parametrize(
-    ("act", "why"),
+    ("act", "fault", "why"),
     [
-        (lambda run: run.ask("end"), "ended by its client"),
-        (gone, "its client is gone"),
+        (lambda run: run.ask("end"), "error_frame:crane", "ended by its client"),
+        (gone, "frozen:right", "its client is gone"),
     ],
 )
 def test_a_fault_ends_with_its_client_and_what_moves_trips(
-    act: Callable[[Rehearsed], None], why: str
+    act: Callable[[Rehearsed], None], fault: str, why: str
 ) -> None:
-    run = asked(act, "error_frame:crane")
+    run = asked(act, fault)
     assert run.report["why"] == why
     assert {event[3] for event in run.report["events"]} == {"LOOP_STALLED"}
     assert run.report["neutral_ms"] is not None

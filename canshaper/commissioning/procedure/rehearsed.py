@@ -117,11 +117,6 @@ def chosen(deployment: Deployment, names: Iterable[str]) -> list[Fault]:
 def made(control: Path, fault: Fault, deployment: Deployment) -> Row:
     """Let the daemon make a fault, and wait until it is over; however this ends, the fault does.
 
-    Args:
-        control: control socket of the daemon.
-        fault: that fault.
-        deployment: the machine.
-
     Raises:
         ControlError: the daemon refuses, or is gone.
     """
