@@ -1,7 +1,7 @@
 """Practice, then the work that counts, with and without anti-sway; a table and picture of it."""
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Techniques that are tried in practice, and in how many working cycles each.
 _SPEEDS, _CATCHES, _PRACTICE = (0.25, 0.5, 0.75, 1.0), (0.0, 0.5, 1.0), 2
 Done = dict[Work, list[Move]]
-"""Moves of each working cycle, in the order of the seeds."""
+"""Moves of each working cycle."""
 Doing = Callable[[Sequence[Work]], Done]
 """Does works."""
 
@@ -48,6 +48,11 @@ class Task(NamedTuple):
         tip_m, most_deg = self.within
         swing = "tip only" if most_deg == math.inf else f"{most_deg:g} deg"
         return f"{100.0 * tip_m:g} cm\n{swing}"
+
+    @property
+    def words(self) -> str:
+        """The tolerance in a line."""
+        return self.head.replace("\n", ", ")
 
 
 # By the profile that is for it.
@@ -90,7 +95,7 @@ def practised(
     trials = [
         replace(one, techniques=(way,) * len(LOADS), seed=f"practice {number}")
         for one, way, number in product(works, product(_SPEEDS, _CATCHES), range(cycles))
-        if way[1] <= one.skill.catch
+        if way[1] <= (one.skill.catch if within[1] < math.inf else 0.0)  # else nothing is caught
     ]
     tried = defaultdict[Any, list[float]](list)
     for one, moves in do(trials).items():
@@ -102,30 +107,69 @@ def practised(
     return [replace(one, techniques=tuple(best[one, load] for load in LOADS)) for one in works]
 
 
-def do_all(engine: Engine, source: Source, progress: OnProgress, works: Sequence[Work]) -> Done:
-    """Do all works."""
-    done: Done = {}
+def do_all(
+    engine: Engine,
+    source: Source,
+    progress: OnProgress,
+    works: Sequence[Work],
+    done: Done | None = None,
+) -> Done:
+    """Do all works; ``done`` is filled with each one that is done, in any order."""
+    done = {} if done is None else done
     for work, moves in engine.run(partial(do_work, source), works):
         done[work] = moves
         progress(len(done) / len(works))
     return {work: done[work] for work in works}
 
 
-def moves_of(
-    source: Source, set_ups: Sequence[SetUp], task: Task, do: Doing, seeds: int
-) -> dict[SetUp, list[Move]]:
-    """Practise for one cycle and do a task, with each set-up.
+def at_work(
+    engine: Engine,
+    source: Source,
+    set_ups: Sequence[SetUp],
+    tasks: Mapping[str, Task],
+    progress: OnProgress,
+    *,
+    seeds: int,
+) -> tuple[dict[str, dict[SetUp, list[Move]]], str]:
+    """Practise for one cycle and do each task, with each set-up.
+
+    Args:
+        engine: does the works.
+        source: the deployment.
+        set_ups: with what they work.
+        tasks: by name.
+        progress: told how much of what is done.
+        seeds: working cycles of each task with each set-up.
+
+    Returns:
+        The moves, by task and set-up, and "". Interrupted: those of the working cycles that every
+        set-up has done, and where it was interrupted.
 
     Raises:
         CampaignError: see ``learn``.
     """
-    people = {task.operator: getattr(Operators(), task.operator)}
-    plans = practised(source, set_ups, people, task.within, do, cycles=1)
-    done = do([replace(one, seed=str(seed)) for seed in range(seeds) for one in plans])
-    by_set_up: dict[SetUp, list[Move]] = {one: [] for one in set_ups}
-    for work, moves in done.items():
-        by_set_up[work.set_up] += moves
-    return by_set_up
+    by_task: dict[str, dict[SetUp, list[Move]]] = {}
+    for name, task in tasks.items():
+        interrupted, done = False, Done()
+        people = {task.operator: getattr(Operators(), task.operator)}
+        do = partial(do_all, engine, source, progress)
+        try:
+            progress(0.0, f"{task.words}: practice")
+            plans = practised(source, set_ups, people, task.within, do, cycles=1)
+            progress(0.0, f"{task.words}: work")
+            do([replace(one, seed=str(seed)) for seed in range(seeds) for one in plans], done)
+        except KeyboardInterrupt:
+            interrupted = True
+        cycles = Counter(work.seed for work in done)
+        whole = [seed for seed, count in cycles.items() if count == len(set_ups)]
+        if whole:
+            by_task[name] = {one: [] for one in set_ups}
+        for work, moves in done.items():
+            if work.seed in whole:
+                by_task[name][work.set_up] += moves
+        if interrupted:
+            return by_task, f"{task.words}: {len(whole)} of {seeds} working cycles are done"
+    return by_task, ""
 
 
 def choice(
@@ -135,9 +179,9 @@ def choice(
 
     Red where it is slower than ``OFF``; and that in words.
     """
-    drawn = new_table(title, *(task.head for task in tasks.values()))
+    drawn = new_table(title, *(tasks[name].head for name in moves))
     slower = []
-    for one in next(iter(moves.values())):
+    for one in next(iter(moves.values()), {}):
         cells = []
         for name, done in moves.items():
             means = {load: _seconds(done[one], load) for load in LOADS}
@@ -145,7 +189,7 @@ def choice(
             style = "red" if more_s > 0.0 else "bold" if name == (one.name or "loading") else ""
             cells.append(Text(" / ".join(f"{mean:.1f}" for mean in means.values()), style))
             if more_s > 0.0:
-                at = tasks[name].head.replace("\n", ", ")
+                at = tasks[name].words
                 slower.append(f"{set_up_name(one)}: {more_s:.1f} s a move slower than off at {at}")
         drawn.add_row(set_up_name(one), *cells)
     return drawn, slower

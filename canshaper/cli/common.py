@@ -131,6 +131,13 @@ def fail(error: Exception, code: int | None = None) -> typer.Exit:
     return typer.Exit(next(codes, EXIT_WRONG) if code is None else code)
 
 
+def end_interrupted(at: str) -> None:
+    """End a verb that Ctrl-C has interrupted, saying at what; "" where none has."""
+    if at:
+        echo(f"interrupted at {at}", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED)
+
+
 @contextmanager
 def os_errors(path: Path) -> Iterator[None]:
     """Report an OSError in the block as an error for the person: which file, and why."""

@@ -69,7 +69,7 @@ def choosing(name: str) -> Callable[[Controller], None]:
     return choose
 
 
-def figures(deployment: Deployment) -> Iterator[Figures]:
+def figures(deployment: Deployment, crane: CraneParameters) -> Iterator[Figures]:
     """Yield the measures of every profile on every axis that has it, and of the axis' own filter.
 
     Raises:
@@ -81,7 +81,8 @@ def figures(deployment: Deployment) -> Iterator[Figures]:
     for axis, bound in deployment.axes.items():
         for name in ["", *bound.config.profiles] if bound.config.profiles else []:
             right, *wrong = (
-                _press(deployment, axis, name, pct) for pct in (0, -LENGTH_PCT, LENGTH_PCT)
+                _press(deployment, axis, name, replace(crane, grapple=crane.grapple.longer(pct)))
+                for pct in (0, -LENGTH_PCT, LENGTH_PCT)
             )
             yield Figures(
                 axis,
@@ -96,10 +97,7 @@ def figures(deployment: Deployment) -> Iterator[Figures]:
             )
 
 
-def _press(deployment: Deployment, axis: str, name: str, length_pct: int) -> AxisMetrics:
-    crane = CraneParameters()
-    crane = replace(crane, grapple=crane.grapple.longer(length_pct))
-
+def _press(deployment: Deployment, axis: str, name: str, crane: CraneParameters) -> AxisMetrics:
     script = Script("press", (Stroke(axis, *_PRESS),), _DRIVE_S)
     recording = drive(deployment, script, parameters=crane, prepare=choosing(name))
     return axis_metrics(recording, axis, deployment.config.still_deg)

@@ -1,7 +1,7 @@
 """``canshaper work``: places, practice, moves, bounds, and the command as a person uses it."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
@@ -19,10 +19,10 @@ from canshaper.campaign.work_results import (
     TASKS,
     Task,
     as_data,
+    at_work,
     choice,
     do_all,
     gain,
-    moves_of,
     practised,
     table,
 )
@@ -212,25 +212,72 @@ def test_another_filter_works() -> None:
 TWO = {name: TASKS[name] for name in ("loading", "tip only")}
 
 
+class Doing:
+    """An engine whose moves last as long as the set-up's name says; Ctrl-C comes at some work."""
+
+    def __init__(self, interrupted_at: float = math.inf) -> None:
+        self.seen: list[Work] = []
+        self._last = interrupted_at
+
+    def run(self, _work: Any, jobs: Iterable[Any]) -> Iterator[Any]:
+        for one in jobs:
+            self.seen.append(one)
+            if len(self.seen) > self._last:
+                raise KeyboardInterrupt
+            seconds = {"off": 9.0, "": 7.0}[one.set_up.name]
+            yield one, [Move(load, True, seconds) for load in LOADS]
+
+
+@pytest.fixture
+def learned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What practice teaches is known."""
+    monkeypatch.setattr(work_results, "learn", lambda *_: known(bypass=True))
+
+
+@pytest.mark.usefixtures("learned")
 def test_each_set_up_does_the_task_with_its_own_moves() -> None:
-    set_ups = OFF, SetUp()
-    seen: list[Work] = []
-
-    def do(works: Sequence[Work]) -> dict[Work, list[Move]]:
-        seen.extend(works)
-        seconds = {"off": 9.0, "": 7.0}
-        return {
-            one: [Move(load, True, seconds[one.set_up.name]) for load in LOADS] for one in works
-        }
-
-    moves = moves_of(source(), set_ups, Task("waiting", (0.2, 3.0)), do, 3)
-    assert {one: [move.seconds for move in done] for one, done in moves.items()} == {
+    engine, heads = Doing(), list[str | None]()
+    tasks = {"still": Task("waiting", (0.2, 3.0))}
+    moves, interrupted = at_work(
+        engine, source(), (OFF, SetUp()), tasks, lambda _, what=None: heads.append(what), seeds=3
+    )
+    assert interrupted == ""
+    assert {one: [move.seconds for move in done] for one, done in moves["still"].items()} == {
         OFF: [9.0] * 6,
         SetUp(): [7.0] * 6,
     }
-    assert {one.operator for one in seen} == {"waiting"}
-    assert {one.within for one in seen} == {(0.2, 3.0)}
-    assert {one.seed for one in seen[-6:]} == {"0", "1", "2"}
+    assert {one.operator for one in engine.seen} == {"waiting"}
+    assert {one.within for one in engine.seen} == {(0.2, 3.0)}
+    assert {one.seed for one in engine.seen[-6:]} == {"0", "1", "2"}
+    assert [one for one in heads if one] == ["20 cm, 3 deg: practice", "20 cm, 3 deg: work"]
+
+
+@pytest.mark.usefixtures("learned")
+def test_interrupted_it_keeps_the_cycles_that_every_set_up_has_done() -> None:
+    whole = Doing()
+    at_work(whole, source(), (OFF, SetUp()), TWO, lambda *_: None, seeds=2)
+    first = sum(one.within[1] == 6.0 for one in whole.seen)
+    engine = Doing(first - 1)  # the last of the second cycle is not done
+    moves, interrupted = at_work(engine, source(), (OFF, SetUp()), TWO, lambda *_: None, seeds=2)
+    assert {name: [len(one) for one in done.values()] for name, done in moves.items()} == {
+        "loading": [2, 2]
+    }
+    assert interrupted == "30 cm, 6 deg: 1 of 2 working cycles are done"
+    assert [row.header for row in choice("s", TWO, moves)[0].columns] == ["s", "30 cm\n6 deg"]
+    moves, interrupted = at_work(Doing(2), source(), (OFF, SetUp()), TWO, lambda *_: None, seeds=2)
+    assert (moves, interrupted) == ({}, "30 cm, 6 deg: 0 of 2 working cycles are done")
+    assert not choice("s", TWO, moves)[0].rows
+
+
+@pytest.mark.usefixtures("learned")
+def test_where_only_the_tip_counts_no_one_practises_to_catch() -> None:
+    engine = Doing()
+    at_work(engine, source(), (OFF,), TWO, lambda *_: None, seeds=1)
+    tried = {
+        within: {one.techniques[0][1] for one in engine.seen if one.within[1] == within}
+        for within in (6.0, math.inf)
+    }
+    assert tried == {6.0: {0.0, 0.5, 1.0}, math.inf: {0.0}}
 
 
 def test_what_is_slower_than_off_is_red_and_said() -> None:

@@ -50,12 +50,12 @@ def to_and_fro(time_s: float) -> float:
     ("load", "says_kg", "timings", "operators"),
     [
         ("empty", None, (0.2, 0.5), (0.4, 0.9)),
-        ("log", None, (0.2, 0.6), (0.9, 2.2)),
-        ("log", late, (1.2, 2.3), (1.2, 2.8)),
-        ("empty", silent, (0.6, 1.1), (2.4, 5.2)),
-        ("log", silent, (1.1, 1.7), (4.8, 8.2)),
-        ("log", lost, (0.7, 2.0), (4.8, 9.3)),
-        ("log", to_and_fro, (1.1, 1.7), (4.8, 8.2)),
+        ("log", None, (0.2, 0.6), (0.6, 1.5)),
+        ("log", late, (1.2, 2.3), (1.0, 2.3)),
+        ("empty", silent, (0.6, 1.1), (1.2, 3.0)),
+        ("log", silent, (1.1, 1.7), (2.9, 5.0)),
+        ("log", lost, (0.7, 2.0), (2.9, 6.2)),
+        ("log", to_and_fro, (1.1, 1.7), (2.9, 5.0)),
     ],
     ids=["empty", "log", "late", "empty unknown", "log unknown", "lost", "to and fro"],
 )

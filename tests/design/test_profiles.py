@@ -68,6 +68,15 @@ def test_the_recommended_file_has_a_calmer_and_a_quicker_one_and_all_last_half_a
         assert precise["residual_deg"] < 0.4
 
 
+@pytest.mark.slow
+def test_the_crane_is_the_one_of_set(figures: dict[tuple[str, str], dict[str, float]]) -> None:
+    status, output = run("j1939-profiles.yaml", "--json", "--no-work", "--set", "grapple.l2_m=1.4")
+    assert status == 0, output
+    for one in json.loads(output)["presses"]:
+        if one["profile"] == "normal":
+            assert one["residual_deg"] > 2.0 * figures[one["axis"], "normal"]["residual_deg"]
+
+
 def short(folder: Path) -> Path:
     """Profiles on near-far alone, one of them shorter than half a swing."""
     text = (ROOT / "config" / "j1939-profiles.yaml").read_text(encoding="utf-8")
@@ -109,6 +118,12 @@ def test_operators_work_with_each_profile(tmp_path: Path, monkeypatch: pytest.Mo
         fault for fault in data["faults"] if fault.endswith("slower than off at 30 cm, tip only")
     ]
     assert [fault.partition(":")[0] for fault in slower] == ["normal", "quick"]
+
+
+def test_a_wrong_parameter_is_named_first() -> None:
+    status, output = run("forwarder.yaml", "--set", "pump=1")
+    assert status == 2
+    assert output.startswith("--set pump=1: expected a parameter, got 'pump'")
 
 
 def test_without_profiles_it_says_so() -> None:

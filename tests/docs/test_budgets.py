@@ -53,7 +53,7 @@ BUDGET = {
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
     "docs/tuning.md": 780,
-    "docs/work.md": 435,
+    "docs/work.md": 501,
     "studies/README.md": 760,
 }
 
@@ -64,11 +64,11 @@ LINES = {
         4_673,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (61_132, "a new ability takes the room of an old one"),
-    "tests": (95_596, "one level for each behaviour"),
+    "canshaper": (62_253, "a new ability takes the room of an old one"),
+    "tests": (96_583, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (331, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (337, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

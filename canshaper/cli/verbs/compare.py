@@ -2,13 +2,12 @@
 
 import json
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import PICTURE, REPORT, echo, engine, loader
+from canshaper.cli.common import PICTURE, REPORT, echo, end_interrupted, engine, loader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
 
 GROUP = "design"
-
-_CYCLES = 6  # of work with each filter
 
 # Columns of the first table: head and kind of work.
 _WORKS = {
@@ -46,8 +43,9 @@ def compare(
     out: Path = typer.Option(Path("out/compare"), "--out", help="Directory for picture and data."),
     as_json: bool = typer.Option(False, "--json", help="Print the rows as JSON, no table."),
     work: bool = typer.Option(
-        False, "--work", help="Seconds a move of a model operator too: half an hour."
+        False, "--work", help="Seconds a move of a model operator too: minutes."
     ),
+    seeds: int = typer.Option(6, "--seeds", min=1, help="Working cycles with each filter."),
     processes: int | None = typer.Option(
         None, "--processes", min=1, help="Processes; by default one a processor."
     ),
@@ -64,7 +62,8 @@ def compare(
     filter, which of ours stops as soon and leaves less, and what no shaper can beat. A file whose
     sway sensors damp has rows with them. Writes compare.png and compare.json. Takes one to two
     minutes. With --work the operator of canshaper work who catches the swing works with each, at
-    30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log.
+    30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
+    shows what is done until then.
 
     Examples:
 
@@ -104,8 +103,9 @@ def compare(
         "limits": [asdict(limit) for limit in limits],
     }
     tables = [_residuals(table), _felt(table), _worst(table), _limits(limits)]
+    interrupted = ""
     if work:
-        shown, data["work"] = _work(deployment, filters, processes)
+        shown, data["work"], interrupted = _work(deployment, filters, seeds, processes)
         tables.insert(0, shown)
     text = json.dumps({**data, "outcomes": [asdict(o) for o in outcomes]}, indent=2)
     (out / "compare.json").write_text(text + "\n", encoding="utf-8")
@@ -115,6 +115,7 @@ def compare(
         results.print(shown)
     for _, why in advice.values():
         results.print(f"- {why}.")
+    end_interrupted(interrupted)
 
     def figure() -> "Figure":
         from canshaper.report.pareto import Point
@@ -131,21 +132,21 @@ def compare(
 
 
 def _work(
-    deployment: "Deployment", filters: "list[Candidate]", processes: int | None
-) -> "tuple[Table, dict[str, Any]]":
-    """Seconds a move of an operator with each filter."""
+    deployment: "Deployment", filters: "list[Candidate]", seeds: int, processes: int | None
+) -> "tuple[Table, dict[str, Any], str]":
+    """Seconds a move of an operator with each filter: table, data, where it was interrupted."""
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp
-    from canshaper.campaign.work_results import OFF, TASKS, as_data, choice, do_all, moves_of
+    from canshaper.campaign.work_results import OFF, TASKS, as_data, at_work, choice
     from canshaper.report.console import progress_bar
 
     source = Source.of(deployment, deployment.config.uncertainty)
     set_ups = [OFF, *(SetUp(one.name, candidate=one) for one in filters if one.name != OFF.name)]
     tasks = {name: TASKS[name] for name in ("loading", "tip only")}
     with progress_bar("operators at work") as on_progress:
-        do = partial(do_all, engine(processes, None), source, on_progress)
-        moves = {name: moves_of(source, set_ups, one, do, _CYCLES) for name, one in tasks.items()}
-    return choice("seconds a move", tasks, moves)[0], as_data(moves)
+        workers = engine(processes, None)
+        moves, interrupted = at_work(workers, source, set_ups, tasks, on_progress, seeds=seeds)
+    return choice("seconds a move", tasks, moves)[0], as_data(moves), interrupted
 
 
 def _residuals(table: "list[Row]") -> "Table":

@@ -3,12 +3,11 @@
 import json
 from collections.abc import Iterator
 from dataclasses import asdict
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import PROCESSES, echo, engine, loader
+from canshaper.cli.common import PROCESSES, SET, echo, end_interrupted, engine, loader
 from canshaper.errors import DesignError, UsageError
 
 if TYPE_CHECKING:
@@ -28,6 +27,7 @@ def profiles(
     work: bool = typer.Option(True, "--work/--no-work", help="Seconds a move too: minutes."),
     seeds: int = typer.Option(6, "--seeds", min=2, help="Working cycles with each profile."),
     processes: int | None = PROCESSES,
+    changes: list[str] | None = SET,
     as_json: bool = typer.Option(False, "--json", help="Print the figures as JSON, no table."),
 ) -> None:
     """Measure what each profile of a deployment does, and which is the right one for a tolerance.
@@ -48,23 +48,28 @@ def profiles(
 
       canshaper profiles machine.yaml --no-work
 
+      canshaper profiles --set grapple.l2_m=1.4  # 0.2 m longer than the file says
+
       canshaper profiles machine.yaml --json
     """
     from canshaper.design.profiles import figures
     from canshaper.report.console import SafeConsole, new_table
+    from canshaper_sim.parameters import changed_parameters
 
+    crane = changed_parameters(changes or [])  # wrong ones are named before anything is driven
     deployment = loader(file)()
     try:
-        results = list(figures(deployment))
+        results = list(figures(deployment, crane))
     except DesignError as error:
         raise UsageError(f"{deployment.path}: {error}") from None
-    faults, data = [*_too_short(deployment)], dict[str, Any]()
+    faults, data, interrupted = [*_too_short(deployment)], dict[str, Any](), ""
     if work:
-        data, at_work, slower = _work(deployment, seeds, processes)
+        data, at_work, slower, interrupted = _work(deployment, changes or [], seeds, processes)
         faults += slower
     if as_json:
         presses = [asdict(one) for one in results]
         echo(json.dumps({"presses": presses, "work": data, "faults": faults}, indent=2))
+        end_interrupted(interrupted)
         return
     heads = ("still, s", "run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
     table = new_table("axis, profile", *heads)
@@ -80,10 +85,11 @@ def profiles(
         )
     console = SafeConsole()
     console.print(table)
-    if work:
+    if data:
         console.print(at_work)
     for fault in faults:
         console.print(fault, style="red")
+    end_interrupted(interrupted)
 
 
 def _too_short(deployment: "Deployment") -> Iterator[str]:
@@ -108,19 +114,18 @@ def _too_short(deployment: "Deployment") -> Iterator[str]:
 
 
 def _work(
-    deployment: "Deployment", seeds: int, processes: int | None
-) -> "tuple[dict[str, Any], Table, list[str]]":
-    """Seconds a move, by task and profile: data, table, and where a profile is slower than off."""
+    deployment: "Deployment", changes: list[str], seeds: int, processes: int | None
+) -> "tuple[dict[str, Any], Table, list[str], str]":
+    """Seconds a move by task and profile: data, table, what is slower than off, interrupted at."""
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp
-    from canshaper.campaign.work_results import OFF, TASKS, as_data, choice, do_all, moves_of
+    from canshaper.campaign.work_results import OFF, TASKS, as_data, at_work, choice
     from canshaper.inputs.value import profile_names
     from canshaper.report.console import progress_bar
 
-    source = Source.of(deployment, deployment.config.uncertainty)
+    source = Source.of(deployment, deployment.config.uncertainty, changes)
     set_ups = [OFF, *map(SetUp, profile_names(deployment.config))]
     with progress_bar("operators at work") as on_progress:
-        do = partial(do_all, engine(processes, None), source, on_progress)
-        moves = {name: moves_of(source, set_ups, task, do, seeds) for name, task in TASKS.items()}
-    table, slower = choice("seconds a move", TASKS, moves)
-    return as_data(moves), table, slower
+        workers = engine(processes, None)
+        moves, interrupted = at_work(workers, source, set_ups, TASKS, on_progress, seeds=seeds)
+    return as_data(moves), *choice("seconds a move", TASKS, moves), interrupted
