@@ -20,6 +20,7 @@
      +-- DesignError            a design or simulation that cannot be, or finds nothing that fits
      |    +-- InfeasibleError       no poles keep all requirements
      |    +-- DriveError            a simulated drive could not be made
+     +-- NativeError            the C cannot be compiled here, or computes otherwise
      +-- CampaignError          a campaign cannot begin or go on; what is done is kept
      |    +-- WorkerError           a process that drives is not the program that asks it to
      +-- MeasurementError       a measurement failed, or says nothing
@@ -154,6 +155,10 @@ class InfeasibleError(DesignError):
 
 class DriveError(DesignError):
     """A simulated drive could not be made."""
+
+
+class NativeError(CanshaperError):
+    """The controller in C cannot be compiled here, or its arithmetic is another one."""
 
 
 class CampaignError(CanshaperError):

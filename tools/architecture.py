@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 FILE = ROOT / "docs" / "architecture.svg"
 # Stops of a joystick frame: bus, I/O cycle, routing, what is known of the message, axis, valve.
 PATH = ("bus", "daemon", "controller", "inputs", "shaping", "codec")
-DESK = ("cli", "studio", "campaign", "commissioning", "recording", "design", "report")
+DESK = ("cli", "studio", "campaign", "native", "commissioning", "recording", "design", "report")
 WIDTH, ROW, LEFT = 960, 46, 24
 # Rings by what an error can do: who reviews a change, and rooms below canshaper/. A room within
 # another one belongs to the ring that names it.
@@ -39,7 +39,10 @@ RINGS = {
     ),
     "desk": (
         "its tests",
-        ("api", "report", "design", "recording", "commissioning", "campaign", "studio", "cli"),
+        (
+            *("api", "report", "design", "recording", "commissioning", "native", "campaign"),
+            *("studio", "cli"),
+        ),
     ),
 }
 STYLE = """

@@ -106,8 +106,7 @@ class Guarded:
 
     def _compare(self, message: Received, frame: Frame, now_ns: int) -> None:
         """Compare what two decoders read in a joystick's frame; its axes stop if they disagree."""
-        name = message.of.name
-        joystick, axes = self._controller.joysticks[name], self._gate.moved[name]
+        joystick, axes = self._controller.joysticks[message.of.name], message.axes
         wrong = axes if message.good_ns != joystick.received_ns else []
         if not wrong and message.good_ns == now_ns:
             for axis in axes:

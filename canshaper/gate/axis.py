@@ -1,10 +1,11 @@
 """The gate's memory of one axis: demands that were asked of it, frames that left for its valve."""
 
 from collections import deque
+from collections.abc import Sequence
 
-from canshaper.gate.fields import EPSILON, Word
-from canshaper.gate.received import NEVER, JoystickState, Pending
-from canshaper.gate.record import Axis
+from canshaper.gate.fields import EPSILON
+from canshaper.gate.received import NEVER, AxisInput, JoystickState
+from canshaper.gate.record import Axis, Valve
 
 FOREIGN_NS = 1_000_000_000
 """So long a second sender has to be silent."""
@@ -17,28 +18,25 @@ ROUNDING = 1.0 + UP
 
 
 class Asked:
-    """Demand in one direction within the tail.
-
-    Attributes:
-        most: the largest of it.
-        before: the largest of it, and of what was asked before the last stop.
-        remaining: distance that was asked and has not been run, full speed times seconds; not
-            below 0 where a stroke begins, since a sound filter may make more of a tap than it is.
-    """
+    """Demand in one direction within the tail."""
 
     __slots__ = ("_last", "_since", "_sizes", "before", "most", "remaining")
 
     def __init__(self) -> None:
         # Each with the period when it was asked last, the largest first, each later one smaller.
         self._sizes: deque[tuple[int, float]] = deque()
-        self.most = self.before = self.remaining = 0.0
+        self.most = self.before = 0.0  # the largest since the last stop, and before it too
+        # Distance that was asked and has not been run, full speed times seconds; not below 0 where
+        # a stroke begins, since a sound filter may make more of a tap than it is.
+        self.remaining = 0.0
         self._last = self._since = -1  # periods, of the last note and of the last stop
 
     def note(self, size: float, distance: float, period: int, of: Axis) -> None:
         """So much is asked in this period: a velocity, and a distance since the last one."""
-        sizes, oldest, self._last = self._sizes, period - of.tail, period
+        sizes, self._last = self._sizes, period
         if not (size or sizes or self.remaining):
             return
+        oldest = period - of.tail
         while sizes and sizes[0][0] < oldest:
             sizes.popleft()
         if size:
@@ -60,65 +58,48 @@ class Asked:
         self.most = self.remaining = 0.0
 
 
-class AxisState(Pending):
+class AxisState(AxisInput):
     """One axis. It may move while it is armed, and for ``stop_left`` periods of a shaped stop.
 
     ``made`` counts ticks that were made, ``number`` deadlines, also those that were missed;
     ``passed`` and ``ticks`` count periods of the valve.
-
-    Attributes:
-        demand: of the last joystick frame that counts, and ``changed_ns`` since when.
-        ramp: of a measurement, the demand in the place of the joystick's, which stays neutral.
-        foreign_ns: when a second sender was received last.
-        armed: the joystick was seen in neutral, valid and enabled, since the last reason to stop.
-        latched: neutral does not arm before reset or enable is pressed again.
-        cause: ticks that were made before the last reason that latched.
-        why: why it is not armed.
-        now: demand in this period, where it is armed; ``held`` for how many periods before it was
-            on the same side.
-        forth, back: what was asked in each direction.
-        least, most: what may leave in this tick.
-        asked_now, asked: something is asked of it or its partner: in this period; in this or the
-            last one.
-        due: it has its turn in this tick, and has sent nothing yet.
-        ticks: periods since its last frame; ``sent_at`` number of the deadline of that.
-        flips: how often anti-sway was switched in its joystick, as this axis knows it.
-        last: velocity of that frame; ``top`` what it may have been before it was rounded, or may
-            be by now where no frame was passed on.
-        way_back: velocity of a fall, at its rate, from what was asked last: it is no run-on, and
-            what is no faster counts no distance.
-        zero_at: ticks that were made before it came to rest, or lost the right to move.
-        ran: how far it has run beyond the demand and what a partner may add, since it did not.
-        way, alone: distance and periods in motion since something was asked of it, or nothing
-            of its partner; a pause gives none of it back.
     """
 
-    def __init__(self, axis: Axis, joystick: JoystickState) -> None:
-        super().__init__()
-        self.of, self.joystick = axis, joystick
-        self.partner: AxisState | None = None
-        self.demand: float | None = None
-        self.ramp: float | None = None
-        self.changed_ns = 0
-        self.foreign_ns = NEVER
-        self.armed = self.latched = False
-        self.stop_left = 0
-        self.cause = NEVER
-        self.why = "start"
-        self.now, self.held, self.ran = 0.0, 0, 0.0
-        self.forth, self.back = Asked(), Asked()
-        self.least = self.most = 0.0
-        self.asked_now = self.asked = self.due = False
-        self.ticks = self.flips = self.sent_at = 0
-        self.last, self.top, self.way_back = 0.0, axis.step, axis.step
-        self.zero_at = NEVER
-        self.way, self.alone = 0.0, 0
+    __slots__ = (
+        "alone", "armed", "asked", "asked_now", "back", "cause", "due", "flips", "forth", "held",
+        "joystick", "last", "latched", "least", "most", "now", "partner", "ramp", "ran", "sent_at",
+        "stop_left", "ticks", "top", "way", "way_back", "why", "zero_at",
+    )  # fmt: skip
 
-    def take(self, word: Word, now_ns: int) -> None:
-        """A frame of its joystick that counts."""
-        demand = self.of.stick.demand(word)
-        if demand != self.demand:
-            self.demand, self.changed_ns = demand, now_ns
+    def __init__(self, axis: Axis, joystick: JoystickState) -> None:
+        super().__init__(axis)
+        self.joystick = joystick
+        self.partner: AxisState | None = None
+        # Of a measurement, the demand in the place of the joystick's, which stays neutral.
+        self.ramp: float | None = None
+        self.armed = False  # neutral was seen, valid and enabled, since the last reason to stop
+        self.latched = False  # neutral does not arm before reset or enable is pressed again
+        self.cause = NEVER  # ticks that were made before the last reason that latched
+        self.why, self.stop_left = "start", 0  # why it is not armed
+        self.now = 0.0  # demand in this period, where it is armed
+        self.held = 0  # for how many periods before it was on the same side
+        self.forth, self.back = Asked(), Asked()  # in each direction
+        self.least = self.most = 0.0  # what may leave in this tick
+        # Something is asked of it or its partner: in this period; in this or the last one.
+        self.asked_now = self.asked = False
+        self.due = False  # it has its turn in this tick, and has sent nothing yet
+        self.ticks = 0  # since its last frame; ``sent_at`` number of the deadline of that
+        self.sent_at = 0
+        self.flips = 0  # how often anti-sway was switched in its joystick, as it knows
+        # Velocity of that frame; what it may have been before it was rounded, or may be by now
+        # where no frame was passed on; and that of a fall, at its rate, from what was asked last:
+        # that is no run-on, and what is no faster counts no distance.
+        self.last, self.top, self.way_back = 0.0, axis.step, axis.step
+        self.zero_at = NEVER  # ticks made before it came to rest, or lost the right to move
+        self.ran = 0.0  # beyond the demand and what a partner may add, since it did not
+        # Distance and periods in motion since something was asked of it, or nothing of its
+        # partner; a pause gives none of it back.
+        self.way, self.alone = 0.0, 0
 
     def halt(self, why: str, made: int, *, latch: bool) -> None:
         """Stop at once."""
@@ -131,23 +112,14 @@ class AxisState(Pending):
         self.back.forget()
 
     def look(
-        self,
-        why: str,
-        demand: float | None,
-        made: int,
-        number: int,
-        passed: int,
-        *,
-        latches: bool,
+        self, why: str, demand: float | None, made: int, number: int, passed: int, *, latches: bool
     ) -> None:
         """Whether it may move in this period, and what is asked of it.
 
         Args:
             why: the reason to stop at once; ``latches`` whether it latches at rest too.
             demand: of the joystick; None is a reason to stop shaped.
-            made: ticks that were made.
-            number: of this deadline.
-            passed: periods since the last one; more than 1 where deadlines were missed.
+            made, number, passed: see above; ``passed`` since the last turn.
         """
         of, before = self.of, self.now
         self.now = 0.0
@@ -167,7 +139,7 @@ class AxisState(Pending):
             self.stop_left = 0
             # The cause is noted in the axis' turn, which may be a period after it was received: a
             # press since the turn before may be the later one of the two, and counts.
-            if not self.latched or self.joystick.press >= self.cause - of.period:
+            if not self.latched or self.joystick.pressed.press >= self.cause - of.period:
                 self.latched, self.armed = False, True
         self.hard, self.latches, self.lost = "", False, False
         self._ask(before, number // of.period, passed)
@@ -203,42 +175,44 @@ class AxisState(Pending):
             return 1.0
         return 0.0 if partner.last else self.of.added
 
-    def skip(self) -> None:
-        """No frame was passed on in the period before: what was allowed in it may fall from now."""
-        reach = self.most if self.last > 0.0 else -self.least
-        self.top = max(self.top - self.of.fall, min(self.top, reach))
+    def share(self) -> None:
+        """Find what is asked of it or its partner, which both know by now."""
+        own, partner = self.forth.most or self.back.most, self.partner
+        asked = bool(own or (partner and (partner.forth.most or partner.back.most)))
+        self.asked_now, self.asked = asked, asked or self.asked_now
+        if own or not self.asked:
+            self.way, self.alone = 0.0, 0
+        if self.of.forwarded and self.ticks > 1:
+            # No frame was passed on in the period before: what was allowed in it may fall from now.
+            reach = self.most if self.last > 0.0 else -self.least
+            self.top = max(self.top - self.of.fall, min(self.top, reach))
+
+    def fallen(self, velocity: float, periods: int) -> float:
+        """What it is on its way back to by then, in the direction of a velocity."""
+        return self.top - self.of.fall * periods if velocity * self.last >= 0.0 else 0.0
 
     def held_at(self, velocity: float) -> float:
         """Demand in the direction of a velocity."""
         return max(self.now if velocity > 0.0 else -self.now, 0.0)
 
-    def beyond(self, velocity: float) -> float:
-        """How much faster it is than the demand, and what a partner may add: that is run-on."""
-        return abs(velocity) - self.held_at(velocity) - self.of.added
-
     def left(self, velocity: float, made: int, number: int) -> None:
-        """A frame has left."""
-        of, size = self.of, abs(velocity)
+        """Remember a frame that has left."""
+        of, last = self.of, self.last
         passed, self.ticks, self.sent_at = self.ticks, 0, number
-        falling = min(passed, 1) if of.forwarded else passed
-        asked = self.forth if velocity > 0.0 else self.back
-        reach = self.most if velocity > 0.0 else -self.least
-        fallen = self.top - of.fall * falling if velocity * self.last >= 0.0 else 0.0
         if not velocity:
-            if self.last:
-                self.zero_at = made
-            fall = of.fall * max(passed, 1) + ROUNDING * of.step
-            if abs(self.last) > fall + self.dropped(made):
-                # Nothing falls so fast but a stop: from here on it is neutral first.
-                self.halt("fell to neutral at once", made, latch=False)
+            self._rests(passed, made)
+            return
+        size, held = abs(velocity), self.held_at(velocity)
+        asked, reach = (self.forth, self.most) if velocity > 0.0 else (self.back, -self.least)
+        fallen = self.fallen(velocity, min(passed, 1) if of.forwarded else passed)
         self.way += velocity * of.period_s
-        self.alone += velocity != 0.0
-        if (beyond := self.beyond(velocity)) > EPSILON:
+        self.alone += 1
+        if (beyond := size - held - of.added) > EPSILON:
             self.ran += beyond * of.period_s * passed
         elif self.now:
             self.ran = 0.0
-        on = self.way_back - of.fall * passed if velocity * self.last > 0.0 else 0.0
-        self.way_back = max(on, self.held_at(velocity) + of.step)
+        on = self.way_back - of.fall * passed if velocity * last > 0.0 else 0.0
+        self.way_back = max(on, held + of.step)
         if size > min(fallen, self.way_back) + EPSILON:
             asked.remaining -= size * of.period_s * passed
         self.top = size + of.step
@@ -246,9 +220,35 @@ class AxisState(Pending):
             self.top = min(self.top, max(reach, fallen))
         self.last = velocity
 
+    def _rests(self, passed: int, made: int) -> None:
+        """Neutral has left."""
+        of = self.of
+        if self.last:
+            self.zero_at = made
+            fall = of.fall * max(passed, 1) + ROUNDING * of.step
+            if abs(self.last) > fall + self.dropped(made):
+                # Nothing falls so fast but a stop: from here on it is neutral first.
+                self.halt("fell to neutral at once", made, latch=False)
+        if self.now:
+            self.ran = 0.0
+        self.last, self.top, self.way_back = 0.0, of.step, of.step
+
     def carry_over(self, before: "AxisState") -> None:
         """Keep over a reload what is latched, and a reason to stop that no tick has seen yet."""
         self.latched = self.latched or before.latched
         self.cause = max(self.cause, before.cause)
         self.hard, self.latches = self.hard or before.hard, self.latches or before.latches
         self.foreign_ns = max(self.foreign_ns, before.foreign_ns)
+
+
+class ValveState:
+    """One valve message with its axes, which have one period, and so their turn together.
+
+    Attributes:
+        count: alive counter of the last frame that left; ``before`` of the one before that.
+    """
+
+    def __init__(self, valve: Valve, axes: Sequence[AxisState]) -> None:
+        self.of, self.axes, self.joystick = valve, axes, axes[0].joystick
+        self.count: int | None = None
+        self.before: int | None = None

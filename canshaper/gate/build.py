@@ -110,14 +110,13 @@ def protection_of(section: Any, message: Any, can_id: int) -> Protection:
     """Protection of a message, by its section of the file."""
     if one := section.e2e:
         counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
-        check = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
-        return Protection(check, counts=counts)
+        e2e = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
+        return Protection(e2e, counts=counts)
     counter = field_of(message, section.alive_counter) if section.alive_counter else None
     counts = counter.mask + 1 if counter else 0
-    if section.checksum is None:
-        return Protection(None, True, counter, counts)
-    checksum = _checksum(section.checksum, message, can_id)
-    return Protection(checksum, checksum is not None, counter, counts)
+    of = section.checksum
+    check = _checksum(of, message, can_id) if of else None
+    return Protection(check, of is None or check is not None, counter, counts)
 
 
 def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
@@ -151,8 +150,7 @@ def _joystick(name: str, deployment: Any, switches: dict[str, Switch]) -> Joysti
     config, message = bound.config, bound.message
     reset = field_of(message, config.reset) if config.reset else None
     bypass = field_of(message, config.anti_sway_off) if config.anti_sway_off else None
-    own, stuck_ns = pressed.message == name, round(config.stuck_s * 1e9)
-    return Joystick(name, pressed, own, tuple(others), reset, bypass, stuck_ns)
+    return Joystick(name, pressed, tuple(others), reset, bypass, round(config.stuck_s * 1e9))
 
 
 def _axis(bound: Any, deployment: Any) -> Axis:
@@ -164,24 +162,28 @@ def _axis(bound: Any, deployment: Any) -> Axis:
     command = command_of(bound.valve_message, valve, rewritten, in_dbc)
     control, start = deployment.config.control, f"axes.{bound.name}."
     curve, tip = (limits.curve_command_pct, limits.curve_speed_pct), config.slewing
-    reversal = 0 if limits.reversal == "stop" else round(limits.reversal_s / period_s)
     ranges = (control.adjustable if control else {}).items()
     return Axis(
-        *(bound.name, config.command.joystick, config.command.signal),
-        stick_of(joystick.message, config.command, find(joystick.config.message)[1]),
-        *(
-            _valve_key(bound, deployment),
-            command,
-            openings_of(limits.deadband_pct, curve, command.size.full),
-        ),
-        *(bound.period_ticks, period_s, limits.max_pct / 100.0),
-        *(limits.rise_per_s * period_s, limits.fall_per_s * period_s),
-        *(round(limits.tail_s / period_s), max(1, round(limits.stop_s / period_s))),
-        valve.timeout_ms // deployment.config.tick_ms,
-        *(limits.allow_faster, limits.allow_reverse),
-        reversal,
-        slack_of(config),
-        forwarded,
+        name=bound.name,
+        joystick=config.command.joystick,
+        signal=config.command.signal,
+        stick=stick_of(joystick.message, config.command, find(joystick.config.message)[1]),
+        valve=_valve_key(bound, deployment),
+        command=command,
+        openings=openings_of(limits.deadband_pct, curve, command.size.full),
+        period=bound.period_ticks,
+        period_s=period_s,
+        maximum=limits.max_pct / 100.0,
+        rise=limits.rise_per_s * period_s,
+        fall=limits.fall_per_s * period_s,
+        tail=round(limits.tail_s / period_s),
+        stop=max(1, round(limits.stop_s / period_s)),
+        silent=valve.timeout_ms // deployment.config.tick_ms,
+        faster=limits.allow_faster,
+        reverse=limits.allow_reverse,
+        reversal=0 if limits.reversal == "stop" else round(limits.reversal_s / period_s),
+        slack=slack_of(config),
+        forwarded=forwarded,
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
         stop_m=limits.stop_distance_m or math.inf,
         tip_m_s=tip.full_speed_rad_s * tip.largest_radius_m if tip else 0.0,

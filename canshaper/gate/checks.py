@@ -3,35 +3,18 @@
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import xor
-from typing import Literal, Protocol
-
-Order = Literal["little", "big"]
-
-
-class Check(Protocol):
-    """Checksum or profile that protects the content of a frame."""
-
-    def right(self, data: bytes) -> bool:
-        """Whether a frame of the right length carries what it should."""
+from typing import Literal
 
 
 @dataclass(slots=True)
 class Crc:
-    """A CRC by its numbers, as catalogues give them; a byte at a time, by a table.
+    """A CRC by its numbers, as catalogues give them; a byte at a time, by a table."""
 
-    Attributes:
-        bits: width of the register, 8 to 64.
-        polynomial: without its highest bit.
-        start: register before the first byte.
-        end: what is added (exclusive or) to the register after the last byte.
-        reflected: the lowest bit of each byte comes first.
-    """
-
-    bits: int
-    polynomial: int
-    start: int
-    end: int
-    reflected: bool = False
+    bits: int  # width of the register, 8 to 64
+    polynomial: int  # without its highest bit
+    start: int  # register before the first byte
+    end: int  # what is added (exclusive or) to the register after the last byte
+    reflected: bool = False  # the lowest bit of each byte comes first
     table: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -69,20 +52,14 @@ def _turned(value: int, bits: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Checksum:
-    """A checksum over all other bits of a frame.
+    """A checksum over all other bits of a frame."""
 
-    Attributes:
-        how: a CRC, or ``xor``, ``sum`` (of the bytes), ``halves`` (sum of the half bytes).
-        byte, shift, bits, order: where it lies.
-        plus: what is added to a sum: the bytes of the identifier, or the length.
-    """
-
-    how: Crc | Literal["xor", "sum", "halves"]
-    byte: int
+    how: Crc | Literal["xor", "sum", "halves"]  # of the bytes, and of the half bytes
+    byte: int  # where it lies
     shift: int = 0
     bits: int = 8
-    order: Order = "little"
-    plus: int = 0
+    order: Literal["little", "big"] = "little"
+    plus: int = 0  # what is added to a sum: the bytes of the identifier, or the length
 
     def right(self, data: bytes) -> bool:
         """Whether a frame carries the checksum of the rest of it."""
@@ -122,21 +99,13 @@ def crc_of(name: str) -> Crc:
 
 @dataclass(slots=True)
 class E2e:
-    """CRC and counter in the first bytes of a frame (AUTOSAR PRS_E2EProtocol).
+    """CRC and counter in the first bytes of a frame (AUTOSAR PRS_E2EProtocol)."""
 
-    Attributes:
-        profile: p01, p02, p04, p05, p06, p07, p11 or p22.
-        counts: values of the counter.
-        data_id: of the message.
-        mode: bytes of the data ID that enter the CRC, profiles 1 and 11.
-        ids: data IDs by the counter, profiles 2 and 22.
-    """
-
-    profile: str
-    counts: int
-    data_id: int = 0
-    mode: str = ""
-    ids: bytes = b""
+    profile: str  # p01, p02, p04, p05, p06, p07, p11 or p22
+    counts: int  # values of the counter
+    data_id: int = 0  # of the message
+    mode: str = ""  # bytes of the data ID that enter the CRC, profiles 1 and 11
+    ids: bytes = b""  # data IDs by the counter, profiles 2 and 22
     crc: Crc = field(init=False)
 
     def __post_init__(self) -> None:
@@ -153,8 +122,17 @@ class E2e:
         profile, count, of = self.profile, self.count(data), self.crc.of
         if count >= self.counts:
             return False
-        if profile in ("p01", "p11"):
-            return self._first(data, count)
+        if profile in ("p01", "p11"):  # the data ID by its mode comes before the bytes from 1
+            low, high = self.data_id & 0xFF, self.data_id >> 8
+            if self.mode == "nibble" and data[1] >> 4 != high & 0x0F:
+                return False
+            first = {
+                "both": (low, high),
+                "low": (low,),
+                "nibble": (low, 0),
+                "alternating": (high if count & 1 else low,),
+            }[self.mode]
+            return data[0] == of(bytes(first) + data[1:])
         if profile in ("p02", "p22"):
             return data[0] == of(data[1:] + self.ids[count : count + 1])
         # The others lay length, counter and data ID over the frame, high bytes first but in 5.
@@ -171,19 +149,6 @@ class E2e:
             head = of(data[8:]).to_bytes(8, "big") + len(data).to_bytes(4, "big")
             head += data[12:16] + self.data_id.to_bytes(4, "big")
         return data.startswith(head)
-
-    def _first(self, data: bytes, count: int) -> bool:
-        """Profiles 1 and 11: the data ID by its mode comes before the bytes from 1."""
-        low, high = self.data_id & 0xFF, self.data_id >> 8
-        if self.mode == "nibble" and data[1] >> 4 != high & 0x0F:
-            return False
-        first = {
-            "both": (low, high),
-            "low": (low,),
-            "nibble": (low, 0),
-            "alternating": (high if count & 1 else low,),
-        }[self.mode]
-        return data[0] == self.crc.of(bytes(first) + data[1:])
 
 
 COUNTERS = {

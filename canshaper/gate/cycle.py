@@ -32,20 +32,15 @@ def longest_gap_ns(deployment: Any) -> int:
 
 
 class Standstill:
-    """Whether a loop has stood still for too long since its last tick; that of ``before`` counts.
-
-    Attributes:
-        clock: the time when a frame is about to leave, ns; a test may replace it.
-        limit_ns: longest time between two ticks.
-        last_ns: time of the last tick that was made: all its frames were sent in time.
-        until_ns: what is computed in this tick may leave until then.
-    """
+    """Whether a loop stood still for too long since its last tick; that of ``before`` counts."""
 
     def __init__(self, deployment: Any, before: "Standstill | None" = None) -> None:
+        # The time when a frame is about to leave; a test may replace it.
         self.clock: Callable[[], int] = boottime_ns
         self.limit_ns = longest_gap_ns(deployment)
+        # Of the last tick that was made: all its frames were sent in time.
         self.last_ns: int = before.last_ns if before else NEVER_NS
-        self.until_ns = 0
+        self.until_ns = 0  # what is computed in this tick may leave until then
         self._leave_ns = max(deployment.config.tick_ms * 1_000_000, LEAST_LEAVE_NS)
 
     def late(self) -> bool:

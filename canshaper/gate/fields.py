@@ -28,20 +28,13 @@ def word_of(data: bytes) -> Word:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """Bits of a frame that are one number.
+    """Bits of a frame that are one number."""
 
-    Attributes:
-        shift, mask: where they lie in the word.
-        sign: the sign bit; 0 where there is none.
-        order: 0 for little endian, 1 for big endian: which number of the word.
-        real: ``struct`` format of a float; empty where it is none.
-    """
-
-    shift: int
+    shift: int  # where they lie in the word
     mask: int
-    sign: int = 0
-    order: int = 0
-    real: str = ""
+    sign: int = 0  # the sign bit; 0 where there is none
+    order: int = 0  # 0 for little endian, 1 for big endian: which number of the word
+    real: str = ""  # ``struct`` format of a float; empty where it is none
 
     def raw(self, word: Word) -> float:
         """Raw value; of a float signal the float."""
@@ -50,28 +43,21 @@ class Field:
             return raw - 2 * self.sign
         if self.real:
             size = struct.calcsize(self.real)
-            value: float = struct.unpack(self.real, raw.to_bytes(size, "little"))[0]
-            return value
+            return float(struct.unpack(self.real, raw.to_bytes(size, "little"))[0])
         return raw
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A signal as a part of full deflection.
-
-    Attributes:
-        scale, offset, full: value = (raw * scale + offset) / full.
-        low, high: parts of full deflection beyond which it is no measurement.
-        named: raw values that are no measurement: those with a name in the DBC.
-    """
+    """A signal as a part of full deflection."""
 
     field: Field
-    scale: float
+    scale: float  # value = (raw * scale + offset) / full
     offset: float
     full: float
-    low: float
+    low: float  # parts of full deflection beyond which it is no measurement
     high: float
-    named: frozenset[float]
+    named: frozenset[float]  # raw values that are none: those with a name in the DBC
 
     def value(self, word: Word) -> float | None:
         """In [-1, 1]; None where it is no measurement."""
@@ -81,25 +67,17 @@ class Part:
         value = (raw * self.scale + self.offset) / self.full
         if not self.low <= value <= self.high:  # nor is what is no number
             return None
-        if -1.0 <= value <= 1.0:
-            return value
-        return -1.0 if value < 0.0 else 1.0
+        return -1.0 if value < -1.0 else 1.0 if value > 1.0 else value
 
 
 @dataclass(frozen=True, slots=True)
 class Stick:
-    """The demand of one axis in the frame of its joystick.
-
-    Attributes:
-        back: of a rocker with a signal for each side, the negative one.
-        flags: of a magnitude, the signals neutral, negative and positive.
-        band: deflection up to which it is neutral.
-    """
+    """The demand of one axis in the frame of its joystick."""
 
     part: Part
-    back: Part | None = None
-    flags: tuple[Field, ...] = ()
-    band: float = 0.02
+    back: Part | None = None  # of a rocker with a signal for each side, the negative one
+    flags: tuple[Field, ...] = ()  # of a magnitude, the signals neutral, negative and positive
+    band: float = 0.02  # deflection up to which it is neutral
 
     def demand(self, word: Word) -> float | None:
         """In [-1, 1]; None where the frame has none, or its signals contradict each other."""
@@ -117,23 +95,17 @@ class Stick:
             sign, largest = _FLAGS.get(flags, (0, -1.0))
             if value < -EPSILON or value > largest:
                 return None
-            return sign * value if value > EPSILON else 0.0
+            return sign * value
         return value
 
 
 @dataclass(slots=True)
 class Opening:
-    """Velocity that a valve gives in one direction: behind a dead band, or by a measured curve.
+    """Velocity that a valve gives in one direction: behind a dead band, or by a measured curve."""
 
-    Attributes:
-        steps: commands, the first one the largest that moves nothing.
-        velocities: parts of full speed that these give.
-        slopes: between two of them, part of full speed in a step.
-    """
-
-    steps: tuple[float, ...]
-    velocities: tuple[float, ...]
-    slopes: tuple[float, ...] = field(init=False)
+    steps: tuple[float, ...]  # commands, the first one the largest that moves nothing
+    velocities: tuple[float, ...]  # parts of full speed that these give
+    slopes: tuple[float, ...] = field(init=False)  # between two of them, in a step
 
     def __post_init__(self) -> None:
         ends = list(zip(self.steps, self.velocities, strict=True))
@@ -169,17 +141,12 @@ def openings_of(
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """A signal with a command: where it lies, its raw value of zero, and how it counts.
-
-    Attributes:
-        sign: -1 where the raw value falls with the command.
-        full: steps to full command.
-    """
+    """A signal with a command."""
 
     field: Field
-    zero: int
-    sign: int
-    full: int
+    zero: int  # raw value
+    sign: int  # -1 where the raw value falls with the command
+    full: int  # steps to full command
 
     def steps(self, word: Word) -> int:
         """Steps from zero."""
@@ -188,21 +155,13 @@ class Resolution:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """The command of one axis in the frame of its valve.
+    """The command of one axis in the frame of its valve."""
 
-    Attributes:
-        size: the command; where the direction stands apart, its magnitude.
-        codes: the signals of the direction.
-        signs: their raw values to the sign.
-        back: of a rocker, the magnitude of the negative direction.
-        also: the same command in other resolutions.
-    """
-
-    size: Resolution
-    codes: tuple[Field, ...] = ()
-    signs: Mapping[tuple[float, ...], int] = field(default_factory=dict)
-    back: Resolution | None = None
-    also: tuple[Resolution, ...] = ()
+    size: Resolution  # where the direction stands apart, its magnitude
+    codes: tuple[Field, ...] = ()  # the signals of the direction
+    signs: Mapping[tuple[float, ...], int] = field(default_factory=dict)  # of their raw values
+    back: Resolution | None = None  # of a rocker, the magnitude of the negative direction
+    also: tuple[Resolution, ...] = ()  # the same command in other resolutions
 
     def steps(self, word: Word) -> int | None:
         """With their sign; None where signals contradict each other, or it is beyond full."""

@@ -1,91 +1,72 @@
 """The gate at work: frames come in, a tick begins, and each frame that wants to leave is judged."""
 
 import math
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 
 from canshaper.gate import rules
-from canshaper.gate.axis import AxisState
-from canshaper.gate.fields import Word, word_of
-from canshaper.gate.received import JoystickState, Received, SwitchState
-from canshaper.gate.record import Key, Message, Record, Switch
+from canshaper.gate.axis import AxisState, ValveState
+from canshaper.gate.fields import word_of
+from canshaper.gate.received import AxisInput, JoystickState, Received, SwitchState
+from canshaper.gate.record import Joystick, Key, Message, Record, Switch
 
 
 class Gate:
-    """All valves of a machine.
-
-    Attributes:
-        moved: axes by the name of the message that moves them.
-        valves: valve messages with their axes.
-    """
+    """All valves of a machine."""
 
     def __init__(self, record: Record) -> None:
         self.record = record
         self.number = -1  # of this deadline
-        self.others: dict[Key, int] = {}  # frames of it, by messages that are no valve's
         self.made = 0  # ticks; deadlines that were missed are none
         self.stood = False  # the loop stood still, and no tick was made since
+        self.others: dict[Key, int] = {}  # frames of it, by messages that are no valve's
         self.messages = {name: Received(one) for name, one in record.messages.items()}
-        self.joysticks: dict[str, JoystickState] = {}
-        for name, one in record.joysticks.items():
-            switches = [self._switch(switch) for switch in (one.pressed, *one.others)]
-            joystick = JoystickState(one, self.messages[one.message], switches)
-            self.joysticks[name] = joystick
-            joystick.received.joysticks.append(joystick)
+        self.joysticks = {name: self._joystick(one) for name, one in record.joysticks.items()}
         self.axes = {
             name: AxisState(one, self.joysticks[one.joystick]) for name, one in record.axes.items()
         }
-        self.moved: dict[str, list[AxisState]] = {name: [] for name in record.messages}
         for axis in self.axes.values():
             axis.partner = self.axes.get(axis.of.partner)
             axis.joystick.received.axes.append(axis)
-            self.moved[axis.joystick.of.message].append(axis)
-        for joystick in self.joysticks.values():
-            for switch in (joystick.pressed, *joystick.others):
-                switch.axes = self.moved[joystick.of.message]
-        self.stop: SwitchState | None = None
-        if record.stop:
-            self.stop = self._switch(record.stop, "emergency stop", latches=True)
-            self.stop.axes = list(self.axes.values())
-        self.ids: dict[Key, Received] = {}
-        self.groups: list[Received] = []
-        for message in self.messages.values():
-            of = message.of
-            self.ids.update({(of.bus, one, of.extended): message for one in of.ids})
-            if of.group is not None:
-                self.groups.append(message)
-        self.valves = {
-            key: (valve, [self.axes[name] for name in valve.axes])
-            for key, valve in record.valves.items()
+        all_axes = [*self.axes.values()]
+        self.stop = self._switch(record.stop, all_axes, emergency=True) if record.stop else None
+        messages = self.messages.values()
+        self.ids: dict[Key, Received] = {
+            (one.of.bus, can_id, one.of.extended): one for one in messages for can_id in one.of.ids
         }
-        self.counts: dict[Key, int] = {}  # of the last frame that left, and of the one before
-        self.before: dict[Key, int | None] = {}
+        self.groups = [(*one.of.group, one) for one in messages if one.of.group]
+        self.valves = {
+            key: ValveState(one, [self.axes[name] for name in one.axes])
+            for key, one in record.valves.items()
+        }
 
-    def _switch(self, of: Switch, why: str = "enable", *, latches: bool = False) -> SwitchState:
-        switch = SwitchState(of, self.messages[of.message], why, latches=latches)
+    def _joystick(self, of: Joystick) -> JoystickState:
+        received = self.messages[of.message]
+        enabling = of.pressed, *of.others
+        switches = [self._switch(one, received.axes, emergency=False) for one in enabling]
+        received.joystick = JoystickState(of, received, *switches)
+        return received.joystick
+
+    def _switch(self, of: Switch, axes: Sequence[AxisInput], *, emergency: bool) -> SwitchState:
+        switch = SwitchState(of, self.messages[of.message], axes, emergency=emergency)
         switch.received.switches.append(switch)
         return switch
 
     # --- what comes in ---------------------------------------------------------------------------
 
     def receive(self, key: Key, data: bytes, now_ns: int) -> Received | None:
-        """A frame was received; return its message, where that is one with a joystick."""
-        message = self.ids.get(key)
+        """Take a frame; return its message, where that is one with a joystick."""
+        message = self.ids.get(key) or self._by_group(key, now_ns)
         if message is None:
-            message = self._by_group(key, now_ns)
-            if message is None:
-                return None
+            return None
         word = word_of(data)
         says, counts = message.take(data, word, now_ns)
         if says:
             for switch in message.switches:
-                if switch.see(word, counts=counts) and not self.stood:
-                    for joystick in self.joysticks.values():
-                        if joystick.pressed is switch:
-                            joystick.press = self.made
+                switch.take(word, self.made, counts=counts, stood=self.stood)
         if counts:
-            for joystick in message.joysticks:
-                joystick.take(word, self.made, stood=self.stood)
-            for axis in self.moved[message.of.name]:
+            if message.joystick:
+                message.joystick.take(word, self.made, stood=self.stood)
+            for axis in message.axes:
                 axis.take(word, now_ns)
         return message if message.axes else None
 
@@ -93,30 +74,28 @@ class Gate:
         """A message of J1939 that any address may send; and commands of others to our valves."""
         bus, can_id, extended = key
         if key in self.valves:
-            self._foreign(self.valves[key][1], now_ns)
-            return None
-        if not extended:
-            return None
-        for message in self.groups:
-            mask, group = message.of.group  # type: ignore[misc]
-            if bus == message.of.bus and can_id & mask == group:
-                source = can_id & 0xFF
-                ours = source == message.of.own or message.from_other(source, now_ns)
-                return None if ours else message
-        for (at, own, _), (valve, axes) in self.valves.items():
-            same = valve.group and bus == at and can_id & valve.group == own & valve.group
-            # Below the mask: a destination, where the group has one; 255 is all of them.
-            if same and can_id >> 8 & 0xFF in (own >> 8 & 0xFF, 0xFF):
-                self._foreign(axes, now_ns)
+            self._foreign(self.valves[key], now_ns)
+        elif extended:
+            for mask, group, message in self.groups:
+                if bus == message.of.bus and can_id & mask == group:
+                    source = can_id & 0xFF
+                    ours = source == message.of.own or message.from_other(source, now_ns)
+                    return None if ours else message
+            for (at, own, _), valve in self.valves.items():
+                mask = valve.of.group
+                # Below the mask: a destination, where the group has one; 255 is all of them.
+                to_us = can_id >> 8 & 0xFF in (own >> 8 & 0xFF, 0xFF)
+                if mask and bus == at and can_id & mask == own & mask and to_us:
+                    self._foreign(valve, now_ns)
         return None
 
-    def _foreign(self, axes: Iterable[AxisState], now_ns: int) -> None:
-        """Someone else commands these axes; one who only listens is no one's rival."""
+    def _foreign(self, valve: ValveState, now_ns: int) -> None:
+        """Someone else commands a valve; one who only listens is no one's rival."""
         if not self.record.listens:
-            for axis in axes:
+            for axis in valve.axes:
                 axis.foreign_ns, axis.hard, axis.latches = now_ns, "second sender", True
 
-    def disagrees(self, axes: Iterable[AxisState]) -> None:
+    def disagrees(self, axes: Iterable[AxisInput]) -> None:
         """Another decoder has read something else in a frame of their joystick."""
         for axis in axes:
             axis.hard = "decoders disagree"
@@ -129,17 +108,13 @@ class Gate:
 
     def send_failed(self, key: Key) -> None:
         """A frame did not reach its bus: what moves stops."""
-        for axis in self.valves[key][1] if key in self.valves else ():
+        for axis in self.valves[key].axes if key in self.valves else ():
             if axis.last:
                 axis.halt("send failed", self.made + 1, latch=True)
 
     def withheld(self, key: Key) -> None:
-        """A frame was too late and did not leave: the next one has its count."""
-        last = self.before.get(key)
-        if last is None:
-            self.counts.pop(key, None)
-        else:
-            self.counts[key] = last
+        """A valve's frame was too late and did not leave: the next one has its count."""
+        self.valves[key].count = self.valves[key].before
 
     def set(self, key: str, value: float) -> None:
         """A number of the file is another one from now on: axes.NAME.SECTION.KEY."""
@@ -152,8 +127,7 @@ class Gate:
         """A measurement moves an axis: so large a part of full command is the demand, [-1, 1]."""
         axis = self.axes[name]
         steps = math.ceil(abs(part) * axis.of.command.size.full)
-        velocity = axis.of.openings[part < 0.0].velocity(steps) if steps else 0.0
-        axis.ramp = -velocity if part < 0.0 else velocity
+        axis.ramp = axis.of.velocity(-steps if part < 0.0 else steps)
 
     # --- a tick ----------------------------------------------------------------------------------
 
@@ -168,52 +142,42 @@ class Gate:
                 message.forget()
         for joystick in self.joysticks.values():
             joystick.look(now_ns)
-        axes = self.axes.values()
-        for axis in axes:
+        due = []
+        for axis in self.axes.values():
             period = axis.of.period
             passed = self.number // period - last // period
             axis.due = passed > 0
             if axis.due:
+                due.append(axis)
                 why, latches = rules.stop_at_once(axis, self.stop, now_ns)
                 demand = None if why else rules.demand_of(axis, now_ns)
                 axis.look(why, demand, self.made, self.number, passed, latches=latches)
-        for axis in axes:
-            if axis.due:
-                partner = axis.partner
-                asked_now = bool(axis.forth.most or axis.back.most)
-                if partner is not None:
-                    asked_now = asked_now or bool(partner.forth.most or partner.back.most)
-                axis.asked_now, axis.asked = asked_now, asked_now or axis.asked_now
-                if not axis.asked or axis.forth.most or axis.back.most:
-                    axis.way, axis.alone = 0.0, 0
-                if axis.ticks > 1 and axis.of.forwarded:
-                    axis.skip()
-                axis.least, axis.most = rules.bounds(axis)
+        for axis in due:
+            axis.share()
+            axis.least, axis.most = rules.bounds(axis)
 
     # --- what goes out ---------------------------------------------------------------------------
 
     def leaving(self, key: Key, data: bytes, of: bytes | None = None) -> str:
         """Why a frame may not leave; in a gateway it was made ``of`` one of the joystick."""
-        known = self.valves.get(key)
-        if known is None:
+        valve = self.valves.get(key)
+        if valve is None:
             self.others[key] = sent = self.others.get(key, 0) + 1
             return rules.other_refused(self.record, key, data, sent)
-        valve, axes = known
-        word, joystick = word_of(data), axes[0].joystick
-        held = not joystick.pressed.released and any(one.armed or one.stop_left for one in axes)
-        if why := rules.bytes_refused(valve, data, word, of, held=held):
+        word, axes, received = word_of(data), valve.axes, valve.joystick.received
+        if why := rules.bytes_refused(valve, data, word, of):
             return why
-        count = valve.protection.count(data, word)
-        # Axes of one message have one period, and so their turn together.
-        due = axes[-1].due if of is None else joystick.received.waiting
-        if why := rules.turn_refused(valve, count, self.counts.get(key), due=due):
+        count = valve.of.protection.count(data, word)
+        due = axes[-1].due if of is None else received.waiting
+        if why := rules.turn_refused(valve, count, due=due):
             return why
         velocities = []
         for axis in axes:
-            velocity = _velocity(axis, word)
-            if velocity is None:
+            steps = axis.of.command.steps(word)
+            if steps is None:
                 return f"axis={axis.of.name} limit=command"
-            if velocity and (why := rules.velocity_refused(axis, velocity, self.made)):
+            velocity = axis.of.velocity(steps)
+            if steps and (why := rules.velocity_refused(axis, velocity, self.made)):
                 return why
             velocities.append(velocity)
         for axis, velocity in zip(axes, velocities, strict=True):
@@ -221,24 +185,24 @@ class Gate:
         if of is None:
             axes[-1].due = False
         else:
-            joystick.received.waiting = False
-        self.before[key], self.counts[key] = self.counts.get(key), count
+            received.waiting = False
+        valve.before, valve.count = valve.count, count
         return ""
 
     def refused(self, key: Key) -> None:
         """A frame was refused: its axes stop, and wait for a reset."""
-        for axis in self.valves[key][1]:
+        for axis in self.valves[key].axes:
             axis.halt("refused", self.made, latch=True)
 
     def last(self, key: Key, data: bytes) -> str:
         """Why a frame may not be the last one: it has to be right and neutral."""
-        (valve, axes), word = self.valves[key], word_of(data)
-        if why := rules.bytes_refused(valve, data, word, None, held=False):
+        valve, word = self.valves[key], word_of(data)
+        if why := rules.bytes_refused(valve, data, word, None, last=True):
             return why
-        moves = [axis.of.name for axis in axes if _velocity(axis, word) != 0.0]
-        if moves:
-            return f"axis={moves[0]} limit=neutral"
-        self.counts[key] = valve.protection.count(data, word)
+        for axis in valve.axes:
+            if axis.of.command.steps(word) != 0:
+                return f"axis={axis.of.name} limit=neutral"
+        valve.count = valve.of.protection.count(data, word)
         return ""
 
     # --- a reload --------------------------------------------------------------------------------
@@ -256,14 +220,11 @@ class Gate:
         for message in self.messages.values():
             if (same := messages.get(_known_by(message.of, places))) is not None:
                 message.carry_over(same, missed=message.of.bus in reopened)
-        keys = {(were[bus], *rest): (bus, *rest) for bus, *rest in before.valves}
-        for key in self.valves:
-            bus, *rest = key
-            same_key = keys.get((places[bus], *rest))
-            if same_key is not None and same_key in before.counts:
-                valve, other = self.valves[key][0], before.valves[same_key][0]
-                if valve.protection.counts == other.protection.counts:
-                    self.counts[key] = before.counts[same_key]
+        valves = {(were[bus], *rest): one for (bus, *rest), one in before.valves.items()}
+        for (bus, *rest), valve in self.valves.items():
+            other = valves.get((places[bus], *rest))
+            if other and valve.of.protection.counts == other.of.protection.counts:
+                valve.count = other.count
         for name, axis in self.axes.items():
             bus, *rest = axis.of.valve
             for other_name, one in before.axes.items():
@@ -271,15 +232,6 @@ class Gate:
                 same_valve = (places[bus], *rest) == (were[at], *other_rest)
                 if name == other_name or (same_valve and axis.of.command == one.of.command):
                     axis.carry_over(one)
-
-
-def _velocity(axis: AxisState, word: Word) -> float | None:
-    """Velocity that a frame gives an axis; None where it is no command."""
-    steps = axis.of.command.steps(word)
-    if not steps:
-        return None if steps is None else 0.0
-    forth, back = axis.of.openings
-    return forth.velocity(steps) if steps > 0 else -back.velocity(-steps)
 
 
 def _known_by(of: Message, places: Mapping[str, Hashable]) -> Hashable:

@@ -7,85 +7,80 @@ one that is in sequence too.
 from collections.abc import Sequence
 
 from canshaper.gate.fields import Word
-from canshaper.gate.record import Joystick, Message, Switch
+from canshaper.gate.record import Axis, Joystick, Message, Switch
 
 NEVER = -(1 << 62)
 
 
-class Pending:
-    """Reasons to stop that were received since an axis had its turn last, however short.
+class AxisInput:
+    """What was received for an axis; reasons to stop since it had its turn last, however short.
 
     Attributes:
+        demand: of the last joystick frame that counts, and ``changed_ns`` since when.
+        foreign_ns: when a second sender was received last.
         hard: a reason to stop at once; ``latches`` whether one was that latches at rest too.
         lost: its joystick was another one meanwhile.
     """
 
-    def __init__(self) -> None:
+    __slots__ = ("changed_ns", "demand", "foreign_ns", "hard", "latches", "lost", "of")
+
+    def __init__(self, axis: Axis) -> None:
+        self.of = axis
+        self.demand: float | None = None
+        self.changed_ns, self.foreign_ns = 0, NEVER
         self.hard, self.latches, self.lost = "", False, False
+
+    def take(self, word: Word, now_ns: int) -> None:
+        """Take a frame of its joystick that counts."""
+        demand = self.of.stick.demand(word)
+        if demand != self.demand:
+            self.demand, self.changed_ns = demand, now_ns
 
 
 class Received:
-    """One message: is it whole, right, in sequence, and how old is it?
-
-    Attributes:
-        good_ns: when the last frame came that counts; None where none does.
-        intact_ns: when the last frame with the right checksum came.
-        count: its alive counter.
-        good: how many good ones came in a row.
-        any_count: after silence the next counter may be any but the last one.
-        waiting: a frame that counts has come and was not passed on; of a gateway.
-        source, source_ns: of a message from any address, the one that counts, and its last frame.
-        switches, joysticks: what is in it; ``axes`` what that moves.
-    """
+    """One message: is it whole, right, in sequence, and how old is it?"""
 
     def __init__(self, message: Message) -> None:
         self.of = message
-        self.good_ns: int | None = None
-        self.intact_ns: int | None = None
-        self.count: int | None = None
-        self.good = 0
-        self.any_count = True
-        self.waiting = False
+        self.good_ns: int | None = None  # when the last frame came that counts
+        self.intact_ns = NEVER  # when the last one came with the right checksum
+        self.count: int | None = None  # its alive counter
+        self.any_count = True  # after silence the next one may be any but that
+        self.good = 0  # good ones in a row
+        self.waiting = False  # of a gateway: one that counts has come and was not passed on
+        # Of a message from any address, the one that counts, and its last frame.
         self.source, self.source_ns = -1, NEVER
-        self.switches: list[SwitchState] = []
-        self.joysticks: list[JoystickState] = []
-        self.axes: list[Pending] = []
+        self.switches: list[SwitchState] = []  # in it, as the joystick
+        self.joystick: JoystickState | None = None
+        self.axes: list[AxisInput] = []  # that this moves
 
     def take(self, data: bytes, word: Word, now_ns: int) -> tuple[bool, bool]:
         """Whether a frame says anything, and whether it counts."""
-        of = self.of
+        of, protection = self.of, self.of.protection
         if len(data) != of.length:
             return False, False
         other = of.page is not None and of.page[0].raw(word) != of.page[1]
         if other and of.alone:
             return False, False
-        if self.intact_ns is None or now_ns - self.intact_ns > of.timeout_ns:
+        if now_ns - self.intact_ns > of.timeout_ns:
             self.any_count, self.good = True, 0
-        if not of.protection.right(data):
+        if not protection.right(data):
             self.good = 0
             return False, False
         self.intact_ns = now_ns
-        if of.protection.counts and not self._next(data, word):
-            return not other, False
-        if self.good < of.qualify:
-            self.good += 1
+        if protection.counts:
+            last, self.count = self.count, protection.count(data, word)
+            step = 1 if last is None else (self.count - last) % protection.counts
+            if step > of.most_step and not self.any_count:
+                self.good = step = 0
+            if step == 0:
+                return not other, False
+            self.any_count = False
+        self.good = min(self.good + 1, of.qualify)
         if other or self.good < of.qualify:
             return not other, False
         self.good_ns, self.waiting = now_ns, True
         return True, True
-
-    def _next(self, data: bytes, word: Word) -> bool:
-        """Whether the alive counter is the next one."""
-        of = self.of.protection
-        last, self.count = self.count, of.count(data, word)
-        step = 1 if last is None else (self.count - last) % of.counts
-        if step == 0:
-            return False
-        if step > self.of.most_step and not self.any_count:
-            self.good = 0
-            return False
-        self.any_count = False
-        return True
 
     def from_other(self, source: int, now_ns: int) -> bool:
         """Whether another address sends this message while the first one does; see J1939."""
@@ -105,7 +100,7 @@ class Received:
 
     def forget(self) -> None:
         """Nothing received so far counts."""
-        self.good_ns = self.intact_ns = None
+        self.good_ns, self.intact_ns = None, NEVER
 
     def carry_over(self, before: "Received", *, missed: bool) -> None:
         """Go on where the same message was before a reload; its values have to come again.
@@ -115,7 +110,7 @@ class Received:
             missed: its bus was closed meanwhile.
         """
         self.source, self.source_ns = before.source, before.source_ns
-        self.intact_ns = None if missed else before.intact_ns
+        self.intact_ns = NEVER if missed else before.intact_ns
         if self.of.protection == before.of.protection:
             self.count, self.any_count, self.good = before.count, before.any_count, before.good
         released = {(one.of.field, one.of.on) for one in before.switches if one.released}
@@ -124,34 +119,36 @@ class Received:
 
 
 class SwitchState:
-    """One switch, as it was seen.
+    """One switch, as it was seen, and the axes that it stops."""
 
-    Attributes:
-        why: what it is, for the log; ``latches`` whether it latches at rest too.
-        axes: what it stops.
-        released: by the last frame that says so or, if it counts, otherwise.
-        was_off: it was seen released since it was pressed last.
-    """
+    def __init__(
+        self, switch: Switch, received: Received, axes: Sequence[AxisInput], *, emergency: bool
+    ) -> None:
+        self.of, self.received, self.axes = switch, received, axes
+        self.emergency = emergency  # it latches at rest too
+        self.on = False  # it agrees in the last frame that counts
+        self.released = False  # by the last frame that says so or, if it counts, otherwise
+        self.was_off = False  # it was seen released since it was pressed last
+        self.press = NEVER  # ticks that were made before that, or before reset was
 
-    def __init__(self, switch: Switch, received: Received, why: str, *, latches: bool) -> None:
-        self.of, self.received, self.why, self.latches = switch, received, why, latches
-        self.axes: Sequence[Pending] = ()
-        self.released = self.was_off = False
-
-    def see(self, word: Word, *, counts: bool) -> bool:
-        """Take a frame; whether it is pressed in it."""
-        raw, of = self.of.field.raw(word), self.of
-        if raw == 0 if of.only_zero else raw != of.on:
+    def take(self, word: Word, made: int, *, counts: bool, stood: bool) -> None:
+        """Take a frame. One that has waited in a standstill is no press."""
+        of = self.of
+        raw = of.field.raw(word)
+        on = raw == of.on
+        if counts:
+            self.on = on
+        if raw == 0 if of.only_zero else not on:
             self.released = self.was_off = True
             for axis in self.axes:
-                axis.hard = self.why
-                axis.latches = axis.latches or self.latches
+                axis.hard = "emergency stop" if self.emergency else "enable"
+                axis.latches = axis.latches or self.emergency
         elif counts:
             self.released = False
-            if self.was_off and raw == of.on:
+            if on and self.was_off:
                 self.was_off = False
-                return True
-        return False
+                if not stood:
+                    self.press = made
 
     def off(self, now_ns: int) -> bool:
         """Whether it does not agree now, or is not known to."""
@@ -159,44 +156,34 @@ class SwitchState:
 
 
 class JoystickState:
-    """One joystick, and the switches that enable it; the first one is the one that is pressed.
+    """One joystick, and the switches that enable it; the first one is the one that is pressed."""
 
-    Attributes:
-        press: ticks that were made before enable or reset was pressed last.
-        enabled: its own switch was on in the last frame that counts.
-        bypassed: anti-sway was off in it; ``flips`` how often that has changed.
-        gone: why nothing that it moves may move in this tick, at once.
-        valid: it may be used in this tick.
-    """
-
-    def __init__(
-        self, joystick: Joystick, received: Received, switches: Sequence[SwitchState]
-    ) -> None:
+    def __init__(self, joystick: Joystick, received: Received, *switches: SwitchState) -> None:
         self.of, self.received = joystick, received
         self.pressed, *self.others = switches
         self.was_reset = True
-        self.press, self.flips = NEVER, 0
-        self.enabled = self.bypassed = self.valid = False
-        self.gone = ""
+        self.bypassed, self.flips = False, 0  # anti-sway was off; how often that has changed
+        self.gone = ""  # why nothing that it moves may move in this tick, at once
+        self.valid = False  # it may be used in this tick
 
     def take(self, word: Word, made: int, *, stood: bool) -> None:
-        """A frame of it that counts. One that has waited in a standstill is no press."""
+        """Take a frame of it that counts. One that has waited in a standstill is no press."""
         of = self.of
-        self.enabled = not of.own or of.pressed.field.raw(word) == 1
         bypassed = of.bypass is not None and of.bypass.raw(word) == 1
         self.flips += bypassed is not self.bypassed
         self.bypassed = bypassed
         if of.reset is not None:
             reset = of.reset.raw(word) == 1
             if reset and not self.was_reset and not stood:
-                self.press = made
+                self.pressed.press = made
             self.was_reset = reset
 
     def look(self, now_ns: int) -> None:
         """Find whether it may be used in this tick."""
-        pressed = self.pressed
-        gone = pressed.released or (not self.of.own and pressed.received.lost(now_ns))
+        pressed, lost = self.pressed, self.received.lost(now_ns)
+        own = pressed.received is self.received
+        gone = pressed.released if own else pressed.off(now_ns)
         for one in self.others:
             gone = gone or one.off(now_ns)
         self.gone = "enable" if gone else ""
-        self.valid = self.enabled and not self.received.lost(now_ns)
+        self.valid = not lost and (pressed.on or not own)

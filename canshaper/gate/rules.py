@@ -4,10 +4,10 @@
 not, 10 why an identifier may not. Empty text, or None for no fault, is that it may.
 """
 
-from canshaper.gate.axis import FOREIGN_NS, ROUNDING, UP, AxisState
+from canshaper.gate.axis import FOREIGN_NS, ROUNDING, UP, AxisState, ValveState
 from canshaper.gate.fields import EPSILON, Word
 from canshaper.gate.received import SwitchState
-from canshaper.gate.record import Key, Record, Valve
+from canshaper.gate.record import Key, Record
 
 OTHERS = 8
 """Frames in a tick of a message that is no valve's: answers to others come several at once."""
@@ -20,7 +20,7 @@ def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tupl
     """
     why, latches = axis.hard, axis.latches
     if stop is not None and stop.off(now_ns):
-        why, latches = stop.why, latches or stop.released
+        why, latches = "emergency stop", latches or stop.released
     if now_ns - axis.foreign_ns <= FOREIGN_NS:
         why, latches = "second sender", True
     return why or axis.joystick.gone, latches
@@ -53,10 +53,10 @@ def bounds(axis: AxisState) -> tuple[float, float]:
     Against a stick that is held for ``reversal_s`` only, but in a shaped stop. Beyond the demand
     what a partner adds.
     """
-    of, low, high, now = axis.of, -axis.back.most, axis.forth.most, axis.now
-    least, most = low, high
+    of, now = axis.of, axis.now
+    least, most = -axis.back.most, axis.forth.most
     if of.faster:
-        least, most = (-1.0 if low else 0.0), (1.0 if high else 0.0)
+        least, most = (-1.0 if least else 0.0), (1.0 if most else 0.0)
     if of.reverse:
         least, most = min(least, -most), max(most, -least)
     elif axis.held >= of.reversal:
@@ -110,19 +110,19 @@ def distance(axis: AxisState, velocity: float) -> str:
     Where nothing was asked within the tail a partner moves it: limits are its path and its time.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
-    if axis.ran > of.run_on and axis.beyond(velocity) > EPSILON:
+    size = abs(velocity)
+    if axis.ran > of.run_on and size - axis.held_at(velocity) - of.added > EPSILON:
         return f"limit=stop_distance_m allowed={of.run_on:.3f}"
     if asked.most:
         ahead = asked.remaining + of.slack + of.path
-        if abs(velocity) * of.period_s > ahead:
+        if size * of.period_s > ahead:
             return f"limit=distance allowed={ahead:.3f}"
     elif of.added:
         if axis.alone > of.most_periods + 1:
             return "limit=time of added velocity"
         way = axis.way + velocity * of.period_s
-        path = of.path
         # A tenth more, and .01 s of full speed.
-        if path and abs(way) > 1.1 * path + 0.01 and way * velocity > 0.0:
+        if of.path and abs(way) > 1.1 * of.path + 0.01 and way * velocity > 0.0:
             return "limit=path of added velocity"
     return ""
 
@@ -130,7 +130,7 @@ def distance(axis: AxisState, velocity: float) -> str:
 def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
     """Why a velocity that is not 0 may not leave: rules 3 to 7."""
     ticks = axis.ticks if axis.of.forwarded else 1
-    fallen = axis.top - axis.of.fall * min(ticks, 1) if velocity * axis.last >= 0.0 else 0.0
+    fallen = axis.fallen(velocity, min(ticks, 1))
     why = (
         neutral_first(axis)
         or direction_and_size(axis, velocity, fallen)
@@ -143,37 +143,42 @@ def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
     return f"axis={axis.of.name} {why} speed={velocity:.3f}" if why else ""
 
 
-def bytes_refused(valve: Valve, data: bytes, word: Word, of: bytes | None, *, held: bool) -> str:
+def bytes_refused(
+    valve: ValveState, data: bytes, word: Word, of: bytes | None, *, last: bool = False
+) -> str:
     """Rule 8: length, bits that are not ours, values of a word, checksum; limit: none.
 
     In a gateway it was made ``of`` a frame of the joystick, or is one of our own: enable is on in
-    that only while it is ``held`` and an axis may move.
+    that only while it is held and an axis may move, and not in the ``last`` one.
     """
-    if len(data) != valve.length:
-        return f"limit=length length={len(data)} expected={valve.length}"
+    record = valve.of
+    if len(data) != record.length:
+        return f"limit=length length={len(data)} expected={record.length}"
     if of is not None:
         wrong = word[0] ^ int.from_bytes(of, "little") if len(of) == len(data) else -1
-        wrong &= ~valve.ours
+        wrong &= ~record.ours
     else:
-        wrong = word[0] & valve.fixed ^ valve.fixed_value
+        wrong = word[0] & record.fixed ^ record.fixed_value
     if wrong:
         return f"limit=bits wrong={wrong:x}"
-    for field, values in valve.words:
+    for field, values in record.words:
         if field.raw(word) not in values:
             return "limit=word"
-    if of is None and valve.enable is not None:
-        enabled = valve.enable.raw(word) == 1
-        if enabled > held or any(field.raw(word) not in values for field, values in valve.own):
+    if of is None and record.enable is not None:
+        held = not (last or valve.joystick.pressed.released)
+        held = held and any(axis.armed or axis.stop_left for axis in valve.axes)
+        enabled = record.enable.raw(word) == 1
+        if enabled > held or any(field.raw(word) not in values for field, values in record.own):
             return "limit=bits of an own frame"
-    return "" if valve.protection.right(data) else "limit=checksum"
+    return "" if record.protection.right(data) else "limit=checksum"
 
 
-def turn_refused(valve: Valve, count: int, last: int | None, *, due: bool) -> str:
+def turn_refused(valve: ValveState, count: int, *, due: bool) -> str:
     """Rule 9: one frame in the tick in which it is due, with the next alive counter."""
     if not due:
         return "limit=one frame a tick"
-    counts = valve.protection.counts
-    if counts and last is not None and count != (last + 1) % counts:
+    counts = valve.of.protection.counts
+    if counts and valve.count is not None and count != (valve.count + 1) % counts:
         return f"limit=counter value={count}"
     return ""
 

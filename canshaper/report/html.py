@@ -41,7 +41,12 @@ _SIGNATURES = ("name", "date", "signature")
 
 
 def document(
-    title: str, facts: Iterable[tuple[str, str]], parts: Iterable[str], first: Iterable[str] = ()
+    title: str,
+    facts: Iterable[tuple[str, str]],
+    parts: Iterable[str],
+    first: Iterable[str] = (),
+    *,
+    signed: bool = True,
 ) -> str:
     """The whole file; nothing in it loads or runs anything.
 
@@ -50,10 +55,12 @@ def document(
         facts: (name, value) of what it is of, in order.
         parts: of ``text``, ``table`` and ``picture``, in order.
         first: such parts in front of the facts.
+        signed: whether there is room for a signature.
     """
     rows = "".join(f"<tr><th>{_safe(k)}</th><td>{_safe(v)}</td></tr>" for k, v in facts)
     lines = "".join("<td></td>" for _ in _SIGNATURES)
     words = "".join(f"<th>{word}</th>" for word in _SIGNATURES)
+    sign = f'<table class="sign"><tr>{lines}</tr><tr>{words}</tr></table>' * signed
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
@@ -64,7 +71,7 @@ def document(
         + "\n".join(first)
         + f'\n<table class="facts">{rows}</table>\n'
         + "\n".join(parts)
-        + f'\n<table class="sign"><tr>{lines}</tr><tr>{words}</tr></table>\n</body></html>\n'
+        + f"\n{sign}\n</body></html>\n"
     )
 
 

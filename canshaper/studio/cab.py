@@ -54,7 +54,7 @@ class Cab:
         self._centred = False  # seen in neutral since they last stopped counting
         self._last_message_s = 0.0
         self._release_at_s: float | None = None
-        self._silent = False  # why enable is about to be released
+        self.silent = False  # why enable is about to be released
         self._reset_until_s = -math.inf
         self._presses_s = deque([-math.inf], maxlen=MOST_PRESSES)  # when each begins
 
@@ -94,8 +94,8 @@ class Cab:
         self._last_message_s = now_s
         if all(abs(value) <= NEUTRAL for value in joysticks.values()):
             self._centred = True
-            if self._silent:
-                self._silent, self._release_at_s = False, None
+            if self.silent:
+                self.silent, self._release_at_s = False, None
                 self._report(said("back", page=page))
         self._joysticks = {n: float(v) for n, v in joysticks.items()} if self._centred else {}
 
@@ -109,7 +109,7 @@ class Cab:
         if page != self.driver:
             return
         if not on:
-            self._joysticks, self._centred, self._silent = {}, False, False
+            self._joysticks, self._centred, self.silent = {}, False, False
             self.enable, self._release_at_s = False, None
         elif self._release_at_s is None or now_s >= self._release_at_s:
             self.enable, self._release_at_s = True, None
@@ -145,16 +145,16 @@ class Cab:
         if silent and self.enable and self._release_at_s is None:
             self._report(said("silent", page=self.driver))
             self._let_go(now_s)
-            self._silent = True
+            self.silent = True
         elif silent:
             self._joysticks, self._centred = {}, False
         if self._release_at_s is not None and now_s >= self._release_at_s:
-            self._release_at_s, self._silent = None, False
+            self._release_at_s, self.silent = None, False
             if self.enable:
                 self.enable = False
                 self._report(said("released"))
 
     def _let_go(self, now_s: float) -> None:
-        self._joysticks, self._centred, self._silent = {}, False, False
+        self._joysticks, self._centred, self.silent = {}, False, False
         if self.enable and self._release_at_s is None:
             self._release_at_s = now_s + RELEASE_S

@@ -11,6 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from canshaper.errors import ControlError, PageMessageError
 from canshaper.studio.cab import Cab, is_number
 from canshaper.studio.numbers_channel import NumbersChannel
+from canshaper.studio.preference import Preference
 from canshaper.studio.stage import Stage
 from canshaper.studio.words import said
 
@@ -54,6 +55,7 @@ class Client:
         self._filled_s = time.monotonic()
         self._pending: dict[str, float] = {}
         self._slid = asyncio.Event()
+        self._preference: Preference | None = None  # of which the settings are still to be sent
         self._numbers = NumbersChannel(stage.numbers, number) if stage.numbers else None
 
     async def serve(self) -> None:
@@ -121,7 +123,9 @@ class Client:
             self._stage.with_cab(lambda cab, _: cab.switch_anti_sway(number, on))
         elif "numbers" in message and self._numbers:
             self._numbers.receive(message)
-        else:
+        elif "settings" in message:
+            self._preference = self._stage.preference
+        elif not self._stage.other(number, message):
             name, factor = message.get("slide"), message.get("to")
             known = isinstance(name, str) and name in self._stage.positions
             if not known or not is_number(factor):
@@ -157,6 +161,8 @@ class Client:
             if events:
                 last = events[-1].number
                 shown["events"] = [list(event) for event in events]
+            if self._preference and (found := self._preference.ready()) is not None:
+                shown["settings"], self._preference = found, None
             if self._numbers:
                 shown |= self._numbers.news()
             if self._refusals:

@@ -33,6 +33,7 @@ class InProcessCrane:
         changes: parameters of the crane, NAME=VALUE.
         crane: which one it is, where the deployment has several; the others' joysticks stand still.
         report: called with the error of a filter: a status frame carries only its reason.
+        joysticks: others than those that ``frames`` holds.
 
     Attributes:
         cycle_ms: of the joysticks.
@@ -47,10 +48,11 @@ class InProcessCrane:
         changes: Sequence[str] = (),
         crane: str | None = None,
         report: Report = lambda _text, _level: None,
+        joysticks: "HeldHand | None" = None,
     ) -> None:
         driven = driven_part(deployment, crane)
-        self._hand = _HeldHand(driven)
-        others = [_HeldHand(one_crane(deployment, n)) for n in cranes(deployment) if n != crane]
+        self._hand = joysticks or HeldHand(driven)
+        others = [HeldHand(one_crane(deployment, n)) for n in cranes(deployment) if n != crane]
         self.cycle_ms = self._hand.hand.cycle_ms
         self._controller = Controller(deployment)
         self._adjuster = Adjuster(self._controller)
@@ -109,7 +111,7 @@ class InProcessCrane:
         self._lock_step.processor = self._guarded
 
 
-class _HeldHand:
+class HeldHand:
     """Joysticks as the page holds them."""
 
     def __init__(self, deployment: Deployment) -> None:

@@ -111,7 +111,17 @@ def build_app(
         parameters: the crane that is drawn.
         commission: of its file.
     """
-    hello = _hello(stage, parameters)
+
+    def left(_request: HTTPConnection) -> Response:
+        return JSONResponse(residuals(stage.deployment, stage.in_force()))
+
+    routes = [pages_of(stage, hello_of(stage, parameters)), Route("/residuals.json", left)]
+    routes += commission.routes()
+    return page_app(routes, "main.js", access)
+
+
+def pages_of(stage: Stage, hello: dict[str, Any]) -> BaseRoute:
+    """The connections of the pages of a stage; each is told what there is."""
     numbers = itertools.count(1)
     open_pages: set[int] = set()
 
@@ -127,16 +137,7 @@ def build_app(
         finally:
             open_pages.discard(number)
 
-    def left(_request: HTTPConnection) -> Response:
-        return JSONResponse(residuals(stage.deployment, stage.in_force()))
-
-    async def settings(_request: HTTPConnection) -> Response:
-        return JSONResponse(stage.preference.ready() if stage.preference else {})
-
-    routes = [WebSocketRoute("/ws", connection), Route("/residuals.json", left)]
-    routes.append(Route("/preference.json", settings))
-    routes += commission.routes()
-    return page_app(routes, "main.js", access)
+    return WebSocketRoute("/ws", connection)
 
 
 def page_app(routes: Sequence[BaseRoute], script: str, access: Access) -> ASGIApp:
@@ -205,7 +206,7 @@ def _with_headers(send: Send) -> Send:
     return sending
 
 
-def _hello(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
+def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
     """The first message to a page: what there is, and how long the links are."""
     return {
         "version": __version__,

@@ -1,19 +1,16 @@
-"""The sliders of the page: how calm the filter is, and how long it believes the pendulum to be.
+"""The slider of the page that says how long the filter believes the pendulum to be.
 
-Each slider is a factor on numbers of the deployment file: "calm" stretches a filter in time that
-has no settings to choose from (see ``preference``); "length" makes the pendulum that the filter
-believes in longer. Several numbers change together, through the daemon's control socket.
+It is a factor on numbers of the deployment file, which change together, through the daemon's
+control socket. (Settings of the filters: ``preference``.)
 """
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
-from canshaper.config.schema import AxisSection, DeploymentConfig
-from canshaper.shaping.registry import KINDS
+from canshaper.config.schema import DeploymentConfig
 
-CALM, LENGTH = "calm", "length"
-RANGES = {CALM: (0.5, 2.0), LENGTH: (0.5, 2.0)}
+LENGTH = "length"
+RANGES = {LENGTH: (0.5, 2.0)}
 """Allowed factors."""
 
 
@@ -42,37 +39,14 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
     An axis with a gain schedule or profiles is left out: what is in force there
     changes with the machine.
     """
-    by_slider: dict[str, list[Number]] = {CALM: [], LENGTH: []}
+    numbers: list[Number] = []
     for name, axis in config.axes.items():
-        if not axis.gain_schedule and not axis.profiles:
-            by_slider[CALM] += _calm(name, axis)
-            by_slider[LENGTH] += _length(name, axis)
-    return {name: numbers for name, numbers in by_slider.items() if numbers}
-
-
-def _calm(name: str, axis: AxisSection) -> list[Number]:
-    """Time constants: all poles move along their rays, so that the filter keeps its shape."""
-    if axis.sway is None:  # the daemon refuses: without a model there is nothing to join to
-        return []
-    parameters = KINDS[axis.filter.kind].parameters
-    powers = {p.name: p.stretch for p in parameters if p.stretch}
-    return _numbers(f"axes.{name}.filter", axis.filter, powers)
-
-
-def _length(name: str, axis: AxisSection) -> list[Number]:
-    """The period grows with the root of the length."""
-    if axis.sway is None:
-        return []
-    return _numbers(f"axes.{name}.sway", axis.sway, {"length_m": 1.0, "period_s": 0.5})
-
-
-def _numbers(place: str, section: Any, powers: dict[str, float]) -> list[Number]:
-    numbers = []
-    for key, power in powers.items():
-        value = getattr(section, key)
-        if value is not None:
-            numbers.append(Number(f"{place}.{key}", float(value), power))
-    return numbers
+        if axis.sway and not axis.gain_schedule and not axis.profiles:
+            # The period grows with the root of the length.
+            for key, power in (("length_m", 1.0), ("period_s", 0.5)):
+                if (value := getattr(axis.sway, key)) is not None:
+                    numbers.append(Number(f"axes.{name}.sway.{key}", float(value), power))
+    return {LENGTH: numbers} if numbers else {}
 
 
 def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:

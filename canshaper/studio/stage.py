@@ -3,7 +3,7 @@
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -181,6 +181,10 @@ class Stage:
         if self.cab is not None:
             with self._lock:
                 action(self.cab, time.monotonic())
+
+    def other(self, page: int, message: Mapping[str, Any]) -> bool:
+        """Take what only pages of some stages send; whether it was such a message."""
+        return False
 
     def slide(self, name: str, factor: float) -> None:
         """Move a slider: change the numbers of the shaped crane's daemon. Waits for its answer.

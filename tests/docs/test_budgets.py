@@ -36,6 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2210,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
+    "docs/export.md": 300,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
@@ -45,10 +46,11 @@ BUDGET = {
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
     "docs/safety.md": 2460,
-    "docs/sensor.md": 1170,
+    "docs/sensor.md": 1180,
     "docs/service.md": 790,
     "docs/states.md": 300,
     "docs/studio.md": 717,
+    "docs/study.md": 333,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
     "docs/troubleshooting.md": 627,
@@ -59,16 +61,16 @@ BUDGET = {
 
 # Lines of Python, and why so many.
 LINES = {
-    "canshaper/gate": (2_291, "read in a day by someone who has never seen it"),
+    "canshaper/gate": (2_098, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_673,
+        4_671,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (62_253, "a new ability takes the room of an old one"),
-    "tests": (96_583, "one level for each behaviour"),
+    "canshaper": (64_081, "a new ability takes the room of an old one"),
+    "tests": (98_304, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (337, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (350, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -31,11 +31,13 @@ NOT_PASTED = {
     "campaign.md": "hours of drives, or a cluster",
     "commission.md": "tests/commissioning/procedure/test_day.py goes its way",
     "doctor.md": "examines this PC for a minute, as root; tests/hil/test_doctor.py",
+    "export.md": "needs a compiler; tests/native/test_export.py",
     "guide.md": "tests/docs/test_guide.py goes its way in lock-step",
     "monitor.md": "a daemon, logs of a machine; tests/commissioning/monitor, tests/recording",
     "replay.md": "logs of a machine; tests/recording",
     "sensor.md": "a machine",
     "studio.md": "serves until it is stopped; tests/studio/test_playback.py opens drives",
+    "study.md": "serves until it is stopped; tests/studio/test_browser_study.py",
     "work.md": "minutes of drives; tests/campaign/test_work.py",
     "service.md": "installs the package; tests/systemd, and tools/image.sh tries the image",
 }

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from tests.faults.drive import Drive
 from tests.faults.judge import Violation
 from tests.faults.sequence import Sequence
-from tests.faults.shipped import NAMES
+from tests.faults.shipped import MADE, NAMES
 
 # Sequences after which a line says how far it is.
 PROGRESS = 500
@@ -35,7 +35,7 @@ def run_one(
 
 
 def _names(name: str | None) -> list[str | None]:
-    return list(NAMES) if name == "all" else [name]
+    return [*NAMES, *MADE] if name == "all" else [name]
 
 
 def run_many(
@@ -60,7 +60,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description=__doc__)
     parser.add_argument("seed", type=int, nargs="?", default=0, help="first seed")
     parser.add_argument("--count", type=int, default=1, help="how many seeds from there")
-    parser.add_argument("--deployment", choices=(*NAMES, "all"), help="one of config/, or all")
+    parser.add_argument(
+        "--deployment", choices=(*NAMES, *MADE, "all"), help="one of config/, or all"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--trace", action="store_true", help="print every frame and the judge")
     parser.add_argument("--stats", action="store_true", help="print what was seen")

@@ -61,7 +61,7 @@ class BenchPort:
         while waiting:
             frame, arrived_ns = waiting.popleft()
             self._bench.note(f"  in {frame} of {arrived_ns / 1e6:.2f} ms")
-            self._bench.rules.receive(frame, arrived_ns)
+            self._bench.rules.receive(frame, min(arrived_ns, self._bench.world.now_ns))
             self.arrived_ns = BEGIN_NS + arrived_ns  # by the clock of the daemon
             if (seen := self._bench.incoming(frame)) is not None:
                 yield seen

@@ -84,6 +84,7 @@ class Joystick(Input):
         self.agree: list[tuple[Switches, str]] = []  # others, by message and signal
         self.reset = self.fields[section["reset"]] if "reset" in section else None
         self.off = self.fields[section["anti_sway_off"]] if "anti_sway_off" in section else None
+        self.next_profile = self.fields.get(section.get("next_profile", ""))
         self.frozen_ns = round(section.get("stuck_s", 20.0) * 1e9)
         self.axes: list[Axis] = []
 

@@ -122,6 +122,20 @@ def _counter_stands(sequence: Sequence) -> None:
     sequence.bench.outgoing = stands
 
 
+def _checksum_wrong(sequence: Sequence) -> None:
+    """A gateway's frame leaves with another checksum, where it moves."""
+    axes = {axis.valve_key: axis for axis in sequence.machine.axes.values()}
+
+    def spoiled(frame: Frame) -> Frame:
+        if frame[:3] not in axes or not axes[frame[:3]].sent(frame.data)[0]:
+            return frame
+        at = axes[frame[:3]].joystick.checksum_byte
+        data = frame.data[:at] + bytes([frame.data[at] ^ 1]) + frame.data[at + 1 :]
+        return frame._replace(data=data)
+
+    sequence.bench.outgoing = spoiled
+
+
 LIES: dict[str, tuple[str, Callable[[Sequence], None]]] = {
     "enable forced": (JOYSTICKS, _incoming(_enabled)),
     "error code unseen": (JOYSTICKS, _incoming(_no_error)),
@@ -135,5 +149,6 @@ LIES: dict[str, tuple[str, Callable[[Sequence], None]]] = {
     "a little too fast": (JOYSTICKS, _steps(lambda _, raw: raw + (raw > 0) * 3 - (raw < 0) * 3)),
     "wrong way": (JOYSTICKS, _steps(lambda _, raw: -raw)),
     "creeps": (JOYSTICKS, _steps(lambda axis, raw: raw or round(axis.deadband * axis.steps) + 1)),
+    "checksum wrong": ("gateway-protected", _checksum_wrong),
     "never moves": (JOYSTICKS, _steps(lambda _, __: 0)),
 }

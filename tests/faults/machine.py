@@ -71,6 +71,13 @@ class Machine:
             self._motion(motion, messages)
             if aim := motion.get("aim"):
                 self.aims.add(self._sent(aim["bus"], messages[aim["message"]]))
+        self.choices = [  # messages that choose a set of filters: length, and the signal
+            (key_of(one["bus"], message, None), message.length, Field(signal))
+            for one in (data.get("load_state"), data.get("profile"))
+            for message in ([messages[one["message"]]] if one else [])
+            for signal in message.signals
+            if signal.name == one["signal"]
+        ]
         self.hydraulics: dict[str, Any] | None = data.get("hydraulics")
         limits = {name: section.get("limits", {}) for name, section in data["axes"].items()}
         self.ends = {

@@ -175,6 +175,8 @@ class Rules:
         old_ns = now_ns - self._ticked_ns
         if wrong := axes[0].count(frame, late=old_ns > self._oldest_ns):
             raise Violation(f"{axes[0].axis.name}: {wrong}")
+        if self.machine.gateway and not axes[0].axis.joystick.whole(frame.data):
+            raise Violation(f"{axes[0].axis.name}: wrong checksum")
         for one in axes:
             if wrong := one.check(frame, ticks):
                 raise Violation(f"{one.axis.name}: {wrong}")

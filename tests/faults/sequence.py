@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from tests.faults import inject
+from tests.faults import inject, later
 from tests.faults.bench import Bench, Loader
 from tests.faults.fault import Fault
 from tests.faults.judge import Violation
@@ -28,6 +28,7 @@ MOVES_WITHIN_S = 1.6
 HOLDS = ("asleep", "between reading and sending", "between two frames", "in a reload")
 
 Act = Callable[["Sequence", Fault], None]
+Trace = Callable[[str], None] | None
 
 
 def _hold(where: str) -> Act:
@@ -85,6 +86,10 @@ def _node(name: str, *arguments: Any) -> Act:
     return act
 
 
+def _moved_to(*radii: int) -> Act:
+    return lambda sequence, fault: setattr(sequence.world, "radius", fault.rng.choice(radii))
+
+
 def _none(_sequence: "Sequence", _fault: Fault) -> None:
     """Nothing: it is over by itself."""
 
@@ -107,6 +112,10 @@ ACTS: dict[str, tuple[Act, Act]] = {
     "valve leaves active": (_node("leave_active"), _none),
     "valve leaves active, short": (_node("blink"), _none),
     "status word lost": (_node("mute", True), _node("mute", False)),
+}
+LATER: dict[str, tuple[Act, Act]] = {
+    later.REFILTERED: (_reload("refiltered"), _none),
+    later.AT_ITS_END: (_moved_to(1000, 9000), _moved_to(5000)),
 }
 SENDING = "loop: valve not sent"
 LONG = {"heartbeat lost", "status word lost", "emergency"}
@@ -131,7 +140,7 @@ def kinds_for(machine: Machine) -> list[str]:
 class Sequence:
     """One sequence of faults, from a seed."""
 
-    def __init__(self, name: str, seed: int, trace: Callable[[str], None] | None = None) -> None:
+    def __init__(self, name: str, seed: int, trace: Trace = None, *, newer: bool = True) -> None:
         self.name, self.seed = name, seed
         self.shipped = shipped(name)
         self.machine = machine = self.shipped.machine
@@ -140,6 +149,9 @@ class Sequence:
         self._first = 80 if machine.nodes else 20 if machine.addresses else 3
         self.ticks = self._first + rng.randint(*(SENSOR_TICKS if machine.sensors else BODY_TICKS))
         self.faults = self._plan()
+        if newer:
+            own = random.Random(f"canshaper later kinds {name} {seed}")
+            self.faults += later.plan(machine, own, self.faults, self._first, self.ticks)
         self.world = World(machine, rng, self.ticks, self.faults, self._put)
         self.rules = Rules(machine)
         sets = any(f.kind == "set" for f in self.faults)
@@ -179,8 +191,8 @@ class Sequence:
 
     def reload(self, what: str) -> None:
         """Ask the daemon to read its file again: the same, changed, or broken."""
-        files = {"same": self._file, "changed": self.shipped.changed, "broken": None}
-        self._load.file = files[what]
+        files = {"same": self._file, "broken": None}
+        self._load.file = files[what] if what in files else getattr(self.shipped, what)
         self.bench.signal(signal.SIGHUP)
 
     # -- one run ----------------------------------------------------------------------------------
@@ -193,7 +205,7 @@ class Sequence:
         """
         tick_ns, world = self.machine.tick_ns, self.world
         for fault in self.faults:
-            if acts := ACTS.get(fault.kind):
+            if acts := (ACTS | LATER).get(fault.kind):
                 for act, tick in zip(acts, (fault.start, fault.stop), strict=True):
                     at_ns = tick * tick_ns + self.rng.randrange(tick_ns)
                     world.at(at_ns, lambda act=act, fault=fault: self._act(act, fault))

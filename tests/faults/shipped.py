@@ -1,13 +1,14 @@
 """The deployments of config/ as they are, and copies of them to reload: changed, or with more."""
 
 import functools
+import re
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 from canshaper.config.load import load_config
 from tests.faults.machine import Machine
-from tests.faults.variants import ROOT
+from tests.faults.variants import COUNTER, JOYSTICK_COUNTER, ROOT, Variant, write
 
 CONFIG = ROOT / "config"
 NAMES = (
@@ -35,6 +36,19 @@ NAMES = (
     "forwarder-pump",
     "forwarder-load",
 )
+CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
+MADE = {
+    "gateway-protected": Variant(
+        "gateway-forwarder",
+        {
+            COUNTER: f"{COUNTER}    qualify: 2\n    {CHECKSUM}\n",
+            "fallback: neutral": "fallback: stop",  # the kernel puts no checksum there
+            "alive_counter: AliveCounter }": f"alive_counter: AliveCounter, {CHECKSUM} }}",
+        },
+        {JOYSTICK_COUNTER: JOYSTICK_COUNTER + ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n'},
+    ),
+}
+"""What no shipped file has together: a gateway whose frames have checksums."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +59,7 @@ class Shipped:
         machine: what its files say.
         adjustable: the same with numbers that may be set while it runs: keys, least and most.
         changed: another one to reload, that allows no more than this one.
+        refiltered: one with other filters.
     """
 
     machine: Machine
@@ -52,6 +67,7 @@ class Shipped:
     adjustable: Path
     ranges: dict[str, tuple[float, float]]
     changed: Path
+    refiltered: Path
 
 
 @functools.cache
@@ -63,7 +79,7 @@ def directory() -> tempfile.TemporaryDirectory[str]:
 @functools.cache
 def shipped(name: str) -> Shipped:
     """A deployment by the name of its file."""
-    file = CONFIG / f"{name}.yaml"
+    file = write(name, MADE[name]) if name in MADE else CONFIG / f"{name}.yaml"
     machine = Machine(name, file)
     ranges = _ranges(machine)
     numbers = "".join(f"    {key}: [{low}, {high}]\n" for key, (low, high) in ranges.items())
@@ -71,12 +87,16 @@ def shipped(name: str) -> Shipped:
     text = file.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     assert "rise_per_s: 5," in text
     changed = text.replace("rise_per_s: 5,", "max_pct: 70, rise_per_s: 4,")
-    copies = {"adjustable": text + control, "changed": changed}
+    refiltered = re.sub(r"kind: gff, a1: [\d.]+, a2: [\d.]+", "kind: zv", text)
+    refiltered = re.sub(r"kind: off\b", "kind: first_order, time_constant_s: 0.1", refiltered)
+    copies = {"adjustable": text + control, "changed": changed, "refiltered": refiltered}
     paths = {}
     for kind, copy in copies.items():
         paths[kind] = Path(directory().name) / f"{name}-{kind}.yaml"
         paths[kind].write_text(copy, encoding="utf-8")
-    return Shipped(machine, file, paths["adjustable"], ranges, paths["changed"])
+    return Shipped(
+        machine, file, paths["adjustable"], ranges, paths["changed"], paths["refiltered"]
+    )
 
 
 def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
@@ -86,7 +106,7 @@ def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
     """
     ranges: dict[str, tuple[float, float]] = {}
     for name, axis in machine.axes.items():
-        config = load_config(CONFIG / f"{machine.name}.yaml")[0].axes[name]
+        config = load_config(machine.path)[0].axes[name]
         if config.profiles or config.gain_schedule:
             continue
         ranges[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)

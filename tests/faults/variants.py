@@ -154,17 +154,22 @@ def _directory() -> tempfile.TemporaryDirectory[str]:
 @functools.cache
 def machine(name: str) -> tuple[Machine, Deployment]:
     """A machine as its files say, and as canshaper has loaded it."""
-    variant = VARIANTS[name]
+    path = write(name, VARIANTS[name])
+    return Machine(name, path), load_deployment(path)
+
+
+def write(name: str, variant: Variant) -> Path:
+    """Write the files of a variant; return the deployment's."""
     path = Path(_directory().name) / f"{name}.yaml"
     text = (ROOT / "config" / f"{variant.file}.yaml").read_text(encoding="utf-8")
     dbc = "forwarder-joints" if variant.file == "forwarder-joints" else "forwarder"
     network = (ROOT / "dbc" / f"{dbc}.dbc").read_text(encoding="cp1252")
-    text = _replaced(text, {**variant.yaml, f"../dbc/{dbc}.dbc": f"{name}.dbc"})
+    text = _replaced(text, {**variant.yaml, f"../dbc/{dbc}.dbc": str(path.with_suffix(".dbc"))})
     text = text.replace("../dbc/", f"{ROOT}/dbc/")
     path.write_text(text, encoding="utf-8")
     network = _replaced(network, variant.dbc)
     path.with_suffix(".dbc").write_text(network, encoding="cp1252")
-    return Machine(name, path), load_deployment(path)
+    return path
 
 
 def _replaced(text: str, pieces: dict[str, str]) -> str:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 from canshaper.codec.frame import Frame
-from tests.faults import inject
+from tests.faults import inject, later
 from tests.faults.fault import Fault
 from tests.faults.hand import path
 from tests.faults.inputs import Joystick
@@ -143,21 +143,26 @@ class World:
         """A frame is on its bus."""
         self._put(frame, self.now_ns)
 
+    def _put_input(self, frame: Frame) -> None:
+        """Put a frame on its bus by whose age the daemon stops in the same tick."""
+        self._put(frame, later.stamp(self.now_ns, self.active()))
+
     def _joystick(self, joystick: Joystick) -> None:
         node = self.machine.joystick_nodes.get(joystick.name)
         if node and not self.nodes[node.number].operational:
             return
         sender = self._joysticks[joystick.name]
-        raw = sender.counted(self._hand(joystick))
-        for data in sender.passed(joystick_frames(joystick, [raw], self.active())):
-            self.put(Frame(*joystick.key, data))
+        raw = sender.counted(later.hand(joystick, self._hand(joystick), self.active()))
+        sent = joystick_frames(joystick, [raw], self.active())
+        for data in sender.passed(later.beside(joystick, sent, self.active())):
+            self._put_input(Frame(*joystick.key, data))
 
     def _switches(self, sender: Sender) -> None:
         switches = sender.source
         raw = sender.counted(dict(switches.codes))
         sent = inject.input_frames(switches, raw, self.active(), inject.SWITCHES)
         for data in sender.passed(sent):
-            self.put(Frame(*switches.key, data))
+            self._put_input(Frame(*switches.key, data))
 
     def _stop(self, sender: Sender) -> None:
         raw = sender.counted({self.machine.stop_field.name: 0})
@@ -200,9 +205,9 @@ class World:
     def _others(self) -> None:
         """What another sender sends in each tick of a fault."""
         for fault in self.active():
-            if extra := inject.EXTRA.get(fault.kind):
-                for frame in extra(fault):
-                    self.put(frame)
+            extra = inject.EXTRA.get(fault.kind, later.choices)
+            for frame in extra(fault):
+                self.put(frame)
 
     # -- what the daemon sends --------------------------------------------------------------------
 

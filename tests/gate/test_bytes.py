@@ -19,7 +19,7 @@ def test_what_was_withheld_leaves_no_gap() -> None:
     one.gate.tick(0, 0)
     assert not one.gate.leaving(one.key, b"\0\7")
     one.gate.withheld(one.key)
-    assert one.key not in one.gate.counts
+    assert one.gate.valves[one.key].count is None
     for number in (8, 9):
         one.gate.tick(number, 0)
         assert not one.gate.leaving(one.key, bytes([0, number]))
@@ -113,6 +113,13 @@ class Gateway:
         self.gate.tick(self.number * 20_000_000, 0)
 
 
+def test_only_a_frame_that_counts_is_passed_on() -> None:
+    one = Gateway()
+    data = one.receives().data
+    one.gate = Gate(record_of(one.deployment))
+    assert one.gate.leaving(one.key, data, data) == "limit=one frame a tick"
+
+
 def test_a_frame_is_made_from_one_of_its_length() -> None:
     one = Gateway()
     data = one.receives().data
@@ -133,7 +140,7 @@ def test_a_frame_of_our_own_asks_for_nothing() -> None:
         data = one.message.own(enabled=enabled).data
         assert not one.gate.leaving(one.key, data)
         one.ticks()
-    valve, _ = one.gate.valves[one.key]
+    valve = one.gate.valves[one.key].of
     data = one.message.own(enabled=False).data
     free = [bit for bit in range(64) if not valve.ours >> bit & 1]
     refused = 0

@@ -9,6 +9,7 @@ import pytest
 from canshaper.checksums.kinds import CHECKSUMS, Checksum, crc_kind
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
 from canshaper.config.inputs import Protected
+from canshaper.gate import checks
 from canshaper.gate.build import protection_of, record_of
 from canshaper.gate.checks import crc_of
 from canshaper.gate.record import Protection
@@ -112,3 +113,15 @@ def test_every_profile_is_what_is_sent(name: str) -> None:
         for at in range(24):
             assert not check.right(data[:at] + bytes([data[at] ^ 0x10]) + data[at + 1 :])
     assert name[:3] not in ("p01", "p11") or not check.right(sent.protect(data, 15))  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("nibble", [0, 1, 2])
+def test_the_nibble_of_a_data_id_is_in_the_frame(nibble: int) -> None:
+    """Whatever the CRC says: that is right for each of them."""
+    check = checks.E2e("p01", 15, 0x123, "nibble")
+    rest = bytes([nibble << 4 | 5, *range(6)])
+    assert check.right(bytes([check.crc.of(b"\x23\0" + rest)]) + rest) is (nibble == 1)
+
+
+def test_a_frame_that_is_its_checksum_only() -> None:
+    assert [checks.Checksum("xor", 0).right(bytes([one])) for one in (0, 1)] == [True, False]

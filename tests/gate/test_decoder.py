@@ -172,6 +172,14 @@ def test_a_rocker(forth: int, back: int, demand: float | None) -> None:
     assert stick_of(one, section, one).demand(word_of(data)) == pytest.approx(demand)
 
 
+@pytest.mark.parametrize(("forth", "back"), [(50, -20), (-20, 50)])
+def test_a_side_of_a_rocker_is_not_below_zero(forth: int, back: int) -> None:
+    one = message("Forth : 8|8@1- (1,0) [-100|100]", "Back : 24|8@1- (1,0) [-100|100]")
+    section = Stick(joystick="left", signal="Forth", negative="Back")
+    data = bytes([0, forth & 0xFF, 0, back & 0xFF, *bytes(4)])
+    assert stick_of(one, section, one).demand(word_of(data)) is None
+
+
 def command_steps(one: Any, data: bytes, joystick: Stick | None = None, **valve: Any) -> int | None:
     keys = {"bus": "crane", "message": "Message", "signal": "Speed", "timeout_ms": 100} | valve
     return command_of(one, Valve(**keys), joystick, one).steps(word_of(data))
@@ -198,11 +206,15 @@ def test_a_command_of_a_rocker(forth: int, back: int, steps: int | None) -> None
     assert command_steps(one, bytes([forth, 0, 0, back, *bytes(4)]), joystick) == steps
 
 
-@pytest.mark.parametrize(("also", "good"), [(75, True), (74, False), (76, False), (25, False)])
-def test_the_same_in_another_resolution(also: int, good: bool) -> None:
+@pytest.mark.parametrize(
+    ("speed", "also", "good"),
+    [(50, 75, True), (50, 74, False), (50, 76, False), (50, 25, False), (51, 74, False),
+     (51, 75, True), (51, 76, True), (51, 77, False)],
+)  # fmt: skip
+def test_the_same_in_another_resolution(speed: int, also: int, good: bool) -> None:
     one = message("Speed : 0|8@1+ (1,0) [0|100]", "Also : 8|8@1+ (2,-100) [-100|100]")
-    steps = command_steps(one, bytes([50, also, *bytes(6)]), also=["Also"])
-    assert steps == (50 if good else None)
+    steps = command_steps(one, bytes([speed, also, *bytes(6)]), also=["Also"])
+    assert steps == (speed if good else None)
 
 
 @pytest.mark.parametrize(
@@ -232,12 +244,14 @@ def test_a_velocity_is_that_behind_dead_band_or_curve(sign: int) -> None:
     curved = Limits(**points, curve_speed_pct=[-90, -40, 0, 0, 50, 100])  # type: ignore[arg-type]
     curve = curved.curve()
     assert curve is not None
+    points_of = curved.curve_command_pct, curved.curve_speed_pct
+    forth, back = openings_of(0, points_of, 100)
+    assert (forth.steps, back.steps) == ((4.0, 60.0, 100.0), (6.0, 50.0, 100.0))
     for steps in range(1, 126):
         # A command is one, however small.
         by_band = openings_of(5, (None, None), 125)[sign < 0].velocity(steps)
         expected = max(without_deadband(steps / 125, 0.05), 2e-6)
         assert by_band == pytest.approx(expected, abs=1e-12)
-        points_of = curved.curve_command_pct, curved.curve_speed_pct
         by_curve = openings_of(0, points_of, 125)[sign < 0].velocity(steps)
         expected = max(abs(curve.velocity(sign * steps / 125)), 2e-6)
         assert by_curve == pytest.approx(expected, abs=1e-12)

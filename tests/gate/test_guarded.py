@@ -193,7 +193,8 @@ def test_a_reload_goes_on_where_the_gate_was() -> None:
     before, after = wrong.guarded, Guarded(Controller(wrong.controller.deployment))
     after.carry_over(before)
     assert after._gate.axes["slew"].latched
-    assert after._gate.counts == before._gate.counts
+    counts = [[valve.count for valve in one._gate.valves.values()] for one in (before, after)]
+    assert counts[0] == counts[1] != [None] * len(counts[0])
 
 
 @pytest.mark.parametrize(

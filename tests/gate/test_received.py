@@ -125,6 +125,55 @@ def test_a_frame_that_is_not_whole_says_nothing(change: int) -> None:
     assert one.gate.joysticks[name].pressed.released
 
 
+def test_an_error_code_of_enable_stops_shaped() -> None:
+    one = bench()
+    one.ramp(60, near_far=1.0)
+    one.change = lambda frame: frame._replace(data=frame.data[:4] + b"\2" + frame.data[5:])
+    assert not one.sends(59, near_far=1.0)
+    assert (one.axis.why, one.axis.latched) == ("joystick", False)
+    assert one.axis.stop_left == one.axis.of.stop
+
+
+@pytest.mark.parametrize(("name", "why"), [("forwarder", "joystick"), ("ecu-forwarder", "enable")])
+def test_what_is_silent_at_the_start_latches_nothing(name: str, why: str) -> None:
+    one = Bench(load(name), "near_far")
+    one.gate.tick(0, 0)
+    assert (one.axis.why, one.axis.latched) == (why, False)
+
+
+def test_a_switch_is_off_until_it_says_otherwise() -> None:
+    one = Bench(load("ecu-forwarder"), "near_far")
+    one.rests()
+    assert one.axis.armed
+    (bound,) = one.deployment.switches
+    one.change = lambda frame: None if frame[:3] == bound.key else frame
+    one.gate.receive(bound.key, bound.protection.check.protect(b"\3\0\2\0", 0), one.now_ns)
+    one.rests()
+    assert (one.axis.why, one.axis.armed) == ("enable", False)
+
+
+def test_a_joystick_stops_with_the_one_whose_switch_enables_it() -> None:
+    one = Bench(load("ecu-forwarder"), "lift")
+    one.rests()
+    assert one.axis.armed
+    silent = one.deployment.joysticks["left"].key
+    one.change = lambda frame: None if frame[:3] == silent else frame
+    one.rests(10)
+    assert (one.axis.why, one.axis.armed) == ("enable", False)
+
+
+def test_what_was_never_seen_released_is_not_pressed() -> None:
+    one = bench()
+    one.gate.receive(one.key, bytes(2), 0)
+    one.gate.tick(0, 0)
+    one.number = 60  # the second sender is silent for long enough
+    one.rests(reset=True)
+    assert one.axis.latched
+    one.rests(enable=False)
+    one.rests()
+    assert one.axis.armed
+
+
 @pytest.mark.parametrize(("age_ns", "armed"), [(100 * MS, True), (100 * MS + 1, False)])
 def test_it_counts_until_its_timeout(age_ns: int, armed: bool) -> None:
     one = bench()
@@ -184,8 +233,8 @@ class TestSources:
     def test_a_command_to_us_or_to_all(self, to: int, ours: bool) -> None:
         """The message has a destination."""
         gate = Gate(record_of(load("j1939-forwarder")))
-        valve, axes = gate.valves.pop(gate.axes["slew"].of.valve)
-        gate.valves["crane", 0x0CEF2080, True] = replace(valve, group=0x03FF0000), axes
+        valve = gate.valves["crane", 0x0CEF2080, True] = gate.valves.pop(gate.axes["slew"].of.valve)
+        valve.of = replace(valve.of, group=0x03FF0000)
         gate.receive(("crane", 0x0CEF0021 | to << 8, True), bytes(8), 5)
         assert (gate.axes["slew"].foreign_ns == 5) is ours
 

@@ -14,7 +14,7 @@ from canshaper.gate import fields, rules
 from canshaper.gate.axis import Asked
 from canshaper.gate.build import record_of
 from canshaper.gate.fields import EPSILON
-from canshaper.gate.gate import Gate, _velocity
+from canshaper.gate.gate import Gate
 from canshaper.gate.record import Protection
 from canshaper.machine.binding import load_deployment
 from tests.faults.shipped import CONFIG
@@ -173,7 +173,7 @@ def test_neutral_first() -> None:
         axis.armed, axis.latched, axis.stop_left, axis.last, axis.top, axis.now = start
         axis.forth.most, axis.back.most = most_of
         axis.sent_at, axis.cause, axis.hard, axis.ramp = sent_at, cause, "", None
-        axis.joystick.press = press
+        axis.joystick.pressed.press = press
         why = "enable" if stops else ""
         given = demand if there else None
         axis.look(why, given, 1000, 1000, passed, latches=bool(latches))
@@ -247,21 +247,23 @@ BY_BITS = (
 def test_every_frame_of_a_valve(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All 2^n contents: no bit but a command's is another, and none is faster than full speed."""
     monkeypatch.setattr(fields, "int", number, raising=False)
-    for valve, axes in gate(name).valves.values():
-        bits = 8 * valve.length
+    for valve in gate(name).valves.values():
+        of, axes = valve.of, valve.axes
+        bits = 8 * of.length
         little = z3.BitVec("frame", bits + 8)  # so that no sum of an 8-bit field overflows
-        ordered = [z3.Extract(8 * n + 7, 8 * n, little) for n in range(valve.length)]
+        ordered = [z3.Extract(8 * n + 7, 8 * n, little) for n in range(of.length)]
         word = Unknown(little), Unknown(z3.Concat(z3.BitVecVal(0, 8), *ordered))
-        words = tuple((f, tuple(v)) for f, v in valve.words)
-        bare = replace(valve, protection=Protection(), words=words)
+        words = tuple((f, tuple(v)) for f, v in of.words)
+        valve.of = replace(of, protection=Protection(), words=words)
 
-        def run(valve: Any = bare, axes: Any = axes, word: Any = word, bits: int = bits) -> Any:
-            if rules.bytes_refused(valve, bytes(bits // 8), word, None, held=False):
+        def run(valve: Any = valve, axes: Any = axes, word: Any = word, bits: int = bits) -> Any:
+            if rules.bytes_refused(valve, bytes(bits // 8), word, None):
                 return True
-            claims: list[Any] = [(word[0] & valve.fixed) == valve.fixed_value]
+            claims: list[Any] = [(word[0] & valve.of.fixed) == valve.of.fixed_value]
             for axis in axes:
-                velocity = _velocity(axis, word)
-                if velocity is not None:
+                steps = axis.of.command.steps(word)
+                if steps is not None:
+                    velocity = axis.of.velocity(steps)
                     claims += [size(velocity) <= 1.0 + EPSILON]
                     claims += [either(velocity == 0.0, size(velocity) >= 2 * EPSILON)]
             return both(*claims)

@@ -44,6 +44,11 @@ def test_a_step_is_run_and_accepted(chromium: "Browser", machine: Path) -> None:
         width = tab.evaluate("document.documentElement.scrollWidth")
         assert width <= 390
         tab.locator("#pictures img").wait_for()
+        for one in tab.locator("#steps button").all():
+            one.click()
+            assert tab.locator("header a[href='/']").is_visible()
+        tab.click("header a[href='/']")
+        expect(tab.locator("#seat")).to_have_text("you drive: press enable")
         assert faults == []
         tab.close()
     finally:

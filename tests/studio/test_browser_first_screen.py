@@ -69,7 +69,10 @@ def test_the_list_of_events_stays_where_a_person_scrolled_to(
     for _ in range(4):
         page.keyboard.press("n")
         page.wait_for_timeout(200)
-    events.evaluate("(list) => { list.style.flex = 'none'; list.style.height = '60px'; }")
+    events.evaluate(
+        "(list) => { list.style.flex = 'none'; list.style.height = '60px'; list.scrollTop = 0;"
+        " list.dispatchEvent(new Event('scroll')); }"  # before anyone learns of the new size
+    )
     page.wait_for_timeout(200)
     assert events.evaluate("(list) => list.scrollTop") > 0  # it followed while it shrank
     events.evaluate("(list) => { list.scrollTop = 0; }")
@@ -102,6 +105,13 @@ def test_the_colours_of_states_are_explained(shared: Studio, tab: Callable[..., 
         " + getComputedStyle(one).backgroundImage)"
     )
     assert len(set(colours)) == 5
+
+
+def test_a_picture_that_is_drawn_coarser_says_so(shared: Studio, tab: Callable[..., Page]) -> None:
+    """The browser of the tests has no graphics card."""
+    page = tab(shared)
+    expect(page.locator("#coarse")).to_contain_text("drawn coarser: no graphics card")
+    assert page.locator("#scene").evaluate("(one) => one.width < one.clientWidth")
 
 
 def test_a_page_that_stood_still_at_rest_says_so_in_a_line(

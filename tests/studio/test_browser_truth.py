@@ -15,6 +15,10 @@ from tests.studio.conftest import Studio, command_of
 from tests.studio.proxy import Proxy
 
 STAND_STILL = "ms => { const t = performance.now(); while (performance.now() - t < ms); }"
+LOSE_WEBGL = (
+    "() => document.getElementById('scene').getContext('webgl2')"
+    ".getExtension('WEBGL_lose_context').loseContext()"
+)
 NO_WEBGL = """
 const of = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
@@ -162,6 +166,21 @@ def test_without_webgl_there_is_a_view_from_the_side_and_it_is_said(
     assert len(picture.getcolors(1 << 20) or []) > 10  # the cranes, and edges of their lines
     context.close()
     assert faults == []
+
+
+def test_a_picture_that_is_lost_is_not_shown_as_new(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    page.evaluate(LOSE_WEBGL)
+    expect(page.locator("#flat")).to_contain_text("has lost it): view from the side")
+    before = page.locator("#scene").screenshot()
+    enabled(page)
+    page.keyboard.down("w")
+    expect(state(page, 1, "near-far")).to_have_text("moving, shaped", timeout=SOON_MS)
+    page.wait_for_timeout(500)
+    page.keyboard.up("w")
+    assert page.locator("#scene").screenshot() != before
 
 
 def test_measured_sway_and_that_of_the_model_are_distinguished(

@@ -153,7 +153,9 @@ def test_the_daemon_takes_it_and_the_next_driver_has_that_of_the_file(
     with studio.page() as page:
         assert page.hello["preference"] is True
         page.drive()
-        assert list(asked("preference")) == AXES
+        page.send(settings=True)
+        assert list(page.until(lambda s: "settings" in s, "settings")["settings"]) == AXES
+        assert all("settings" not in shown for shown in page.for_s(1.0))  # said once
         before = asked("residuals")
         page.send(slide=PREFERENCE, to=1.0)
         page.until(lambda s: s["sliders"][PREFERENCE] == 1.0, "slider")

@@ -10,28 +10,10 @@ from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.studio.crane import copied
-from canshaper.studio.sliders import CALM, LENGTH, RANGES, adjustable, sliders, values
+from canshaper.studio.sliders import LENGTH, RANGES, adjustable, sliders, values
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = sorted(path.name for path in CONFIG.glob("*.yaml") if "axes:" in path.read_text())
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    """A filter that is no design: it may be stretched in time."""
-    text = (CONFIG / "forwarder.yaml").read_text().replace("../dbc", str(CONFIG.parent / "dbc"))
-    lag = "kind: first_order, time_constant_s: 0.5"
-    path = tmp_path / "lag.yaml"
-    path.write_text(text.replace("kind: gff, a1: 0.708, a2: 0.12", lag))
-    return path
-
-
-def test_calm_stretches_a_filter_that_is_no_design(file: Path) -> None:
-    offered = sliders(load_deployment(file).config)
-    keys = [f"axes.{axis}.filter.time_constant_s" for axis in ("slew", "near_far")]
-    assert values(offered, CALM, 1.0) == dict.fromkeys(keys, 0.5)
-    assert values(offered, CALM, 1.5) == dict.fromkeys(keys, 0.75)
-    assert CALM not in sliders(load_deployment(CONFIG / "forwarder.yaml").config)
 
 
 def test_length_is_that_of_the_pendulum() -> None:
@@ -79,9 +61,8 @@ def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", RANGES)
-def test_the_daemon_takes_both_ends(name: str, file: Path, tmp_path: Path) -> None:
-    (tmp_path / "copy").mkdir()
-    _, deployment = copied(file, tmp_path / "copy")
+def test_the_daemon_takes_both_ends(name: str, tmp_path: Path) -> None:
+    _, deployment = copied(CONFIG / "forwarder.yaml", tmp_path)
     adjuster = Adjuster(Controller(deployment))
     offered = sliders(deployment.config)
     for factor in (*RANGES[name], 1.0):

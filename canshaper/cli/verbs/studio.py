@@ -119,7 +119,7 @@ def studio(
     from canshaper_sim.parameters import changed_parameters
 
     # As a service manager ends it; uvicorn raises the signal again when it is done.
-    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
         parameters = changed_parameters(changes or [])
         file = sensed(file, DEFAULT, sensor)
@@ -134,7 +134,7 @@ def studio(
             )  # fmt: skip
             from canshaper.studio.playback_app import playback_app
 
-            _serve(stack, host, port, lambda access: playback_app(Path(file).name, choices, access))
+            serve(stack, host, port, lambda access: playback_app(Path(file).name, choices, access))
             return
         if others:
             raise UsageError("--with: expected with a log, a black box, --seed or --campaign")
@@ -158,7 +158,7 @@ def studio(
         def page(access: "Access") -> "ASGIApp":
             return build_app(stage, access, parameters, commission)
 
-        _serve(stack, host, port, page, stage)
+        serve(stack, host, port, page, stage)
 
 
 def _machine(
@@ -204,7 +204,7 @@ def _cranes(
     return stage
 
 
-def _serve(
+def serve(
     stack: contextlib.ExitStack,
     host: str,
     port: int,
@@ -270,5 +270,6 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
     return [Transport("socketcan", one, f"{one} (SocketCAN)") for one in channels[:2]]
 
 
-def _interrupt(_number: int, _frame: FrameType | None) -> None:
+def interrupt(_number: int, _frame: FrameType | None) -> None:
+    """End as by Ctrl-C."""
     raise KeyboardInterrupt

@@ -49,7 +49,6 @@ class Parameter:
         default: value where the key is missing.
         optional: the key may be missing, and then the constructor does not get it.
         entries: of a list: least and largest number of entries.
-        stretch: power of a factor by which the studio stretches the filter in time.
 
     Raises:
         ValueError: the default is outside of the range, or there is no range.
@@ -64,7 +63,6 @@ class Parameter:
     default: float | None = None
     optional: bool = False
     entries: tuple[int, int] | None = None
-    stretch: float = 0.0
 
     def __post_init__(self) -> None:
         value = self.low if self.default is None else self.default

@@ -82,7 +82,7 @@ KINDS = (
         "A first-order lag.",
         FirstOrder,
         lambda mode, _tick_s: {"first order": {"time_constant_s": 0.3 * mode.period_s}},
-        (Parameter("time_constant_s", 0.01, 5, "s", "time to 63 % of a step", stretch=1.0),),
+        (Parameter("time_constant_s", 0.01, 5, "s", "time to 63 % of a step"),),
     ),
     ShaperKind(
         "s_curve",

@@ -9,6 +9,7 @@ const BUTTONS = [
   { number: 1, name: "B", action: "release" },
   { number: 2, name: "X", action: "antisway" },
   { number: 3, name: "Y", action: "profile" },
+  { number: 5, name: "RB", action: "grip" },
   { number: 9, name: "Start", action: "reset" },
 ];
 const DEAD = 0.1;
@@ -21,6 +22,7 @@ export class Gamepad {
     this.id = null;
     this.down = [];
     this.on = {}; // what to do, by action
+    this.lost = () => {}; // what to do when it is unplugged
     host.hidden = true;
   }
 
@@ -39,6 +41,7 @@ export class Gamepad {
 
   /** Show the layout of another one, or none. */
   connected(pad) {
+    if (this.id !== null && !pad) this.lost();
     this.down = [];
     this.id = pad ? pad.id ?? "" : null;
     this.host.hidden = !pad;

@@ -5,6 +5,7 @@ import { Numbers } from "/static/numbers.js";
 import { Panel } from "/static/panel.js";
 import { Shell } from "/static/shell.js";
 import { Joysticks } from "/static/joysticks.js";
+import { Study } from "/static/study.js";
 
 const READ_MS = 20;
 const SLIDE_MS = 100;
@@ -14,7 +15,7 @@ const TOLD_MS = 4000; // so long a hiccup is shown
 const byId = (id) => document.getElementById(id);
 
 const shell = new Shell();
-let hello, panel, numbers, joysticks, shown, link;
+let hello, panel, numbers, joysticks, shown, link, study;
 let inForce = null; // numbers of a machine that may be changed
 let taken = false; // whether this page has asked for the joysticks on this connection
 let before = null; // its number on the connection before, where it drove
@@ -35,6 +36,7 @@ function begin(found) {
   byId("hands").hidden = !hello.drives;
   byId("profile").hidden = !hello.profiles;
   taken = false;
+  if (hello.preference) link.send({ settings: true }); // they come when they are computed
   if (same) {
     byId("events").replaceChildren(); // all of them come again
     shell.charts.events = [];
@@ -49,6 +51,7 @@ function begin(found) {
     reset: actions.KeyX,
     ...(hello.profiles ? { profile: actions.KeyP } : {}),
   };
+  if (hello.study) study = new Study(hello, shell, (message) => link.send(message), actions, joysticks.gamepad);
   if (hello.numbers) numbers = new Numbers(byId("numbers"), (message) => link.send(message));
   if (first) shell.begin(hello);
   else location.reload(); // another machine: other cranes
@@ -74,8 +77,9 @@ function show(message) {
   shell.residual.follow([message.sliders, inForce]);
   if (message.numbers) numbers.show(message.numbers);
   if (message.difference) numbers.ask(message.difference);
+  study?.show(message, mine);
   fresh();
-  byId("hint").hidden = !mine || message.enable;
+  byId("hint").hidden = !mine || message.enable || Boolean(hello.study?.can);
   byId("language").disabled = mine && message.enable; // another one loads the page again
   if (!hello.drives) return;
   byId("seat").hidden = false;

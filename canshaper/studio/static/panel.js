@@ -6,7 +6,6 @@ const MOST_EVENTS = 300;
 const OLD_S = 0.5;
 const SHOW_MS = 150; // no one reads faster
 const FILE = -1; // position of the slider of settings at which they are those of the file
-const ASK_MS = 1000; // for settings of the filters, which take seconds
 const URGENT = ["bad", "stop", "wait", "move", "ready"]; // levels of states, the first is said first
 
 const make = (tag, attributes = {}, ...children) => {
@@ -26,11 +25,7 @@ const set = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
 };
 
-/** A number of the file with its unit; those of a filter have their names there. */
-function numberText(name, value) {
-  const words = text(`slider.number.${name}`, { value });
-  return words.startsWith("slider.") ? `${name.replace(/_(s|m|rad_s)$/, "")} ${value}` : words;
-}
+const sizeOf = (list) => `${list.scrollHeight} ${list.clientHeight}`;
 
 export class Panel {
   constructor(hello, slide) {
@@ -68,7 +63,10 @@ export class Panel {
     list.replaceChildren();
     // The newest event stays in sight, also where the list gets another size, until a person scrolls up.
     this.follows = true;
-    list.onscroll = () => { this.follows = list.scrollHeight - list.scrollTop - list.clientHeight < 30; };
+    list.onscroll = () => {
+      if (sizeOf(list) !== this.size) this.follow(); // it was laid out anew, no person has scrolled
+      else this.follows = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
+    };
     this.sized?.disconnect();
     this.sized = new ResizeObserver(() => this.follow());
     this.sized.observe(list);
@@ -77,6 +75,7 @@ export class Panel {
   follow() {
     const list = document.getElementById("events");
     if (this.follows) list.scrollTop = list.scrollHeight;
+    this.size = sizeOf(list);
   }
 
   buildSliders(slide) {
@@ -96,7 +95,7 @@ export class Panel {
         const byAxis = {};
         for (const [key, v, p] of numbers) {
           const [, axis, , number] = key.split(".");
-          (byAxis[nameOf("axis", axis)] ??= []).push(numberText(number, (v * f ** p).toPrecision(3)));
+          (byAxis[nameOf("axis", axis)] ??= []).push(text(`slider.number.${number}`, { value: (v * f ** p).toPrecision(3) }));
         }
         set(found, Object.entries(byAxis).map(([axis, all]) => `${axis} ${all.join(" ")}`).join(" · "));
       };
@@ -129,13 +128,7 @@ export class Panel {
     const found = make("span", { className: "numbers" }, text("preference.wait"));
     const back = make("button", { className: "back", title: text("slider.back"), disabled: true, onclick: () => slide("preference", FILE) }, text("preference.file"));
     back.setAttribute("aria-label", `${title}: ${text("preference.file")}`);
-    const one = { input, back, at: FILE, load: async () => {
-      while (!one.settings) {
-        one.settings = await fetch("/preference.json").then((answer) => answer.json()).catch(() => null);
-        if (!one.settings) await new Promise((done) => setTimeout(done, ASK_MS));
-      }
-      one.words(one.at);
-    }, words: (at) => {
+    const one = { input, back, at: FILE, words: (at) => {
       set(value, at === FILE ? text("preference.file") : at.toFixed(1));
       set(found, Object.entries(one.settings ?? {}).map(([axis, { file, choose }]) => {
         const setting = at === FILE || !choose.length ? file : choose[Math.round(at * (choose.length - 1))];
@@ -150,7 +143,6 @@ export class Panel {
     input.addEventListener("change", () => slide("preference", Number(input.value)));
     host.append(make("div", { className: "slider" }, back, make("label", { htmlFor: input.id }, `${title} `, value), input,
       make("div", { className: "ends" }, make("span", {}, text("slider.preference.low")), found, make("span", {}, text("slider.preference.high")))));
-    one.load().catch(() => set(found, ""));
     return one;
   }
 
@@ -166,6 +158,10 @@ export class Panel {
 
   show(shown, mine, soon = false) {
     const now = performance.now();
+    if (shown.settings && this.preference) {
+      this.preference.settings = shown.settings;
+      this.preference.words(this.preference.at);
+    }
     if (now - this.shownAt < SHOW_MS && mine === this.mine && !soon) return;
     this.shownAt = now;
     this.mine = mine;

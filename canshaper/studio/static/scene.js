@@ -21,14 +21,14 @@ export class Scene {
     this.overlay = false;
     this.shown = [];
     this.offset = null;
-    const software = drawnBySoftware();
+    this.software = drawnBySoftware();
     this.finest = Math.min(window.devicePixelRatio, 2);
     const few = Math.sqrt(SOFTWARE_POINTS / Math.max(1, canvas.clientWidth * canvas.clientHeight));
-    this.coarsest = software ? Math.min(0.5, few) : 0.75;
-    this.sharpness = software ? Math.min(this.finest, few) : this.finest;
+    this.coarsest = this.software ? Math.min(0.5, few) : 0.75;
+    this.sharpness = this.software ? Math.min(this.finest, few) : this.finest;
     this.cost = 16;
     this.judged = 0;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.software, powerPreference: "high-performance" });
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(FIELD_DEG, 1, 0.1, 120);
     // Two stand side by side; of more the eye is farther away.
@@ -60,6 +60,11 @@ export class Scene {
     });
     this.paint();
     this.place();
+  }
+
+  /** Whether less is drawn than the screen could show. */
+  get coarse() {
+    return this.software || this.sharpness < this.finest;
   }
 
   /** Take the colours of the theme. */

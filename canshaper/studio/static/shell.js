@@ -41,6 +41,8 @@ export class Shell {
     this.scene?.dispose();
     try {
       this.scene = new Scene(byId("scene"), hello);
+      // Else the last picture would stand there as if it were new.
+      byId("scene").addEventListener("webglcontextlost", () => this.flat(text("page.lostwebgl")), { once: true });
     } catch (error) {
       this.flat(error.message);
     }
@@ -84,6 +86,7 @@ export class Shell {
   draw(now) {
     if (this.other === "plan") this.plan.draw(now);
     else if (this.other === null) this.scene?.draw(now);
+    byId("coarse").hidden = !this.scene?.coarse;
     this.charts.draw(now);
   }
 

@@ -1,0 +1,182 @@
+/* The controller: frames in, frames out, without a bus and without a clock. */
+#include <string.h>
+
+#include "cs_internal.h"
+
+/* A late tick weighs five, a punctual one takes one away; at the limit it is an overrun, to 0. */
+#define LATE_WEIGHT 5
+#define LATE_LIMIT 50
+/* So long another sender has to be silent before a trip for it can be reset. */
+#define FOREIGN_NS 1000000000
+
+void cs_init(cs_controller *s, const cs_config *c)
+{
+    (void)memset(s, 0, sizeof(*s));
+    for (int32_t i = 0; i < c->joysticks_n; i++) { cs_joystick_init(&s->joystick[i], &c->joystick[i]); }
+    for (int32_t i = 0; i < c->valves_n; i++) { (void)memcpy(s->valve[i].data, c->valve[i].start, CS_BYTES); }
+    for (int32_t i = 0; i < c->axes_n; i++) { cs_axis_init(&s->axis[i], &c->axis[i]); }
+    for (int32_t i = 0; i < c->motions_n; i++) {
+        cs_message_init(&s->motion[i].message);
+        s->motion[i].weight = 1;
+        s->motion[i].measured_ns = CS_NEVER;
+    }
+    s->last = -1;
+}
+
+/* A frame with the id of a valve came from someone else: its axes trip. */
+static void foreign_sender(cs_controller *s, const cs_config *c, int32_t valve, int64_t now_ns)
+{
+    for (int32_t i = 0; i < c->axes_n; i++) {
+        if (c->axis[i].valve == valve) {
+            if (s->axis[i].trip == CS_NONE) { s->axis[i].trip = CS_SECOND_SENDER; }
+            s->axis[i].foreign_ns = now_ns;
+        }
+    }
+}
+
+void cs_receive(cs_controller *s, const cs_config *c, int32_t bus, uint32_t id, bool extended, const uint8_t *data,
+                int32_t length, int64_t arrived_ns)
+{
+    for (int32_t i = 0; i < c->joysticks_n; i++) {
+        if (cs_message_is(&c->joystick[i].message, bus, id, extended, length)) {
+            cs_joystick_receive(&s->joystick[i], &c->joystick[i], data, arrived_ns);
+        }
+    }
+    for (int32_t i = 0; i < c->motions_n; i++) {
+        if (c->motion[i].measured && cs_message_is(&c->motion[i].message, bus, id, extended, length)) {
+            cs_radius_receive(&s->motion[i], &c->motion[i], data, arrived_ns);
+        }
+    }
+    for (int32_t i = 0; i < c->valves_n; i++) {
+        const cs_valve_config *v = &c->valve[i];
+        if ((v->bus == bus) && (v->id == id) && (v->extended == extended)) { foreign_sender(s, c, i, arrived_ns); }
+    }
+}
+
+static void trip_in_motion(cs_axis *a, int32_t reason)
+{
+    if (cs_moves(a->state)) { a->trip = reason; }
+}
+
+void cs_send_failed(cs_controller *s, const cs_config *c, int32_t valve)
+{
+    for (int32_t i = 0; i < c->axes_n; i++) {
+        if (c->axis[i].valve == valve) { trip_in_motion(&s->axis[i], CS_SEND_FAILED); }
+    }
+}
+
+void cs_stalled(cs_controller *s, const cs_config *c)
+{
+    s->stood_still = true;
+    for (int32_t i = 0; i < c->axes_n; i++) {
+        s->axis[i].invalid = true;
+        trip_in_motion(&s->axis[i], CS_LOOP_STALLED);
+    }
+}
+
+/* What has come does not count any more; the frames that waited during a standstill neither. */
+static void invalidate(cs_message *m)
+{
+    m->last_frame_ns = CS_NEVER;
+    m->received_ns = CS_NEVER;
+}
+
+static void invalidate_all(cs_controller *s, const cs_config *c)
+{
+    for (int32_t i = 0; i < c->joysticks_n; i++) { invalidate(&s->joystick[i].message); }
+    for (int32_t i = 0; i < c->motions_n; i++) {
+        invalidate(&s->motion[i].message);
+        s->motion[i].measured_ns = CS_NEVER;
+    }
+}
+
+/* Count late ticks against punctual ones; whether too many were late. */
+static bool overrun(cs_controller *s, bool late)
+{
+    int32_t most = ((s->late + LATE_WEIGHT) > LATE_LIMIT) ? LATE_LIMIT : (s->late + LATE_WEIGHT);
+    int32_t least = (s->late > 0) ? (s->late - 1) : 0;
+    s->late = late ? most : least;
+    s->overrun = (s->overrun || (s->late == LATE_LIMIT)) && (s->late > 0);
+    return s->overrun;
+}
+
+/* The input of an axis, with what objects to it. */
+static cs_input input_of(cs_controller *s, const cs_config *c, int32_t axis, int64_t now_ns, bool late)
+{
+    const cs_axis_config *ac = &c->axis[axis];
+    cs_axis *a = &s->axis[axis];
+    const cs_joystick *j = &s->joystick[ac->joystick];
+    cs_input in = cs_joystick_command(j, &c->joystick[ac->joystick], ac, now_ns, a->releases);
+    a->releases = j->releases;
+    if (a->foreign_ns != CS_NEVER) {
+        if (!cs_fresh(a->foreign_ns, now_ns, FOREIGN_NS)) { a->foreign_ns = CS_NEVER; }
+        else if (a->trip == CS_NONE) { a->trip = CS_SECOND_SENDER; }
+        else { /* an earlier cause */ }
+    }
+    in.trip = a->trip;
+    a->trip = CS_NONE;
+    if (a->invalid) {
+        a->invalid = false;
+        if (in.enabled || !cs_moves(a->state)) { /* a release is more than a fault */
+            in.fault = CS_JOYSTICK_TIMEOUT;
+            in.enabled = true;
+            in.bypass = false;
+        }
+    }
+    /* late ticks spoil a filter; in bypass there is none, and the driver keeps the axis */
+    if (late && (a->state != CS_BYPASS_ON) && in.enabled && (in.fault == CS_NONE)) {
+        in.fault = CS_LOOP_OVERRUN;
+        in.bypass = false;
+    }
+    return in;
+}
+
+/* Run an axis that is due; whether it has given a frame. */
+static bool run(cs_controller *s, const cs_config *c, int32_t axis, int64_t now_ns, bool late, cs_frame *out)
+{
+    const cs_axis_config *ac = &c->axis[axis];
+    const cs_valve_config *vc = &c->valve[ac->valve];
+    cs_axis *a = &s->axis[axis];
+    cs_valve *v = &s->valve[ac->valve];
+    cs_input in = input_of(s, c, axis, now_ns, late);
+    int32_t old = a->state;
+    cs_axis_act(a, ac, &in);
+    cs_field_write(&ac->setpoint, v->data, (int64_t)ac->zero + ((int64_t)ac->sign * a->out.steps));
+    if (ac->sends) { /* the last axis of its valve's message */
+        if (vc->counts > 0) {
+            v->count = (v->count + 1) % vc->counts;
+            cs_field_write(&vc->counter, v->data, v->count);
+        }
+        *out = (cs_frame){vc->id, vc->bus, vc->length, vc->extended, {0}};
+        (void)memcpy(out->data, v->data, CS_BYTES);
+    }
+    cs_axis_advance(a, ac);
+    if ((a->state == CS_TRIPPED) && (old != CS_TRIPPED)) { cs_motion_tripped(s, c, axis); }
+    return ac->sends;
+}
+
+int32_t cs_tick(cs_controller *s, const cs_config *c, int64_t now_ns, int32_t missed, cs_frame *out)
+{
+    int64_t last = s->last;
+    int64_t now = (last + 1) + ((missed > 0) ? missed : 0);
+    int32_t frames = 0;
+    s->last = now;
+    if (s->stood_still) {
+        s->stood_still = false;
+        invalidate_all(s, c);
+    }
+    bool late = overrun(s, missed > 0);
+    for (int32_t i = 0; (i < c->axes_n) && (missed > 0); i++) {
+        int32_t period = c->axis[i].period_ticks;
+        int64_t passed = cs_periods(now, period) - cs_periods(last, period);
+        if (passed > 1) { cs_axis_hold(&s->axis[i], &c->axis[i], (int32_t)(passed - 1)); }
+    }
+    for (int32_t i = 0; i < c->motions_n; i++) { cs_motion_step(s, c, i, now_ns, last, now); }
+    for (int32_t i = 0; i < c->axes_n; i++) {
+        int32_t period = c->axis[i].period_ticks;
+        if (cs_periods(now, period) != cs_periods(last, period)) {
+            if (run(s, c, i, now_ns, late, &out[frames])) { frames++; }
+        }
+    }
+    return frames;
+}

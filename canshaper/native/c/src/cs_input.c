@@ -1,0 +1,184 @@
+/* Fields of frames; messages that are received, their sequence and age; joysticks, and a measured radius. */
+#include "cs_internal.h"
+
+/* -- fields */
+
+static int32_t next_bit(const cs_field *f, int32_t bit)
+{
+    int32_t motorola = ((bit % 8) == 0) ? (bit + 15) : (bit - 1); /* down in a byte, then the highest of the next one */
+    return f->motorola ? motorola : (bit + 1);
+}
+
+/* Raw value of a field of up to 32 bits; 0 where there is none. */
+static int64_t field_read(const cs_field *f, const uint8_t *data)
+{
+    int64_t value = 0;
+    int64_t weight = 1;
+    int32_t bit = f->start;
+    for (int32_t i = 0; i < f->length; i++) {
+        int64_t one = ((data[bit / 8] & (1u << (uint32_t)(bit % 8))) != 0u) ? 1 : 0;
+        value = f->motorola ? ((value * 2) + one) : (value + (weight * one));
+        weight *= 2;
+        bit = next_bit(f, bit);
+    }
+    return (f->is_signed && (value >= (weight / 2))) ? (value - weight) : value;
+}
+
+void cs_field_write(const cs_field *f, uint8_t *data, int64_t value)
+{
+    uint32_t raw = (uint32_t)((uint64_t)value & 0xFFFFFFFFu);
+    int32_t bit = f->start;
+    for (int32_t i = 0; i < f->length; i++) {
+        uint32_t from = (uint32_t)(f->motorola ? ((f->length - 1) - i) : i);
+        uint32_t mask = 1u << (uint32_t)(bit % 8);
+        uint32_t byte = data[bit / 8];
+        byte = (((raw >> from) & 1u) != 0u) ? (byte | mask) : (byte & ~mask);
+        data[bit / 8] = (uint8_t)(byte & 0xFFu);
+        bit = next_bit(f, bit);
+    }
+}
+
+/* -- messages */
+
+bool cs_fresh(int64_t since_ns, int64_t now_ns, int64_t timeout_ns)
+{
+    return (since_ns != CS_NEVER) && ((now_ns - since_ns) <= timeout_ns);
+}
+
+void cs_message_init(cs_message *m) { *m = (cs_message){CS_NEVER, CS_NEVER, CS_NEVER, CS_NONE, 0, true, false}; }
+
+bool cs_message_is(const cs_message_config *c, int32_t bus, uint32_t id, bool extended, int32_t length)
+{
+    return (c->bus == bus) && (c->id == id) && (c->extended == extended) && (c->length == length);
+}
+
+/* Begin the count of good frames again. */
+static void requalify(cs_message *m)
+{
+    m->good = 0;
+    m->qualified = false;
+}
+
+/* Whether the counter of a frame follows the last one; after silence any other one does. */
+static bool in_sequence(cs_message *m, const cs_message_config *c, const uint8_t *data)
+{
+    int32_t count = (int32_t)field_read(&c->counter, data);
+    int32_t step = (m->last == CS_NONE) ? 1 : (((count - m->last) + c->counts) % c->counts);
+    bool jump = (step > c->max_step) && !m->resynced;
+    bool ok = (step != 0) && !jump; /* repeated: no news */
+    m->last = count;
+    if (jump) { requalify(m); }
+    if (ok) { m->resynced = false; }
+    return ok;
+}
+
+/* Take a frame of the right length; whether it may be used. */
+static bool accepts(cs_message *m, const cs_message_config *c, const uint8_t *data, int64_t now_ns)
+{
+    if (!cs_fresh(m->last_frame_ns, now_ns, c->timeout_ns)) {
+        m->resynced = true;
+        requalify(m);
+    }
+    bool ok = (c->counts == 0) || in_sequence(m, c, data);
+    if (ok && !m->qualified) {
+        m->good++;
+        m->qualified = m->good >= c->qualify;
+    }
+    ok = ok && m->qualified;
+    m->last_frame_ns = now_ns;
+    if (ok) { m->received_ns = now_ns; }
+    else { m->refused_ns = now_ns; }
+    return ok;
+}
+
+/* Value of a number; why it is no measurement, or CS_NONE. */
+static int32_t number_read(const cs_number_config *c, const uint8_t *data, cs_real *value)
+{
+    int64_t code = field_read(&c->field, data);
+    int32_t why = CS_NONE;
+    for (int32_t i = 0; i < c->codes_n; i++) {
+        if (code == c->codes[i].code) { why = c->codes[i].reason; }
+    }
+    *value = ((CS_R(code) * c->scale) + c->offset) / c->full;
+    if ((why == CS_NONE) && !((c->low <= *value) && (*value <= c->high))) { why = CS_JOYSTICK_OUT_OF_RANGE; }
+    return why;
+}
+
+/* Take a frame with the measured radius. */
+void cs_radius_receive(cs_motion *m, const cs_motion_config *c, const uint8_t *data, int64_t now_ns)
+{
+    cs_real value;
+    int32_t why = number_read(&c->radius, data, &value);
+    if (accepts(&m->message, &c->message, data, now_ns) && (why == CS_NONE)) {
+        m->value = value;
+        m->measured_ns = now_ns;
+    }
+}
+
+/* -- joysticks */
+
+void cs_joystick_init(cs_joystick *j, const cs_joystick_config *c)
+{
+    cs_message_init(&j->message);
+    for (int32_t i = 0; i < c->numbers_n; i++) { j->why[i] = CS_JOYSTICK_TIMEOUT; } /* no frame says that */
+}
+
+static void take_numbers(cs_joystick *j, const cs_joystick_config *c, const uint8_t *data, int64_t now_ns)
+{
+    for (int32_t i = 0; i < c->numbers_n; i++) {
+        cs_real value;
+        int32_t why = number_read(&c->number[i], data, &value);
+        value = (why == CS_NONE) ? cs_max(cs_min(value, 1), -1) : CS_R(0); /* full scale may be rounded */
+        if ((why != j->why[i]) || (value != j->value[i])) { j->changed_ns[i] = now_ns; }
+        j->why[i] = why;
+        j->value[i] = value;
+    }
+}
+
+/* Take a frame. Any frame can show a released enable, only an accepted one ends it. */
+void cs_joystick_receive(cs_joystick *j, const cs_joystick_config *c, const uint8_t *data, int64_t now_ns)
+{
+    bool accepted = accepts(&j->message, &c->message, data, now_ns);
+    int32_t enable = (int32_t)field_read(&c->enable, data);
+    if (enable == 0) {
+        j->releases++;
+        j->released = true;
+        if (!accepted) { j->doubted = j->releases; }
+    }
+    if (accepted) {
+        j->released = enable == 0;
+        j->enable = enable;
+        j->reset = (int32_t)field_read(&c->reset, data);
+        j->off = (int32_t)field_read(&c->off, data);
+        take_numbers(j, c, data, now_ns);
+    }
+}
+
+/* Input of the axis that one of its numbers drives. A release since the last tick of the axis counts when it is read,
+   however short it was. */
+cs_input cs_joystick_command(const cs_joystick *j, const cs_joystick_config *c, const cs_axis_config *axis,
+                             int64_t now_ns, int64_t releases)
+{
+    cs_input in = {0, j->why[axis->number], CS_NONE, true, false, j->reset == 1};
+    bool more = j->releases > releases;
+    bool released = j->released || more;
+    if (!cs_fresh(j->message.received_ns, now_ns, c->message.timeout_ns)) {
+        /* seen released is more than lost; a switch that is held was not pressed */
+        bool untrusted = cs_fresh(j->message.refused_ns, now_ns, c->message.timeout_ns);
+        in.fault = untrusted ? CS_JOYSTICK_UNTRUSTED : CS_JOYSTICK_TIMEOUT;
+        in.enabled = !(more || (j->released && untrusted));
+        in.reset = true;
+    } else {
+        bool moved = CS_ABS(j->value[axis->number]) > axis->neutral_band;
+        bool frozen = moved && !cs_fresh(j->changed_ns[axis->number], now_ns, c->frozen_ns);
+        bool doubted = (j->enable != 0) && (j->released || (j->doubted > releases));
+        if (released) { in.fault = doubted ? CS_JOYSTICK_UNTRUSTED : in.fault; } /* that moves nothing, and is no press */
+        else if (in.fault != CS_NONE) { /* no measurement */ }
+        else if (j->enable != 1) { in.fault = CS_SWITCH_INVALID; }
+        else if (frozen) { in.fault = CS_JOYSTICK_FROZEN; }
+        else { in.bypass = j->off == 1; }
+        in.command = (in.fault == CS_NONE) ? j->value[axis->number] : CS_R(0);
+        in.enabled = !released;
+    }
+    return in;
+}

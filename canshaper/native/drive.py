@@ -1,0 +1,198 @@
+"""A random drive of any deployment: joystick frames, most of them good, some wrong in every way.
+
+It needs no simulated crane. The same seed gives the same drive.
+"""
+
+import random
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from canshaper.codec.frame import Frame
+from canshaper.codec.velocity import VelocitySignal
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.protocols.interface import MessageKey
+
+# A thousandth of a tick: a frame is read a little later than it arrives.
+READ_NS = 1_000
+BEGIN_NS = 1_000_000_000
+
+
+@dataclass
+class Tick:
+    """One tick of a drive: what has come since the one before.
+
+    Attributes:
+        now_ns: its time.
+        missed: ticks that were left out before it.
+        frames: what arrived, in order, each ``READ_NS`` before the tick.
+        stalled: the loop stood still before it.
+        failed: frame of a valve that did not leave in the tick before, or None.
+    """
+
+    now_ns: int
+    missed: int
+    frames: list[Frame]
+    stalled: bool = False
+    failed: Frame | None = None
+
+
+@dataclass
+class _Hand:
+    """An operator's hand on one joystick, and what its sender is at."""
+
+    wanted: dict[str, float]
+    held: dict[str, float] = field(default_factory=dict)
+    silent: int = 0  # messages that are still left out
+    resting: int = 0  # ticks in neutral after a tap
+    count: int = 0
+    enable: int = 1
+    reset: int = 0
+    off: int = 0
+
+
+class Driven(Protocol):
+    """A controller, in whatever language."""
+
+    def stalled(self) -> None:
+        """Take note that the loop stood still."""
+
+    def send_failed(self, frame: Frame, /) -> None:
+        """Take note that a frame of a valve did not leave."""
+
+    def receive(self, frame: Frame, now_ns: int, /) -> object:
+        """Take a frame that was received."""
+
+    def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]:
+        """Return the frames to send now."""
+
+
+def play(tick: Tick, controller: Driven) -> list[Frame]:
+    """Give a tick of a drive to a controller, and return the frames that leave."""
+    if tick.stalled:
+        controller.stalled()
+    if tick.failed is not None:
+        controller.send_failed(tick.failed)
+    for frame in tick.frames:
+        controller.receive(frame, tick.now_ns - READ_NS)
+    return list(controller.tick(tick.now_ns, tick.missed))
+
+
+def valve_keys(deployment: Deployment) -> list[MessageKey]:
+    """Bus and id of each valve message, in the order of their axes."""
+    return list(dict.fromkeys(axis.valve.message.key for axis in deployment.axes.values()))
+
+
+def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick]:
+    """Yield the ticks of a drive.
+
+    Args:
+        deployment: the machine.
+        seed: of the drive.
+        ticks: how many.
+    """
+    source = random.Random(seed)
+    tick_ns = deployment.config.tick_ms * 1_000_000
+    hands = {
+        name: _Hand(dict.fromkeys((one.name for one in bound.velocities), 0.0))
+        for name, bound in deployment.joysticks.items()
+    }
+    radii = [one.radius for one in deployment.motions.values() if one.radius]
+    middles = {
+        one.key: 0.5 * ((one.signal.minimum or 0) + (one.signal.maximum or 0)) for one in radii
+    }
+    valves = valve_keys(deployment)
+    now_ns, late = BEGIN_NS, 0
+    for _ in range(ticks):
+        late = 60 if source.random() < 0.001 else max(late - 1, 0)
+        missed = source.choice((0, 0, 1, 2) if late else (0,) * 300 + (1, 2, 5))
+        now_ns += tick_ns * (1 + missed)
+        frames = []
+        for name, bound in deployment.joysticks.items():
+            frames += _joystick_frames(source, bound, hands[name])
+        for radius in radii:
+            if source.random() < 0.97:
+                middles[radius.key] += source.uniform(-0.01, 0.01)
+                code = round((middles[radius.key] - radius.signal.offset) / radius.signal.scale)
+                if source.random() < 0.003:
+                    code = source.getrandbits(radius.signal.length - 1)
+                frames.append(_frame(radius, {radius.signal.name: code}))
+        frames += _strange_frames(source, deployment)
+        source.shuffle(frames)
+        failed = Frame(*source.choice(valves), b"") if source.random() < 0.0003 else None
+        yield Tick(now_ns, missed, frames, source.random() < 0.0002, failed)
+
+
+def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -> list[Frame]:
+    """Frames of one joystick in a tick: one, none or two."""
+    config = bound.config
+    if hand.silent > 0:
+        hand.silent -= 1
+        return []
+    hand.count += 1
+    if source.random() < 0.001:  # what the switches do meanwhile is not seen
+        hand.silent, hand.enable = source.randint(1, 15), source.choice((0, 1, 1))
+        hand.count += source.randint(0, 9)
+        return []
+    _move(source, hand)
+    if source.random() < 0.003:
+        hand.count += source.choice((-1, 1, 2, 3, 7, 100))
+        hand.enable = source.choice((0, 1, 1, 1))
+    if source.random() < 0.002:
+        hand.enable = source.choice((0, 1, 1, 2, 3))
+    elif hand.enable != 1 and source.random() < 0.1:
+        hand.enable = 1
+    hand.off ^= source.random() < 0.003
+    hand.reset ^= source.random() < 0.01
+    raw: dict[str, Any] = {}
+    for one in bound.velocities:
+        assert isinstance(one, VelocitySignal)  # no other one is exported
+        signal = bound.message.get_signal_by_name(one.name)
+        raw[one.name] = round((hand.held[one.name] * one.full - one.offset) / one.scale)
+        if source.random() < 0.001:
+            low = -(1 << (signal.length - 1)) if signal.is_signed else 0
+            any_code = source.randint(low, low + (1 << signal.length) - 1)
+            raw[one.name] = source.choice((low, any_code, *list(one.special)[:2]))
+    raw |= {config.reset: hand.reset} if config.reset else {}
+    raw |= {config.anti_sway_off: hand.off} if config.anti_sway_off else {}
+    raw |= {bound.enable: hand.enable} if bound.enable else {}
+    if bound.protection.counter:
+        raw[bound.protection.counter] = hand.count % bound.protection.counts
+    frame = _frame(bound, raw)
+    if source.random() < 0.002:
+        frame = frame._replace(data=frame.data[: source.randint(0, 7)])
+    return [frame] * (2 if source.random() < 0.002 else 1)
+
+
+def _move(source: random.Random, hand: _Hand) -> None:
+    """Move a joystick as an operator does: strokes, taps with a pause behind them, a jerk."""
+    hand.resting = max(0, hand.resting - 1)
+    if source.random() < 0.004:
+        hand.resting = source.randint(20, 150)
+    for name, wanted in hand.wanted.items():
+        if not hand.resting and source.random() < 0.03:
+            some = source.choice((source.uniform(-1.0, 1.0), source.uniform(-0.1, 0.1)))
+            hand.wanted[name] = source.choice((0.0, 0.0, 1.0, -1.0, some, some))
+        elif hand.resting:
+            tap = source.random() < 0.02
+            hand.wanted[name] = source.uniform(-0.5, 0.5) if tap else 0.0
+        before = hand.held.get(name, 0.0)
+        hand.held[name] = before + max(-0.2, min(0.2, wanted - before))
+
+
+def _frame(bound: BoundInput, raw: dict[str, Any]) -> Frame:
+    """A frame of a message; signals that are not given are 0."""
+    whole = dict.fromkeys((signal.name for signal in bound.message.signals), 0)
+    return Frame(*bound.key, bound.layout.encode(whole | raw))
+
+
+def _strange_frames(source: random.Random, deployment: Deployment) -> list[Frame]:
+    """Frames that no one knows; and seldom one with the id of a valve."""
+    frames, bus = [], next(iter(deployment.config.buses))
+    if source.random() < 0.01:
+        frames.append(Frame(bus, source.randint(0x500, 0x6FF), False, source.randbytes(8)))
+    if source.random() < 0.0005:
+        axis = source.choice([*deployment.axes.values()])
+        frames.append(Frame(*axis.valve.message.key, bytes(axis.valve_message.length)))
+    return frames

@@ -1,0 +1,159 @@
+"""The C, compiled with the tables of a deployment by the compiler of this machine.
+
+Nothing of it is needed to run a crane: it drives campaigns, and judges the C. A build whose
+arithmetic is not that of the tables is refused when it is loaded.
+"""
+
+import ctypes
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from canshaper.codec.frame import Frame
+from canshaper.errors import NativeError
+from canshaper.machine.deployment import Deployment
+from canshaper.native.drive import valve_keys
+from canshaper.native.source import sizes_source, tables_source
+from canshaper.native.states import NAMES
+from canshaper.native.tables import Numbers, tables
+from canshaper.shipped import PACKAGE
+
+C_FILES = PACKAGE / "native" / "c"
+# Never -ffast-math, never contracted: equality to the last bit hangs on them.
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math")
+COMPILERS = ("cc", "gcc", "clang")
+MOTION_ROW = 12
+
+
+def compiler() -> list[str]:
+    """Return the command of the C compiler: that of CC, or the first that is there.
+
+    Raises:
+        NativeError: there is none.
+    """
+    if named := os.environ.get("CC"):
+        return named.split()
+    found = next(filter(None, map(shutil.which, COMPILERS)), None)
+    if found is None:
+        text = f"expected a C compiler ({', '.join(COMPILERS)}, or CC), got none"
+        raise NativeError(f"{text}; apt-get install gcc")
+    return [found]
+
+
+def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -> Path:
+    """Compile the C with these tables into a shared library in a folder.
+
+    Args:
+        numbers: see ``tables``.
+        folder: it gets the library, and the tables as source.
+        more: flags of the compiler besides the usual ones.
+        sources: where the C stands.
+
+    Raises:
+        NativeError: there is no compiler, or it fails.
+    """
+    (folder / "cs_sizes.h").write_text(sizes_source(numbers), encoding="ascii")
+    (folder / "cs_tables.c").write_text(tables_source(numbers), encoding="ascii")
+    library = folder / "canshaper.so"
+    files = [*sources.glob("src/*.c"), sources / "test/cs_inspect.c", folder / "cs_tables.c"]
+    command = [*compiler(), *FLAGS, *more, "-shared", "-fPIC", f"-I{folder}", f"-I{sources}/src"]
+    done = subprocess.run(
+        [*command, *map(str, files), "-o", str(library), "-lm"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise NativeError(f"{command[0]} failed: {' '.join(done.stderr.split())[:500]}")
+    return library
+
+
+class _CFrame(ctypes.Structure):
+    _fields_ = (
+        ("id", ctypes.c_uint32),
+        ("bus", ctypes.c_int32),
+        ("length", ctypes.c_int32),
+        ("extended", ctypes.c_bool),
+        ("data", ctypes.c_uint8 * 8),
+    )
+
+
+class NativeLibrary:
+    """The C with the tables of a deployment, compiled and loaded.
+
+    Args:
+        deployment: the machine.
+        more: flags of the compiler besides the usual ones.
+        sources: where the C stands.
+
+    Raises:
+        ConfigError: the C has no part for something of the deployment.
+        NativeError: it cannot be compiled, or its arithmetic is another one.
+    """
+
+    def __init__(self, deployment: Deployment, *more: str, sources: Path = C_FILES) -> None:
+        numbers = tables(deployment)
+        self.buses = list(deployment.config.buses)
+        self.axes, self.motions = len(numbers["axis"]), len(numbers["motion"])
+        self.valves = valve_keys(deployment)
+        self.real = ctypes.c_float if "-DCS_FLOAT" in more else ctypes.c_double
+        with tempfile.TemporaryDirectory() as folder:
+            self.c = ctypes.CDLL(str(build(numbers, Path(folder), *more, sources=sources)))
+        self.c.cs_arithmetic.restype = ctypes.c_bool
+        if not self.c.cs_arithmetic():
+            text = "expected arithmetic as Python's, got another one"
+            raise NativeError(f"{text}: -ffast-math, contraction, x87, or another libm")
+
+
+class NativeController:
+    """The controller in C, with the interface of ``Controller`` as far as it has it."""
+
+    def __init__(self, library: NativeLibrary) -> None:
+        self._c, self._buses = library.c, library.buses
+        self._axes, self._motions, self._valves = library.axes, library.motions, library.valves
+        self._tables = ctypes.byref(ctypes.c_char.in_dll(self._c, "cs_tables"))
+        self._state = ctypes.create_string_buffer(self._c.cs_inspect_size())
+        self._out = (_CFrame * len(library.valves))()
+        self._row = (library.real * len(NAMES))()
+        self._motion_row = (library.real * MOTION_ROW)()
+        self._c.cs_init(self._state, self._tables)
+
+    def receive(self, frame: Frame, arrived_ns: int) -> None:
+        """Take a frame that was received."""
+        bus, can_id, extended, data = frame
+        length, at = len(data), ctypes.c_int64(arrived_ns)
+        number = self._buses.index(bus)
+        self._c.cs_receive(
+            self._state, self._tables, number, can_id, ctypes.c_bool(extended), data, length, at
+        )
+
+    def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
+        """Run every axis that is due, and return the frames of the valves."""
+        now = ctypes.c_int64(now_ns)
+        count = self._c.cs_tick(self._state, self._tables, now, missed, self._out)
+        frames: Iterable[_CFrame] = self._out[:count]
+        return [
+            Frame(self._buses[f.bus], f.id, f.extended, bytes(f.data[: f.length])) for f in frames
+        ]
+
+    def stalled(self) -> None:
+        """Distrust every input: the loop stood still."""
+        self._c.cs_stalled(self._state, self._tables)
+
+    def send_failed(self, frame: Frame) -> None:
+        """Take note that the frame of a valve did not leave."""
+        self._c.cs_send_failed(self._state, self._tables, self._valves.index(frame[:3]))
+
+    def rows(self) -> list[list[float]]:
+        """Inner state: a row for each axis, then one for each motion; see ``states.py``."""
+        rows = []
+        for axis in range(self._axes):
+            self._c.cs_inspect_axis(self._state, axis, self._row)
+            rows.append(list(self._row))
+        for motion in range(self._motions):
+            self._c.cs_inspect_motion(self._state, motion, self._motion_row)
+            rows.append(list(self._motion_row))
+        return rows

@@ -1,0 +1,321 @@
+"""From a deployment to the constant tables of the C in ``c/``: numbers only, no code.
+
+The numbers are read off the objects that the controller runs, so that no rule is computed twice.
+What the C has no part for is refused by the key of the file, all of it at once. Status messages,
+feedback of the valves and numbers that may be changed at run time are left out: no valve frame
+hangs on them.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from cantools.database.can import Message
+
+from canshaper.codec.layout import CLASSICAL_BYTES, is_fd, is_j1939
+from canshaper.codec.message import SequenceChecker
+from canshaper.codec.signals import find_signal, special_codes
+from canshaper.codec.velocity import VelocitySignal
+from canshaper.config.source import Place
+from canshaper.controller.controller import Controller
+from canshaper.controller.motion import MotionRunner
+from canshaper.controller.runner import AxisControl
+from canshaper.errors import ConfigError
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
+from canshaper.shaping.axis import ShapedAxis
+from canshaper.shaping.shapers.fir import Fir
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.limit_aware import LimitAware
+from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
+from canshaper.shaping.states import Reason
+from canshaper.shaping.transfer import Off
+
+Numbers = dict[str, Any]
+"""A struct of the tables, by the names of its members; of an absent member 0."""
+_PROTECTED = ("checksum", "e2e", "multiplexor", "source")
+NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
+    (): ("switches", "hydraulics", "gateway", "emergency_stop", "load_state", "profile"),
+    ("buses", "*"): ("canopen", "j1939"),
+    ("joysticks", "*"): (*_PROTECTED, "enable_of", "next_profile", "node"),
+    ("axes", "*"): ("sway_sensor", "gain_schedule", "profiles"),
+    ("axes", "*", "command"): ("flags", "negative"),
+    ("axes", "*", "valve"): ("direction", "also", "cia408", "node", *_PROTECTED[:3]),
+    ("axes", "*", "limits"): ("ends",),
+    ("motion", "*", "radius"): _PROTECTED,
+}
+"""Keys of the file for which the C has no part, by their sections."""
+KINDS: dict[type, str] = {
+    Off: "CS_OFF",
+    Fir: "CS_FIR",
+    LimitAware: "CS_ROBUST",
+    Gff: "CS_GFF",
+    FirstOrder: "CS_FIRST_ORDER",
+    SCurve: "CS_S_CURVE",
+}
+"""Filters of the C, by their classes here."""
+MOST_BITS = 32  # of a number in a frame
+NONE = -1
+UNLIMITED_TICKS = 2_000_000_000  # more than the C ever counts
+
+
+def tables(deployment: Deployment) -> Numbers:
+    """Return the tables of a deployment, as the struct ``cs_config``.
+
+    Raises:
+        ConfigError: all keys for which the C has no part.
+    """
+    controller = Controller(deployment)
+    problems = [deployment.source.problem(*one) for one in _refused(deployment, controller)]
+    if problems:
+        raise ConfigError(problems)
+    buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
+    axes = controller.axes
+    last = {runner.valve.key: runner for runner in axes.values()}
+    valves = list(last)
+    return {
+        "tick_ns": deployment.config.tick_ms * 1_000_000,
+        "joystick": [_joystick(deployment, name, buses) for name in joysticks],
+        "valve": [_valve(runner, buses) for runner in last.values()],
+        "axis": [
+            {
+                **_wiring(runner, deployment, joysticks),
+                "valve": valves.index(runner.valve.key),
+                "sends": last[runner.valve.key] is runner,
+                **_filter(runner.axis),
+                **_limits(runner.axis),
+            }
+            for runner in axes.values()
+        ],
+        "motion": [
+            _motion(deployment, name, one, list(axes), buses)
+            for name, one in zip(deployment.motions, controller.motions, strict=True)
+        ],
+    }
+
+
+def _refused(deployment: Deployment, controller: Controller) -> Iterator[tuple[Place, str]]:
+    """Yield what the C has no part for: where, and what was expected."""
+    for pattern, keys in NOT_EXPORTED.items():
+        for place, section in _sections((), deployment.config, pattern):
+            for key in keys:
+                value = getattr(section, key)
+                if value or (value == 0 and value is not False):
+                    yield (*place, key), "expected none in an export, for which C has no part"
+    for name, joystick in deployment.joysticks.items():
+        config, place = joystick.config, ("joysticks", name)
+        if len(joystick.conditions) != 1 or joystick.enable is None:
+            yield (*place, "enable"), "expected one switch of its own message in an export"
+        read = [config.reset, config.anti_sway_off, joystick.enable]
+        read += [one.name for one in joystick.velocities]
+        yield from _unreadable(place, joystick.message, filter(None, read))
+    for name, axis in deployment.axes.items():
+        at = ("axes", name, "valve")
+        yield from _unreadable(at, axis.valve_message, [axis.config.valve.signal])
+        shaper = controller.axes[name].axis._transfer._shaper
+        inner = shaper._shaper if isinstance(shaper, LimitAware) else shaper
+        if type(shaper) not in KINDS or type(inner) not in KINDS:
+            text = f"expected a filter that C has, got {axis.config.filter.kind}"
+            yield ("axes", name, "filter", "kind"), text
+    for name, motion in deployment.motions.items():
+        if motion.radius:
+            place = ("motion", name, "radius")
+            yield from _unreadable(place, motion.radius.message, [motion.radius.signal.name])
+
+
+def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Place, Any]]:
+    """Yield the sections that a pattern fits, * for every name, with their places."""
+    if not pattern:
+        yield place, section
+    elif section is not None:
+        key, rest = pattern[0], pattern[1:]
+        named = section.items() if key == "*" else [(key, getattr(section, str(key)))]
+        for name, one in named:
+            if one is not None:
+                yield from _sections((*place, name), one, rest)
+
+
+def _unreadable(
+    place: Place, message: Message, signals: Iterable[str]
+) -> Iterator[tuple[Place, str]]:
+    """Yield why the C cannot read or write a message."""
+    if is_j1939(message) or is_fd(message) or message.length > CLASSICAL_BYTES:
+        text = "expected classical CAN without J1939 in an export"
+        yield (*place, "message"), f"{text}, got {message.name}"
+    for name in signals:
+        signal = find_signal(message, name)
+        if signal is None or signal.is_float or signal.length > MOST_BITS:
+            text = f"expected a whole signal of up to {MOST_BITS} bits in an export, got {name}"
+            yield (*place, "message"), text
+
+
+def _field(message: Message, name: str | None) -> Numbers:
+    signal = find_signal(message, name) if name else None
+    if signal is None:
+        return {}
+    return {
+        "start": signal.start,
+        "length": signal.length,
+        "motorola": signal.byte_order == "big_endian",
+        "is_signed": signal.is_signed,
+    }
+
+
+def _message(bound: BoundInput, buses: list[str]) -> Numbers:
+    """What ``cs_message_config`` has."""
+    config, protection = bound.config, bound.protection
+    bus, can_id, extended = bound.key
+    sequence = SequenceChecker(protection, config.alive_max_step, config.qualify)
+    return {
+        "bus": buses.index(bus),
+        "length": bound.message.length,
+        "id": can_id,
+        "extended": extended,
+        "counter": _field(bound.message, protection.counter),
+        "counts": protection.counts,
+        "max_step": sequence._max_step,
+        "qualify": config.qualify,
+        "timeout_ns": config.timeout_ms * 1_000_000,
+    }
+
+
+def _codes(special: dict[Any, Reason]) -> Numbers:
+    codes = [{"code": int(code), "reason": int(reason)} for code, reason in special.items()]
+    return {"codes": codes, "codes_n": len(codes)}
+
+
+def _joystick(deployment: Deployment, name: str, buses: list[str]) -> Numbers:
+    bound = deployment.joysticks[name]
+    message, config = bound.message, bound.config
+    numbers = [
+        {
+            "field": _field(message, one.name),
+            **{n: float(getattr(one, n)) for n in ("scale", "offset", "full", "low", "high")},
+            **_codes(one.special),
+        }
+        for one in _velocities(deployment, name)
+    ]
+    return {
+        "message": _message(bound, buses),
+        "enable": _field(message, bound.enable),
+        "reset": _field(message, config.reset),
+        "off": _field(message, config.anti_sway_off),
+        "frozen_ns": round(config.stuck_s * 1e9),
+        "number": numbers,
+        "numbers_n": len(numbers),
+    }
+
+
+def _velocities(deployment: Deployment, joystick: str) -> list[VelocitySignal]:
+    """The numbers of a joystick, each once though several axes may read it."""
+    by_name = {one.name: one for one in deployment.joysticks[joystick].velocities}
+    return [one for one in by_name.values() if isinstance(one, VelocitySignal)]
+
+
+def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
+    sent = runner.bound.valve.message
+    bus, can_id, extended = sent.key
+    data = sent.fields.layout.encode(dict(sent.start))
+    return {
+        "bus": buses.index(bus),
+        "length": len(data),
+        "id": can_id,
+        "extended": extended,
+        "start": [*data],
+        "counter": _field(sent.fields.message, sent.protection.counter),
+        "counts": sent.protection.counts,
+    }
+
+
+def _wiring(runner: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
+    """From which joystick an axis gets its demand, and where its setpoint goes."""
+    bound, command, valve = runner.bound, runner.bound.config.command, runner.bound.valve
+    numbers = [one.name for one in _velocities(deployment, command.joystick)]
+    return {
+        "joystick": joysticks.index(command.joystick),
+        "number": numbers.index(command.signal),
+        "period_ticks": runner.period_ticks,
+        "setpoint": _field(bound.valve_message, bound.config.valve.signal),
+        "zero": valve._zero,
+        "sign": valve._sign,
+    }
+
+
+def _filter(axis: ShapedAxis) -> Numbers:
+    """Sway model and filter of an axis."""
+    transfer, sway = axis._transfer, axis.sway
+    shaper = transfer._shaper
+    numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis._tick_s, "fade": transfer._fade}
+    if sway is not None:
+        numbers |= {"sways": True, **{n: getattr(sway, n) for n in ("f11", "f12", "f21", "f22")}}
+    fir = shaper._shaper if isinstance(shaper, LimitAware) else shaper
+    gff = shaper._gff if isinstance(shaper, LimitAware) else shaper
+    if isinstance(fir, Fir):
+        numbers |= {"taps": [*fir.taps], "taps_n": len(fir.taps)}
+    if isinstance(gff, Gff):
+        numbers |= {"k1": gff.k1, "k2": gff.k2, "share": gff._share}
+    if isinstance(shaper, FirstOrder):
+        numbers["share"] = shaper._share
+    if isinstance(shaper, SCurve):
+        numbers |= {"rate": shaper._rate, "change": shaper._jerk * shaper._tick_s}
+    return numbers
+
+
+def _limits(axis: ShapedAxis) -> Numbers:
+    """Limits of an axis, and what a motion may add to it."""
+    stage, limits = axis._stage, axis._stage.limits
+    rise, fall = stage._rates
+    numbers: Numbers = {
+        "neutral_band": axis._neutral_band,
+        "rise": rise,
+        "fall": fall,
+        "steps": stage._grid_steps,
+        "tail": stage.tail,
+        "reversal": min(stage._reversal, UNLIMITED_TICKS),
+        "stop_ticks": axis._states._stop_ticks,
+        "spreads": stage._spreads,
+        "small_least": stage._small._least,
+        "small_most": stage._small._most,
+        "largest_added": float(stage.largest_added),
+        "added_ticks": axis.added_time._ticks,
+    }
+    same = ("maximum", "minimum", "fall_per_s", "deadband", "run_on", "allow_faster")
+    numbers |= {name: getattr(limits, name) for name in (*same, "allow_reverse")}
+    if curve := limits.curve:
+        numbers |= {"curve_command": [*curve._commands], "curve_speed": [*curve.speeds]}
+        numbers["curve_n"] = len(curve.speeds)
+    return numbers
+
+
+def _motion(
+    deployment: Deployment, name: str, runner: MotionRunner, axes: list[str], buses: list[str]
+) -> Numbers:
+    """What ``cs_motion_config`` has."""
+    bound, motion = deployment.motions[name], runner._motion
+    config, near_far = bound.config, bound.config.near_far
+    members = [one for one in (motion._slew, motion._near_far) if one]
+    same = ("full_speed", "period_s", "stiffness", "damping", "lag_s", "farthest", "fall_per_s")
+    numbers: Numbers = {
+        "slew": axes.index(config.slew),
+        "near_far": axes.index(near_far) if near_far else NONE,
+        "path_m": motion._path_m,
+        "circle_m": runner._circle_m or 0.0,
+        "tick_s": runner._tick_s,
+        "moving": [
+            {**{n: getattr(one, n) for n in same}, "bounded": one.farthest < math.inf}
+            for one in members
+        ],
+    }
+    if radius := bound.radius:
+        low, high = radius.signal.minimum, radius.signal.maximum
+        numbers |= {"measured": True, "message": _message(radius, buses)}
+        numbers["radius"] = {
+            "field": _field(radius.message, radius.signal.name),
+            "scale": float(radius.signal.scale),
+            "offset": float(radius.signal.offset),
+            "full": 1.0,
+            "low": float(low or 0.0),
+            "high": float(high or 0.0),
+            **_codes(special_codes(radius.signal)),
+        }
+    return numbers

@@ -1,0 +1,168 @@
+"""A study with people: which placements in which order, and what becomes of each. No clock.
+
+A placement begins with the first motion of the crane and ends with the driver's grip, hit or miss,
+as in ISO 9241-411. One that is broken off is not done; it comes again at the end of its part.
+"""
+
+import math
+import random
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from canshaper.studio.study_files import BROKEN, HIT, MISS, Table
+
+# Ways of the grapple to the target, and diameters of the target: .9 to 3.8 bits.
+TARGETS_M = [(distance, width) for distance in (1.0, 2.0, 4.0) for width in (0.3, 0.6, 1.2)]
+# Two Latin squares: each setting follows each other one as often (Williams 1949).
+ORDERS = ("ABC", "BCA", "CAB", "CBA", "ACB", "BAC")
+REACH_M, AHEAD = (2.5, 7.5), 0.3  # where a target may be, from the pillar; part of it straight on
+SHOWN_S = 1.5  # so long is said whether a grip has hit
+LIMIT_S, HELD_UP_S = 60.0, 0.3  # longest placement, and standstill of this program in it
+
+
+class Placement(NamedTuple):
+    """A target; parts and numbers are counted from 1, the practice of a part comes first."""
+
+    part: int
+    setting: str
+    number: int
+    practice: int
+    distance_m: float
+    width_m: float
+
+
+def plan(
+    counts: tuple[int, int], start_m: float, order: str, seed: str
+) -> dict[Placement, tuple[float, float]]:
+    """Every placement of a person and its place, in m ahead of the pillar and to its left.
+
+    Args:
+        counts: of practice, and of placements that count, of each setting: rounds of all nine
+            targets, each in random order.
+        start_m: of the grapple from the pillar.
+        order: letters of the settings.
+        seed: of the order.
+    """
+    planned = {}
+    for part, letter in enumerate(order, 1):
+        source, number = random.Random(f"{seed} {part}"), 0
+        for practice, count in zip((1, 0), counts, strict=True):
+            drawn: list[tuple[float, float]] = []
+            while len(drawn) < count:
+                drawn += source.sample(TARGETS_M, len(TARGETS_M))
+            for distance_m, width_m in drawn[:count]:
+                number += 1
+                one = Placement(part, letter, number, practice, distance_m, width_m)
+                planned[one] = _place(source, start_m, distance_m)
+    return planned
+
+
+def _place(source: random.Random, start_m: float, distance_m: float) -> tuple[float, float]:
+    """Somewhere in reach and in the picture, so far from the start."""
+    while True:
+        angle = source.uniform(-math.pi, math.pi)
+        x, y = start_m + distance_m * math.cos(angle), distance_m * math.sin(angle)
+        if REACH_M[0] <= math.hypot(x, y) <= REACH_M[1] and x > AHEAD * math.hypot(x, y):
+            return x, y
+
+
+class Session:
+    """A person at work.
+
+    Args:
+        planned: every placement and its place.
+        break_s: between two parts, at least.
+        table: where each is written; those that stand there are done.
+        fresh: called with a setting: puts a crane that has it at the start.
+
+    Attributes:
+        phase: pause, ready, moving, shown or done.
+    """
+
+    def __init__(
+        self,
+        planned: dict[Placement, tuple[float, float]],
+        break_s: float,
+        table: Table,
+        fresh: Callable[[str], None],
+    ) -> None:
+        done = {(r["part"], r["number"]) for r in table.rows if r["outcome"] != BROKEN}
+        self._todo = [one for one in planned if (str(one.part), str(one.number)) not in done]
+        self._planned, self._break_s, self._table, self._fresh = planned, break_s, table, fresh
+        self.phase = "pause" if self._todo else "done"
+        self._why = ""  # of a pause, empty before a part
+        self._result: tuple[str, float] | None = None
+        self._last = [*planned][-1]
+        self._since_s = self._until_s = self._reaction_s = self._seen_s = 0.0
+        self._place: tuple[float, float] | None = None
+        self._swing_deg = 0.0
+
+    def begin(self, now_s: float) -> None:
+        """End a pause, where it has lasted long enough."""
+        if self.phase == "pause" and now_s >= self._until_s:
+            self._next(now_s)
+
+    def _next(self, now_s: float) -> None:
+        self.phase, self._why, self._result, self._since_s = "ready", "", None, now_s
+        self._fresh(self._todo[0].setting)
+
+    def see(
+        self, level: str, place: tuple[float, float] | None, swing_deg: float | None, now_s: float
+    ) -> None:
+        """See the level of its axes as a page has it, and the grapple, each tick."""
+        held_up, self._seen_s = now_s - self._seen_s > HELD_UP_S, now_s
+        self._place, self._swing_deg, lasts_s = place, swing_deg or 0.0, now_s - self._since_s
+        if self.phase == "ready" and level == "move":
+            self.phase, self._reaction_s, self._since_s = "moving", lasts_s, now_s
+        elif self.phase == "shown" and lasts_s > SHOWN_S:
+            if self._todo and self._todo[0].part == self._last.part:
+                self._next(now_s)
+            else:
+                self.phase = "pause" if self._todo else "done"
+                self._until_s = now_s + self._break_s
+        elif self.phase == "moving" and level not in ("move", "ready"):
+            self.break_off("stopped", now_s)
+        elif self.phase == "moving" and (held_up or lasts_s > LIMIT_S):
+            self.break_off("held" if held_up else "long", now_s)
+
+    def grip(self, by: str, now_s: float) -> None:
+        """Close the grapple where it is: that ends the placement."""
+        if self.phase != "moving" or self._place is None:
+            return
+        one = self._last = self._todo.pop(0)
+        error_m = math.dist(self._place, self._planned[one])
+        self._result = (HIT if error_m <= one.width_m / 2.0 else MISS), error_m
+        self._table.add(
+            **one._asdict(), input=by, reaction_s=self._reaction_s, seconds=now_s - self._since_s,
+            error_m=error_m, swing_deg=self._swing_deg, outcome=self._result[0],
+        )  # fmt: skip
+        self.phase, self._since_s = "shown", now_s
+
+    def break_off(self, why: str, now_s: float) -> None:
+        """Count a placement under way as not done; a pause follows."""
+        if self.phase == "moving":
+            one, seconds = self._todo.pop(0), now_s - self._since_s
+            self._table.add(**one._asdict(), seconds=seconds, outcome=BROKEN, why=why)
+            self._todo.insert(sum(other.part == one.part for other in self._todo), one)
+            self.phase, self._why, self._until_s = "pause", why, now_s
+
+    def shown(self, now_s: float) -> dict[str, Any]:
+        """What the page shows; nothing of it says which setting it is."""
+        over = self.phase in ("shown", "done")
+        one = self._last if over else self._todo[0]
+        numbers, left = (
+            sum(o.part == one.part for o in all_) for all_ in (self._planned, self._todo)
+        )
+        target = self.phase in ("ready", "moving")
+        return {
+            "phase": self.phase,
+            "why": self._why,
+            "result": self._result,
+            "part": one.part,
+            "parts": max(other.part for other in self._planned),
+            "practice": bool(one.practice),
+            "number": numbers - left + (not over),
+            "numbers": numbers,
+            "wait_s": max(0, math.ceil(self._until_s - now_s)) if self.phase == "pause" else 0,
+            "target": [*self._planned[one], one.width_m] if target else None,
+        }

@@ -1,0 +1,78 @@
+"""The C against the controller: every valve frame and number of the inner state, bit by bit."""
+
+import struct
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.errors import NativeError
+from canshaper.machine.deployment import Deployment
+from canshaper.native.drive import play, random_drive
+from canshaper.native.library import C_FILES, NativeController, NativeLibrary, compiler
+from canshaper.native.states import NAMES, rows
+from tests.rigs.files import CONFIG, read
+
+SeenStates = set[tuple[str, str]]
+
+
+def needs_compiler() -> None:
+    """Skip the test where there is no C compiler."""
+    try:
+        compiler()
+    except NativeError as error:
+        pytest.skip(str(error))
+
+
+def native(deployment: Deployment, *flags: str, sources: Path = C_FILES) -> NativeController:
+    """The C with the tables of a deployment; the test is skipped where nothing compiles it."""
+    needs_compiler()
+    return NativeController(NativeLibrary(deployment, *flags, sources=sources))
+
+
+@cache
+def shipped(name: str) -> NativeLibrary:
+    """The C with the tables of a shipped deployment; compiled once by each process."""
+    needs_compiler()
+    return NativeLibrary(read(CONFIG / f"{name}.yaml"))
+
+
+def difference(
+    deployment: Deployment, c: NativeController, seed: str, ticks: int, *, guarded: bool = False
+) -> tuple[str, SeenStates]:
+    """The first difference of frames or states, "" for none; and the states that were seen.
+
+    Args:
+        deployment: the machine.
+        c: the C with its tables.
+        seed: of the drive.
+        ticks: of the drive.
+        guarded: the controller is behind its gate.
+    """
+    controller = Controller(deployment.unreported)
+    python = Guarded(controller) if guarded else controller
+    seen: SeenStates = set()
+    for number, tick in enumerate(random_drive(deployment, seed, ticks)):
+        ours, theirs = play(tick, python), play(tick, c)
+        controller.events.clear()
+        if ours != theirs:
+            return f"tick {number}: frames {ours}, C {theirs}", seen
+        if wrong := _of_rows(rows(controller), c.rows()):
+            return f"tick {number}: {wrong}", seen
+        for runner in controller.axes.values():
+            seen.add((runner.axis.state.name, runner.axis.reason.name))
+    return "", seen
+
+
+def _of_rows(ours: list[list[float]], theirs: list[list[float]]) -> str:
+    """The first number that is not the same to the last bit."""
+    for part, (row, other) in enumerate(zip(ours, theirs, strict=True)):
+        form = f"<{len(row)}d"
+        if struct.pack(form, *row) != struct.pack(form, *other):
+            for number, (one, two) in enumerate(zip(row, other, strict=True)):
+                if struct.pack("<d", one) != struct.pack("<d", two):
+                    name = NAMES[number] if len(row) == len(NAMES) else str(number)
+                    return f"part {part}, {name}: {one!r}, C {two!r}"
+    return ""

@@ -1,0 +1,87 @@
+"""The C computes as the controller does: frames and inner states equal to the last bit."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.errors import NativeError
+from canshaper.native.library import NativeController, NativeLibrary
+from canshaper.shaping.states import REACTION_OF, Reaction, Reason
+from tests.native.judge import SeenStates, difference, native, needs_compiler, shipped
+from tests.native.machines import SHIPPED, VARIANTS, changed
+from tests.rigs.files import CONFIG, Machine, read
+
+STATES = {"NEUTRAL_WAIT", "READY", "ACTIVE", "BYPASS_ON", "STOPPING", "TRIPPED"}
+
+
+def check_seen(seen: SeenStates) -> None:
+    """The drive was no idle one."""
+    assert {state for state, _ in seen} == STATES
+    reactions = {REACTION_OF[Reason[reason]] for _, reason in seen}
+    assert reactions == {*Reaction}
+
+
+@pytest.mark.parametrize("seed", ["first", "second"])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_c_is_the_controller_for_a_shipped_machine(name: str, seed: str) -> None:
+    """30 000 ticks in all."""
+    c = NativeController(shipped(name))
+    wrong, seen = difference(read(CONFIG / f"{name}.yaml"), c, seed, 3_750)
+    assert wrong == ""
+    check_seen(seen)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SHIPPED)
+def test_it_is_so_in_a_long_drive_behind_the_gate(name: str) -> None:
+    c = NativeController(shipped(name))
+    wrong, _ = difference(read(CONFIG / f"{name}.yaml"), c, "long", 100_000, guarded=True)
+    assert wrong == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VARIANTS)
+def test_the_c_is_the_controller_for_every_part(name: str, machine: Machine) -> None:
+    deployment = changed(machine, VARIANTS[name]).load()
+    wrong, seen = difference(deployment, native(deployment), name, 10_000)
+    assert wrong == ""
+    check_seen(seen)
+
+
+@pytest.mark.parametrize("name", ["motorola", "periods"])
+def test_it_is_so_with_fields_and_periods_of_every_kind(name: str, machine: Machine) -> None:
+    deployment = changed(machine, VARIANTS[name]).load()
+    assert difference(deployment, native(deployment, "-O0"), "few", 800)[0] == ""
+
+
+@pytest.mark.skipif(
+    "fma" not in Path("/proc/cpuinfo").read_text(encoding="utf-8").split(),
+    reason="the processor has no FMA",
+)
+def test_a_build_that_contracts_is_refused() -> None:
+    """Products that keep their digits: a processor with FMA, whose compiler may use it."""
+    needs_compiler()
+    with pytest.raises(NativeError, match="expected arithmetic as Python's, got another one"):
+        NativeLibrary(read(CONFIG / "forwarder.yaml"), "-mfma", "-ffp-contract=fast")
+
+
+@pytest.mark.parametrize("flag", ["-ffast-math", "-funsafe-math-optimizations"])
+def test_a_build_with_quick_arithmetic_is_refused(flag: str) -> None:
+    needs_compiler()
+    with pytest.raises(NativeError, match="expected arithmetic as Python's, got another one"):
+        NativeLibrary(read(CONFIG / "forwarder.yaml"), flag)
+
+
+def test_without_a_compiler_it_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(NativeError, match=r"expected a C compiler .*, got none; apt-get"):
+        NativeLibrary(read(CONFIG / "forwarder.yaml"))
+
+
+def test_what_the_compiler_says_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    needs_compiler()
+    with pytest.raises(NativeError, match=r"failed: .*no-such-flag"):
+        NativeLibrary(read(CONFIG / "forwarder.yaml"), "-fno-such-flag")
