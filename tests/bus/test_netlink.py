@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus import device as module
 from canshaper.bus import netlink
-from canshaper.bus.device import Device, kind_and_bitrates, read_device
+from canshaper.bus.device import Device, read_device
+from canshaper.bus.netlink import kind_and_bitrates
 
 
 def field(kind: int, payload: bytes) -> bytes:
@@ -56,7 +56,7 @@ def test_kind_and_bit_rate_of_an_interface(
         requested.append((kind, flags, body))
         yield message
 
-    monkeypatch.setattr(module, "request", request)
+    monkeypatch.setattr(netlink, "request", request)
     assert kind_and_bitrates(7) == expected
     assert requested == [(18, 4, struct.pack("=BxHiII", 0, 0, 7, 0, 0))]
 

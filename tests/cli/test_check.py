@@ -195,31 +195,6 @@ def test_check_of_no_file() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "where", "got"),
-    [
-        ("dbc: [", 'dbc: ["a\\0b.dbc", ', "dbc.0", r"'a\x00b.dbc'"),
-        (
-            "tick_ms: 20",
-            'tick_ms: 20\ncontrol: { socket: "/run/a\\0b",'
-            " adjustable: { axes.slew.limits.max_pct: [20, 100] } }",
-            "control.socket",
-            r"'/run/a\x00b'",
-        ),
-    ],
-)
-def test_check_refuses_a_path_that_the_system_would_not_take(
-    tmp_path: Path, old: str, new: str, where: str, got: str
-) -> None:
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace(old, new, 1), encoding="utf-8")
-    result = invoke("check", str(file))
-    line = 1 + next(i for i, row in enumerate(file.read_text().splitlines()) if "\\0" in row)
-    problem = f"{file}:{line}: {where}: expected text without control characters, got {got}"
-    assert (result.exit_code, result.stderr.splitlines()) == (2, [problem, "1 problem"])
-
-
 @pytest.mark.slow
 def test_a_shipped_file_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

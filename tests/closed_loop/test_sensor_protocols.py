@@ -23,10 +23,7 @@ TOOL = 0x30
 START_S = 2.0  # an address is claimed, nodes are started, and valves brought up
 REVERSAL = Script(
     "reversal",
-    (
-        Stroke("near_far", START_S, 1.5, 1.0, 0.1),
-        Stroke("near_far", START_S + 1.5, 1.5, -1.0, 0.1),
-    ),
+    (Stroke("near_far", START_S, 1.5, 1.0, 0.1), Stroke("near_far", START_S + 1.5, 1.5, -1.0, 0.1)),
     START_S + 8.0,
 )
 Change = tuple[str, str]

@@ -54,10 +54,7 @@ def late(drive: Drive) -> float:
 )
 @pytest.mark.parametrize("contact", [still, Dragged])
 def test_a_grapple_that_leans_on_something_hardly_changes_the_travel(
-    sensor: Setup,
-    contact: Holding,
-    from_s: float,
-    angle_deg: float,
+    sensor: Setup, contact: Holding, from_s: float, angle_deg: float
 ) -> None:
     plain = replace(PLAIN, contact=contact(from_s, angle_deg)).drive(LONG)
     for seed in (1, 2):

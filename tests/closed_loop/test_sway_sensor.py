@@ -21,11 +21,7 @@ from tests.rigs.sensed import LENGTH_M, MODE, SCRIPTS, TICK_S, Setup
         (replace(ENCODER, every=2), 0.7, 1.4),
         (replace(ENCODER, every=5), 0.7, 1.6),
         (replace(GYRO, every=5), 0.6, 1.3),
-        (
-            replace(ENCODER, delay_s=0.08, sensor=SwaySensorParameters(delay_s=0.08)),
-            0.7,
-            1.4,
-        ),
+        (replace(ENCODER, delay_s=0.08, sensor=SwaySensorParameters(delay_s=0.08)), 0.7, 1.4),
     ],
     ids=["encoder", "gyro", "25 Hz", "10 Hz", "gyro 10 Hz", "80 ms late"],
 )

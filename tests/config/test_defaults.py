@@ -137,11 +137,7 @@ def test_any_text_of_yaml_signs_loads_or_says_why(file: Path, text: str) -> None
 @noise
 @given(
     cuts=st.lists(
-        st.tuples(
-            st.integers(0, 2600),
-            st.integers(0, 40),
-            st.sampled_from(NEW),
-        ),
+        st.tuples(st.integers(0, 2600), st.integers(0, 40), st.sampled_from(NEW)),
         min_size=1,
         max_size=4,
     )

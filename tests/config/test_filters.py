@@ -44,10 +44,7 @@ GOOD: list[tuple[str, dict[str, Any]]] = [
     ("kind: s_curve, rate_per_s: 1, jerk_per_s2: 7", {"rate_per_s": 1.0, "jerk_per_s2": 7.0}),
     ("kind: ei", {"residual_pct": 5.0}),
     ("kind: ei, residual_pct: 2", {"residual_pct": 2.0}),
-    (
-        "kind: two_mode, period_s: 0.9, damping_ratio: 0",
-        {"period_s": 0.9, "damping_ratio": 0.0},
-    ),
+    ("kind: two_mode, period_s: 0.9, damping_ratio: 0", {"period_s": 0.9, "damping_ratio": 0.0}),
     (
         "kind: robust, tick_ms: 20, taps: [0.5, 0.25, 0.25]",
         {"tick_ms": 20, "taps": [0.5, 0.25, 0.25]},
@@ -106,10 +103,7 @@ BAD = [
     ("kind: ei, residual_pct: 0", "residual_pct: expected 0.1 to 20 %, got 0"),
     ("kind: ei, residual_pct: 21", "residual_pct: expected 0.1 to 20 %, got 21"),
     ("kind: two_mode, period_s: 1", "damping_ratio: missing: damping ratio of the second mode"),
-    (
-        "kind: two_mode, period_s: 13, damping_ratio: 0",
-        "period_s: expected 0.15 to 12 s, got 13",
-    ),
+    ("kind: two_mode, period_s: 13, damping_ratio: 0", "period_s: expected 0.15 to 12 s, got 13"),
     ("kind: two_mode, period_s: 1, damping_ratio: 1", "expected 0 to 0.95, got 1"),
     ("kind: gff, third_pole_rad_s: -4", "expected a1 and a2, or poles_rad_s, got neither"),
     ("kind: gff, a1: 0.42", "expected a1 and a2, or poles_rad_s, got a1"),

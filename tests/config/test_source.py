@@ -59,14 +59,8 @@ def test_what_is_no_yaml_is_one_problem(file: Path, text: str | bytes, says: str
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (
-            r"""a: ["b\0c"]""",
-            ":1: a.0: expected text without control characters, got 'b\\x00c'",
-        ),
-        (
-            "a:\n  b: |\n    c\n",
-            ":2: a.b: expected text without control characters, got 'c\\n'",
-        ),
+        (r"""a: ["b\0c"]""", ":1: a.0: expected text without control characters, got 'b\\x00c'"),
+        ("a:\n  b: |\n    c\n", ":2: a.b: expected text without control characters, got 'c\\n'"),
         (r"""a: "\x7f" """, ":1: a: expected text without control characters, got '\\x7f'"),
         (r"""a: "\ud800" """, ":1: a: expected text without control characters, got '\\ud800'"),
         (r"""a: { "b\0": 1 }""", ":1: a: expected a word as key, got 'b\\x00'"),

@@ -70,9 +70,7 @@ def test_no_frame_is_younger_than_the_tick_that_reads_it(rig: Rig) -> None:
     assert rig.state() is State.STOPPING
 
 
-def test_a_counter_is_not_expected_to_run_on_over_a_silence_between_two_arrivals(
-    rig: Rig,
-) -> None:
+def test_a_counter_is_not_expected_to_run_on_over_a_silence_between_two_arrivals(rig: Rig) -> None:
     """Both are read by one tick: the gap counts, not that they were read together."""
     rig.moving()
     port = Waiting()

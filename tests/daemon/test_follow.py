@@ -237,10 +237,7 @@ def test_a_black_box_of_such_ticks_is_played_the_same(
 
 @pytest.mark.parametrize("cycle_us", [20_000, 20_400])
 def test_the_daemon_says_that_it_does_not_follow(
-    bench: Bench,
-    caplog: pytest.LogCaptureFixture,
-    monkeypatch: pytest.MonkeyPatch,
-    cycle_us: int,
+    bench: Bench, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, cycle_us: int
 ) -> None:
     lines: list[str] = []
     monkeypatch.setattr(ServiceManager, "status", lambda _, text: lines.append(text))

@@ -74,21 +74,14 @@ def test_a_cycle_receives_ticks_sends_and_then_takes_what_can_wait(standstill: S
     assert standstill.last_ns == NOW_NS
 
 
-def test_after_a_standstill_the_processor_knows_before_it_receives(
-    standstill: Standstill,
-) -> None:
+def test_after_a_standstill_the_processor_knows_before_it_receives(standstill: Standstill) -> None:
     notes, port = Notes(), Waiting(most=2)
     standstill.last_ns = NOW_NS - 1000 * MS
     port.wait(*[JOYSTICK] * 5, arrived_ns=NOW_NS - MS)
     io_cycle(notes, {"crane": port}, NOW_NS, 49, standstill)
     received = ("receive", 0x110, NOW_NS - MS)
     withheld = ("withhold", 0x200)  # what moves and was computed from before the standstill
-    assert notes.calls == [
-        ("stalled",),
-        *[received, withheld] * 5,
-        ("tick", NOW_NS, 49),
-        withheld,
-    ]
+    assert notes.calls == [("stalled",), *[received, withheld] * 5, ("tick", NOW_NS, 49), withheld]
 
 
 @pytest.mark.parametrize("held_ms", [0, 1000])

@@ -165,11 +165,7 @@ def matched_file(folder: Path, match: str) -> Path:
     ],
 )
 def test_no_rule_leads_to_the_wrong_device(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    state: str,
-    fault: str | OSError,
-    text: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, fault: str | OSError, text: str
 ) -> None:
     changed: list[str] = []
 

@@ -15,8 +15,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.usefixtures("never_wait")]
 
 
 @pytest.mark.parametrize(
-    ("level", "prefix"),
-    [(logging.INFO, "<6>"), (logging.WARNING, "<4>"), (logging.ERROR, "<3>")],
+    ("level", "prefix"), [(logging.INFO, "<6>"), (logging.WARNING, "<4>"), (logging.ERROR, "<3>")]
 )
 def test_the_journal_gets_the_priority_before_the_line(pipe: Pipe, level: int, prefix: str) -> None:
     log(JournalHandler(pipe.writer, journal=True), "axis=slew state=READY", level)
@@ -96,12 +95,7 @@ def standard_error(environment: dict[str, str], pipe: Pipe) -> str:
 def test_the_journal_is_known_by_device_and_inode(pipe: Pipe) -> None:
     info = os.fstat(pipe.writer)
     written = standard_error({"JOURNAL_STREAM": f"{info.st_dev}:{info.st_ino}"}, pipe)
-    assert written.splitlines() == [
-        "<6>axis=slew",
-        "<4>fault=CHECKSUM",
-        "<3>worst",
-        "<4>careful",
-    ]
+    assert written.splitlines() == ["<6>axis=slew", "<4>fault=CHECKSUM", "<3>worst", "<4>careful"]
 
 
 @pytest.mark.parametrize("stream", ["", "1:2"])

@@ -105,9 +105,7 @@ def test_a_reload_begins_with_its_time(manager: Manager) -> None:
 
 
 @pytest.mark.parametrize("environment", [{}, {"NOTIFY_SOCKET": ""}])
-def test_without_a_manager_nothing_is_sent_and_no_socket_made(
-    environment: dict[str, str],
-) -> None:
+def test_without_a_manager_nothing_is_sent_and_no_socket_made(environment: dict[str, str]) -> None:
     before = sorted(Path("/proc/self/fd").iterdir())
     service = ServiceManager({**environment, "WATCHDOG_USEC": "1000000"})
     service.ready("started")

@@ -19,9 +19,7 @@ AXES = "slew,near_far,lift"
 READY = "slew READY, near_far READY, lift READY, crane up"
 
 
-def test_neutral_goes_out_before_the_service_is_ready_and_after_its_last_tick(
-    diary: Diary,
-) -> None:
+def test_neutral_goes_out_before_the_service_is_ready_and_after_its_last_tick(diary: Diary) -> None:
     diary.run(3)
     assert diary.all()[:9] == [
         "open vcan0",

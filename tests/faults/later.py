@@ -73,8 +73,8 @@ def hand(joystick: Joystick, raw: Raw, active: Iterable[Fault]) -> Raw:
 def beside(joystick: Joystick, frames: list[bytes], active: Iterable[Fault]) -> list[bytes]:
     """Frames of a tick with a bad one before or behind them."""
     for fault in active:
-        if fault.kind in BESIDE and fault.joystick is joystick and frames:
-            rng, data = fault.rng, frames[-1]
+        if fault.kind in BESIDE and fault.joystick is joystick and any(frames):
+            rng, data = fault.rng, max(frames, key=len)
             flipped = bytearray(data)
             flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
             noise, old = rng.randbytes(len(data)), fault.memory.setdefault("old", data)

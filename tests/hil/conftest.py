@@ -9,14 +9,7 @@ from pathlib import Path
 import can
 import pytest
 
-from tests.hil.machine import (
-    FILE,
-    Joysticks,
-    Service,
-    joysticks_on,
-    open_bus,
-    service,
-)
+from tests.hil.machine import FILE, Joysticks, Service, joysticks_on, open_bus, service
 
 HERE = Path(__file__).parent
 

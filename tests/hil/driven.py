@@ -4,12 +4,7 @@ import time
 
 import can
 
-from tests.hil.machine import (
-    Accept,
-    Joysticks,
-    wait_for,
-    wait_for_one,
-)
+from tests.hil.machine import Accept, Joysticks, wait_for, wait_for_one
 
 SLEW = 0x200
 

@@ -68,11 +68,7 @@ def test_what_is_ours_or_blocked_passes_in_no_direction(
     tmp_path: Path, who: tuple[str, str]
 ) -> None:
     blocked = ("  fallback: stop", "  fallback: stop\n  blocked: [TipPosition]")
-    with (
-        in_the_line(tmp_path, who, STOP, blocked),
-        open_bus(NEAR) as near,
-        open_bus(FAR) as far,
-    ):
+    with in_the_line(tmp_path, who, STOP, blocked), open_bus(NEAR) as near, open_bus(FAR) as far:
         kept = [
             can.Message(arbitration_id=i, is_extended_id=False, data=[7]) for i in (0x300, 0x401)
         ]

@@ -12,14 +12,7 @@ from pathlib import Path
 import can
 
 from tests.hil.driven import SLEW, drive
-from tests.hil.machine import (
-    FILE,
-    Joysticks,
-    Service,
-    candump,
-    logged,
-    wait_for,
-)
+from tests.hil.machine import FILE, Joysticks, Service, candump, logged, wait_for
 
 
 def state(*names: str) -> Callable[[dict], bool]:

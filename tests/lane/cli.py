@@ -67,11 +67,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--boot-timeout", type=float, default=300, metavar="S")
     add("--systemd", action="store_true", help="systemd is PID 1, the command runs as a service")
     add("--bench", action="store_true", help="repeatable latencies: 1 ns for each instruction")
-    add(
-        "--steady",
-        action="store_true",
-        help="a time of its own: a busy host makes nothing late",
-    )
+    add("--steady", action="store_true", help="a time of its own: a busy host makes nothing late")
     add("--kernel", choices=tuple(kernel.META_PACKAGES), default="std", help="rt: PREEMPT_RT")
     memory = f"the machine's memory (default {MEMORY_MIB}, with --systemd {systemd.MEMORY_MIB})"
     add("--mem", type=int, metavar="MIB", help=memory)

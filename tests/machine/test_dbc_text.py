@@ -187,6 +187,7 @@ def test_all_that_can_be_loaded(file: Path) -> None:
     for row in (
         OTHER,  # two of one id
         "SIG_VALTYPE_ 5 One : 1;\n",  # a float of 8 bits
+        "SIG_VALTYPE_ 5 None : 1;\n",  # of a signal that there is not
         'BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","J1939PG";\n'
         'BA_DEF_DEF_ "VFrameFormat" "StandardCAN";\nBA_ "VFrameFormat" BO_ 5 1;\n',
     ):

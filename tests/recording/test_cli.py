@@ -81,17 +81,10 @@ def test_part_of_a_drive(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "text"),
     [
-        ("", "got no frame"),
         ("(1.0) vcan0 7FF#00\n(2.0) vcan0 7FF#00\n", "none of its joystick messages (JoystickLeft"),
         (
             "(1.0) can3 110#00\n(2.0) can4 110#00\n",
             "bus crane: expected the channel 'vcan0', got 'can3', 'can4'",
-        ),
-        ("(2.0) vcan0 110#00\n(1.0) vcan0 110#00\n", "got mixed clocks: a time 1.000 s before"),
-        (
-            "nothing\n",
-            "x.log:1: expected a line of candump -L, such as (1436509052.249713) can0 110#0102,"
-            " got 'nothing'",
         ),
     ],
 )
@@ -99,7 +92,7 @@ def test_a_log_that_cannot_be_used_is_reported(tmp_path: Path, rows: str, text: 
     log = tmp_path / "x.log"
     log.write_text(rows)
     arguments = [log, "--config", "forwarder.yaml", "--out", tmp_path / "out"]
-    assert text in called(*arguments, code=2).replace("\n", " ").replace("x.log: 1", "x.log:1")
+    assert text in called(*arguments, code=2).replace("\n", " ")
 
 
 def test_options_that_cannot_be(tmp_path: Path) -> None:

@@ -9,15 +9,6 @@ from canshaper.codec.frame import service_of
 from canshaper.commissioning.nodes.eds import Eds
 from canshaper.errors import ConfigError, Problem
 
-
-@dataclass(frozen=True)
-class MessageTiming:
-    """How a deployment uses a message: sent every so many ms, lost after so many."""
-
-    cycle_ms: int | None
-    timeout_ms: int
-
-
 MOST_PDOS = 512
 MOST_BITS = 64
 RECEIVE, TRANSMIT = 0x1400, 0x1800  # communication parameters of the first RPDO and TPDO

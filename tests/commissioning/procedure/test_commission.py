@@ -101,11 +101,7 @@ def exchanged(text: str) -> str:
 
 @pytest.mark.slow
 def test_a_joystick_of_another_axis_is_put_right(machine: Path) -> None:
-    text = machine.read_text()
-    swapped = text.replace("signal: Slew,", "signal: X,").replace(
-        "signal: NearFar,", "signal: Slew,"
-    )
-    machine.write_text(swapped.replace("signal: X,", "signal: NearFar,"))
+    machine.write_text(exchanged(machine.read_text()))
     real = load_deployment(machine)
     assert real.axes["slew"].config.command.signal == "NearFar"
     bench = _WrongHand(Prompts(), [])
@@ -122,11 +118,7 @@ class _WrongHand(Simulated):
 
     def drive(self, deployment: Any, log: Path, task: Any) -> None:
         right = Path("right.yaml")
-        text = Path("machine.yaml").read_text()
-        text = text.replace("signal: Slew,", "signal: X,").replace(
-            "signal: NearFar,", "signal: Slew,"
-        )
-        right.write_text(text.replace("signal: X,", "signal: NearFar,"))
+        right.write_text(exchanged(Path("machine.yaml").read_text()))
         super().drive(load_deployment(right), log, task)
 
 

@@ -41,9 +41,7 @@ def test_known_measures(poles: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("poles", KNOWN)
-def test_a_machine_without_limits_leaves_what_the_filter_leaves(
-    poles: tuple[float, float],
-) -> None:
+def test_a_machine_without_limits_leaves_what_the_filter_leaves(poles: tuple[float, float]) -> None:
     for residual in evaluate(MODE, 0.02, gff(poles), WIDE).residuals:
         # 1.0 is the most an axis sends, so filters that ask for more are clipped.
         within = poles[0] * poles[1] < 1.01 * MODE.omega_rad_s**2

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from canshaper.design.tuning.modes import modes_over_range
-from canshaper.design.tuning.robust import (
-    LEAST_TAP,
-    least_residual,
-    shortest,
-    time_optimal_s,
-)
+from canshaper.design.tuning.robust import LEAST_TAP, least_residual, shortest, time_optimal_s
 from canshaper.shaping.sway import SwayMode
 from tests.rigs.residual import residual_left
 
@@ -18,8 +13,7 @@ VALVE = {"tick_s": 0.02, "rate_per_s": 5.0}
 
 
 @pytest.mark.parametrize(
-    "duration_s, range_pct, residual_pct",
-    [(1.6, 15.0, 9.4), (1.8, 15.0, 6.9), (2.2, 30.0, 3.5)],
+    "duration_s, range_pct, residual_pct", [(1.6, 15.0, 9.4), (1.8, 15.0, 6.9), (2.2, 30.0, 3.5)]
 )
 def test_designs_of_the_literature_values(
     duration_s: float, range_pct: float, residual_pct: float
