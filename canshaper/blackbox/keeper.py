@@ -90,7 +90,9 @@ class BlackBox:
             except OSError as error:
                 self._log_fault(error.errno or 1)
 
-    def around(self, guarded: Guarded, controller: Controller) -> Recorder:
+    def around(
+        self, guarded: Guarded, controller: Controller, kind: type[Recorder] = Recorder
+    ) -> Recorder:
         """Return a recorder of all calls to a controller and their results; ``begin`` starts it."""
         deployment = controller.deployment
         self._flush()
@@ -108,7 +110,7 @@ class BlackBox:
             from canshaper.blackbox.write import last_number
 
             self._number = max(self._number, last_number(self._folder, deployment.path.stem))
-        self._recorder = Recorder(guarded, controller, self._ring)
+        self._recorder = kind(guarded, controller, self._ring)
         return self._recorder
 
     def begin(self, now_ns: int) -> None:

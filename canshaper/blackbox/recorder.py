@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from canshaper.blackbox.ring import CHUNK, Kind, Ring
 from canshaper.codec.frame import Frame, FrameFault
@@ -95,6 +96,17 @@ class Recorder:
         for at in range(0, len(text), CHUNK):
             part = text[at : at + CHUNK]
             self._put(Kind.SET, 0, len(part), False, len(text) - at, 0, part)
+
+    def rehearse(self, what: object, who: str) -> Mapping[str, Any]:
+        """Make a fault of an input, see ``Rehearsal``.
+
+        Raises:
+            ValueError: this file does not allow it.
+        """
+        raise ValueError("faults are rehearsed where the file has control.rehearse_faults")
+
+    def reloads(self) -> None:
+        """Take note that another controller follows."""
 
     def flush(self) -> None:
         """Write down what was noted."""

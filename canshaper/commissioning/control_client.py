@@ -1,4 +1,4 @@
-"""The other end of the control socket: for ``canshaper set``, ``metrics`` and the live page."""
+"""The other end of the control socket: for ``set``, ``fault``, ``metrics`` and the live page."""
 
 import getpass
 import json
@@ -54,6 +54,17 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
         ControlError: no daemon answers, or it refuses; then nothing has changed.
     """
     _ask(path, {"set": dict(values), "by": f"{person()}/{by}" if by else person()})
+
+
+def rehearse(path: Path, what: str) -> dict[str, Any]:
+    """Let a running daemon make a fault, by its name, ``end`` it, or ``report`` of it.
+
+    Raises:
+        ControlError: no daemon answers, or it refuses.
+    """
+    answer = _ask(path, {"fault": what, "by": person()})["fault"]
+    assert isinstance(answer, dict)
+    return answer
 
 
 def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:

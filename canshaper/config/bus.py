@@ -188,6 +188,10 @@ RUNTIME = Path("/run/canshaper")
 End = Annotated[float, number(-1e6, 1e6, "", "end of the range, in the number's own unit")]
 
 
+REDUCED_PCT = 40.0
+"""Reduced speed, % of full speed: of a first motion, and while faults are rehearsed."""
+
+
 class Control(Section):
     """The control socket of the daemon, and the numbers that ``canshaper set`` may change."""
 
@@ -196,15 +200,18 @@ class Control(Section):
     option --control PATH of run and set is another place."""
     mode: str = Field("0600", pattern="^0[0-7]{3}$")
     """File mode of the socket, octal, in quotes: who may write to it may change the numbers."""
-    adjustable: dict[str, Annotated[list[End], Field(min_length=2, max_length=2)]] = Field(
-        min_length=1
-    )
+    adjustable: dict[str, Annotated[list[End], Field(min_length=2, max_length=2)]] = Field({})
     """Least and most of each number of sway and filter in the file, and of max_pct, rise_per_s,
     fall_per_s of limits, by its keys with dots between. Not on axes with gain_schedule or
     profiles."""
+    rehearse_faults: bool = Field(False, description="let canshaper fault make faults of inputs")
+    """For commissioning: canshaper fault may make faults of the inputs while the machine runs. Only
+    at reduced speed: with max_pct of every axis and motion up to 40."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
+        if not (self.adjustable or self.rehearse_faults):
+            raise ValueError("adjustable: expected a number to change, or rehearse_faults")
         if int(self.mode, 8) & 0o002:
             others = f"0{int(self.mode, 8) & ~0o007:03o}"
             text = f"expected no right to write for others, such as {others!r}, got {self.mode!r}"

@@ -51,9 +51,13 @@ class Control:
         values = request.get("set", {})
         if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
             peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
-        if request.keys() - {"set", "black_box", "by", "status"} or not isinstance(values, dict):
+        known = {"set", "black_box", "by", "status", "fault"}
+        if request.keys() - known or not isinstance(values, dict):
             expected = '{} or {"set": {KEY: VALUE}}, {"black_box": "write"}, {"status": true}'
+            expected += ', {"fault": NAME}'
             raise ValueError(f"expected {expected}, got another object")
+        if "fault" in request:
+            return {"fault": self._recorder.rehearse(request["fault"], peer)}
         if "black_box" in request:
             if request["black_box"] == "write":
                 self._black_box.request()

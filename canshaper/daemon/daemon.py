@@ -9,6 +9,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
+from canshaper.blackbox.recorder import Recorder
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
@@ -73,6 +74,7 @@ class Daemon:
         self._ports = opened_ports(deployment, self._on_fault, self._manager)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)
+        self._recorder: Recorder
         self._use(deployment)
         self._control = self._open_control(deployment)
 
@@ -184,13 +186,20 @@ class Daemon:
     # -- deployments ---------------------------------------------------------------------------
 
     def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
+        if before:
+            self._recorder.reloads()
         self._controller = Controller(deployment)
         guarded = Guarded(self._controller)
         if before:
             self._controller.carry_over(before)
             guarded.carry_over(self._guarded)
         self._guarded: Guarded = guarded
-        self._recorder = self._black_box.around(guarded, self._controller)
+        kind = Recorder
+        if deployment.config.control and deployment.config.control.rehearse_faults:
+            from canshaper.daemon.rehearsal.rehearsal import Rehearsal
+
+            kind = Rehearsal
+        self._recorder = self._black_box.around(guarded, self._controller, kind)
         self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._follower = tick_follower(deployment, self._controller)

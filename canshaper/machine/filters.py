@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.filters import Breakpoint, Filter, Profile, designed
 from canshaper.config.limits import Sway
 from canshaper.config.schema import AxisSection, DeploymentConfig
@@ -140,12 +141,12 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that every adjustable number can be changed in motion."""
+    """Check that every adjustable number can be changed in motion, and speed while faults are."""
     if config.control is None:
         return
     from canshaper.config.adjust import Key, faults
 
-    add = diagnostics.add
+    add, slow = diagnostics.add, config.control.rehearse_faults
     for text, (low, high) in config.control.adjustable.items():
         place = ("control", "adjustable", text)
         key = Key.parsed(text)
@@ -154,6 +155,16 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         elif diagnostics.check_axis(place, key.axis, config.axes):
             for fault in faults(key, config.axes[key.axis], low, high):
                 add(place, fault)
+            if slow and key.name == "max_pct" and high > REDUCED_PCT:
+                add(place, f"expected up to {REDUCED_PCT:g} with rehearse_faults, got {high:g}")
+    if not slow:
+        return
+    fast = {("axes", n, "limits", "max_pct"): a.limits.max_pct for n, a in config.axes.items()}
+    motions = {("motion", n, "max_pct"): one.max_pct for n, one in config.motion.items()}
+    for where, most in (fast | motions).items():
+        if most > REDUCED_PCT:
+            text = f"expected up to {REDUCED_PCT:g} with control.rehearse_faults"
+            add(where, f"{text}, got {most:g}")
 
 
 def filter_fault(

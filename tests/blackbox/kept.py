@@ -23,12 +23,14 @@ class Kept(keeper.BlackBox):
         self.boxes = []
         self._fresh = b""
 
-    def around(self, guarded: Guarded, controller: Controller) -> Recorder:
+    def around(
+        self, guarded: Guarded, controller: Controller, kind: type[Recorder] = Recorder
+    ) -> Recorder:
         deployment = controller.deployment
         if self._deployment and self._deployment.identity != deployment.identity:
             self._keep()
         self._fresh = pickle.dumps(deployment)
-        return super().around(guarded, controller)
+        return super().around(guarded, controller, kind)
 
     def close(self) -> None:
         self._keep()

@@ -131,4 +131,5 @@ def test_black_boxes_are_written_where_the_daemon_was_started_with(
 
 def test_a_request_that_is_none_is_answered_with_what_is_one(bench: Bench, path: Path) -> None:
     text = 'expected {} or {"set": {KEY: VALUE}}, {"black_box": "write"}, {"status": true}'
-    assert answered(bench, path, {"get": 1}) == {"error": f"{text}, got another object"}
+    text += ', {"fault": NAME}, got another object'
+    assert answered(bench, path, {"get": 1}) == {"error": text}

@@ -30,7 +30,7 @@ BUDGET = {
     "docs/campaign.md": 945,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
-    "docs/commission.md": 675,
+    "docs/commission.md": 790,
     "docs/comparison.md": 610,
     "docs/decisions.md": 895,
     "docs/deployment.md": 2210,
@@ -46,7 +46,7 @@ BUDGET = {
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
-    "docs/safety.md": 2300,
+    "docs/safety.md": 2460,
     "docs/sensor.md": 1180,
     "docs/service.md": 790,
     "docs/states.md": 300,
@@ -67,11 +67,11 @@ LINES = {
         4_926,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (63_846, "a new ability takes the room of an old one"),
-    "tests": (98_152, "one level for each behaviour"),
+    "canshaper": (64_913, "a new ability takes the room of an old one"),
+    "tests": (99_000, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (349, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (355, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -115,6 +115,7 @@ class Bench:
 
     Attributes:
         requests: numbers to be set, as they come from the control socket.
+        control: another control socket.
         refused: how often such a request was.
         holds: standstills to come: (time, where, for how long).
     """
@@ -122,6 +123,7 @@ class Bench:
     def __init__(self, world: World, rules: Rules, load: Loader, reading_polls: int = 2) -> None:
         self.world, self.rules = world, rules
         self.requests: list[dict[str, float]] = []
+        self.control: Requests | None = None
         self.refused = self.applied = 0
         self.holds: list[tuple[int, str, int]] = []
         self.trace: Callable[[str], None] | None = None
@@ -258,7 +260,7 @@ class Bench:
         return Read(load, self._polls)
 
     def _control(self, *_: object) -> "Requests":
-        return Requests(self)
+        return self.control or Requests(self)
 
 
 class Read:

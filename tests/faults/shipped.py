@@ -71,7 +71,8 @@ class Shipped:
 
 
 @functools.cache
-def _directory() -> tempfile.TemporaryDirectory[str]:
+def directory() -> tempfile.TemporaryDirectory[str]:
+    """Where the copies are."""
     return tempfile.TemporaryDirectory(prefix="canshaper-shipped-")
 
 
@@ -91,7 +92,7 @@ def shipped(name: str) -> Shipped:
     copies = {"adjustable": text + control, "changed": changed, "refiltered": refiltered}
     paths = {}
     for kind, copy in copies.items():
-        paths[kind] = Path(_directory().name) / f"{name}-{kind}.yaml"
+        paths[kind] = Path(directory().name) / f"{name}-{kind}.yaml"
         paths[kind].write_text(copy, encoding="utf-8")
     return Shipped(
         machine, file, paths["adjustable"], ranges, paths["changed"], paths["refiltered"]

@@ -151,3 +151,35 @@ def test_a_number_of_the_swing_that_goes_with_another_one_only_may_be_adjustable
     control = machine.load().config.control
     assert control is not None
     assert len(control.adjustable) == 2
+
+
+def rehearsing(machine: Machine, rows: str = "", limits: str = "max_pct: 40, ") -> None:
+    """Allow faults to be rehearsed, at such a speed."""
+    machine.in_yaml(STATUS, f"{STATUS}control:\n  rehearse_faults: true\n{rows}")
+    machine.yaml = machine.yaml.replace("rise_per_s: 5,", f"{limits}rise_per_s: 5,")
+
+
+def test_faults_are_rehearsed_at_reduced_speed_without_a_number_to_change(machine: Machine) -> None:
+    rehearsing(machine)
+    control = machine.load().config.control
+    assert control is not None
+    assert control.rehearse_faults
+    assert not control.adjustable
+
+
+def test_faults_are_rehearsed_at_no_higher_speed(machine: Machine) -> None:
+    rehearsing(machine, limits="max_pct: 41, ")
+    for axis in ("slew", "near_far", "lift"):
+        text = f"axes.{axis}.limits.max_pct: expected up to 40 with control.rehearse_faults, got 41"
+        assert any(text in problem for problem in machine.problems())
+
+
+def test_no_number_may_be_set_to_a_higher_speed_meanwhile(machine: Machine) -> None:
+    rehearsing(machine, "  adjustable:\n    axes.slew.limits.max_pct: [20, 60]\n")
+    (problem,) = machine.problems()
+    assert problem.endswith("expected up to 40 with rehearse_faults, got 60")
+
+
+def test_a_control_section_allows_something(machine: Machine) -> None:
+    machine.in_yaml(STATUS, f"{STATUS}control: {{ socket: /run/c.sock }}\n")
+    assert "expected a number to change, or rehearse_faults" in machine.problems()[0]

@@ -8,6 +8,7 @@ from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.likely_mistakes import warnings_of
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
+from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.source import Source
 from canshaper.edit.edit import change, of_limits
 from canshaper.machine.deployment import Deployment
@@ -15,7 +16,6 @@ from canshaper.machine.stopping import rehearsed_valves, unstated
 from canshaper.report import style
 from canshaper.report.console import axis_title
 
-FIRST_PCT = 40.0  # of full speed, for the first motion; what `canshaper init` writes too
 MOTION = "motion"  # the step of that name
 EVENTS = ("joystick released", "joystick reversed", "joystick lost", "enable lost", "limits allow")
 
@@ -43,7 +43,7 @@ def run(context: Context) -> Outcome:
     outcome.figures[""] = lambda: figure(axes)
     limits = {name: axis.limits for name, axis in deployment.config.axes.items()}
     first = MOTION not in context.numbers
-    fast = [name for name, one in limits.items() if first and one.max_pct > FIRST_PCT]
+    fast = [name for name, one in limits.items() if first and one.max_pct > REDUCED_PCT]
     if fast:
         outcome.sheet.print(f"The first motion is at reduced speed: {', '.join(fast)}")
     allowed = []
@@ -61,7 +61,7 @@ def run(context: Context) -> Outcome:
 
 
 def _write(deployment: Deployment, fast: list[str], allowed: list[str]) -> list[str]:
-    sections, slow = deployment.config.axes, {"max_pct": FIRST_PCT}
+    sections, slow = deployment.config.axes, {"max_pct": REDUCED_PCT}
     slower = [of_limits(name, sections[name], slow) for name in fast]
     change(deployment.path, [*slower, *confirmed(deployment.path, allowed)])
     return []

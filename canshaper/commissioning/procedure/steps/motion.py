@@ -9,9 +9,10 @@ from statistics import fmean
 from canshaper.commissioning.identification.commands import Samples
 from canshaper.commissioning.procedure.bench import Mode, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
-from canshaper.commissioning.procedure.steps.check import FIRST_PCT, MOTION
+from canshaper.commissioning.procedure.steps.check import MOTION
 from canshaper.commissioning.procedure.steps.dry import PAUSE_S, ends, figure, show_states
 from canshaper.commissioning.procedure.traffic import AxisTraffic, read_traffic
+from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.source import Source
 from canshaper.edit.edit import change
 from canshaper.errors import UsageError
@@ -32,9 +33,9 @@ GUIDE = (
 def run(context: Context) -> Outcome:
     """Let every axis be moved a little, and the enable be let go in motion."""
     deployment = context.deployment
-    fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > FIRST_PCT]
+    fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > REDUCED_PCT]
     if fast:
-        text = f"expected max_pct up to {FIRST_PCT:g} for the first motion"
+        text = f"expected max_pct up to {REDUCED_PCT:g} for the first motion"
         raise UsageError(f"{', '.join(fast)}: {text}; do the step check again, which proposes it")
     log = context.folder / "motion.log"
     axes = [*deployment.axes]

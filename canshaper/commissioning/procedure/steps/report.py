@@ -5,6 +5,7 @@ from pathlib import Path
 
 from canshaper.commissioning.assumed import MEASURE, origins
 from canshaper.commissioning.procedure.files import shown
+from canshaper.commissioning.procedure.rehearsed import WRONG, Row, kept, table
 from canshaper.commissioning.procedure.state import (
     FILE,
     Context,
@@ -45,7 +46,11 @@ def run(context: Context) -> Outcome:
     if assumed:
         text = f"NOT FIT TO SIGN: a guess decides about movement: {', '.join(assumed)}; {MEASURE}"
         outcome.sheet.print(text)
-    fit = "" if assumed or undone else ", fit to sign"
+    faults = kept(context.folder)
+    wrong = [row["fault"] for row in faults if row["verdict"] == WRONG]
+    none = f"No fault was rehearsed: canshaper fault {context.deployment.path.name}"
+    outcome.sheet.print(table(faults) if faults else none)
+    fit = "" if assumed or undone or wrong else ", fit to sign"
     outcome.sheet.print(f"Report: {path}, to print{fit}")
     return outcome
 
@@ -77,18 +82,20 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     numbers = new_table("number", "is", "by", title="Origins")
     for row in origins(deployment.config):
         numbers.add_row(*row)
-    parts = [html.table(by_hand), html.table(summary), html.table(numbers)]
+    faults = kept(folder)
+    tables = [by_hand, *([table(faults)] if faults else []), summary, numbers]
+    parts = [html.table(one) for one in tables]
     for name, one in steps.items():
         parts += _step(name, one, folder)
     drive = steps.get(DRIVE.name)
     first = [
-        html.verdict(_verdict(deployment, steps)),
+        html.verdict(_verdict(deployment, steps, faults)),
         *(_pictures(drive, folder) if drive else []),
     ]
     return html.document(title, facts, parts, first)
 
 
-def _verdict(deployment: Deployment, steps: dict[str, Record]) -> str:
+def _verdict(deployment: Deployment, steps: dict[str, Record], faults: list[Row]) -> str:
     """The result of the day in one sentence: the swing that is left, and what is missing."""
     drive = steps.get(DRIVE.name)
     done = drive if drive and drive.status is Status.DONE else None
@@ -103,6 +110,8 @@ def _verdict(deployment: Deployment, steps: dict[str, Record]) -> str:
         missing.append(f"{len(assumed)} values are assumed, not measured")
     if undone := [name for name, one in steps.items() if one.status is not Status.DONE]:
         missing.append(f"not done: {', '.join(undone)}")
+    if wrong := [row["fault"] for row in faults if row["verdict"] == WRONG]:
+        missing.append(f"{WRONG}: {', '.join(wrong)}")
     if missing:
         return f"NOT FIT TO SIGN: {'; '.join(missing)}; {swing}."
     return f"Fit to sign after the hand tests: {swing}."

@@ -1,0 +1,1 @@
+"""Faults rehearsed at the running machine; loaded where its file allows them only."""
