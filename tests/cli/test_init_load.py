@@ -65,7 +65,7 @@ def test_a_signal_and_its_values(
         (f"{GRIPPED} = JoystickLeft.Enable", "expected one of "),
         ("Weight: its value with a usual log = 0", "expected another value than that of an empty"),
         ("Weight: its value with a usual log = 6000", "expected a number, 0 to 5000, got '6000'"),
-        ("slew: time of ten full swings with a log = 23", "expected a number, 23.6 to 85.7, got"),
+        ("slew: time of ten full swings with a log = 23", "expected a number, 23.6 to 178.5, got"),
         (f"{GRIPPED} = GrappleLoad.Gripped\nGripped: its value = 2", "a whole number, 0 to 1, got"),
     ],
 )

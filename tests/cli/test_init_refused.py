@@ -28,7 +28,7 @@ def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
         "slew radius": "30\n10",
         "Axis that moves the tip": "turn\nnear_far",
         "Measured radius": "Radius\n-",
-        "slew ten": "0\n2.1\n86\n20",
+        "slew ten": "0\n2.1\n179\n20",
         "slew last": "21\n10",
     }
     result = init(file, given)
@@ -43,11 +43,11 @@ def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
         "expected a word of letters, digits and _, other than true, false and null, got 'big slew'",
         "expected a word of letters, digits and _, other than true, false and null, got 'null'",
         "expected another one than turn, got 'turn'",
-        "expected a number, 2.2 to 85.7, got '2.1'",
-        "expected a number, 2.2 to 85.7, got '86'",
+        "expected a number, 2.2 to 178.5, got '2.1'",
+        "expected a number, 2.2 to 178.5, got '179'",
         "expected one of SlewCommand.Velocity, ",
         "expected a whole number, 60 to 5000, got '50'",
-        "expected a number, 2.2 to 85.7, got '0'",
+        "expected a number, 2.2 to 178.5, got '0'",
         "expected a number, 0.02 to 20, got '21'",
         "expected a number, 0.05 to 3, got '90'",
         "expected a number, 0.5 to 20, got '30'",

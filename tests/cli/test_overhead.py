@@ -16,6 +16,7 @@ def run(*words: str, code: int = 0) -> str:
     return " ".join(done.output.split())
 
 
+@pytest.mark.slow
 def test_check_finds_nothing() -> None:
     said = run("check", str(FILE))
     assert "bridge-crane.yaml: good" in said

@@ -46,7 +46,7 @@ BUDGET = {
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
-    "docs/safety.md": 2460,
+    "docs/safety.md": 2470,
     "docs/sensor.md": 1180,
     "docs/service.md": 790,
     "docs/states.md": 300,
@@ -67,8 +67,8 @@ LINES = {
         4_926,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (64_913, "a new ability takes the room of an old one"),
-    "tests": (99_000, "one level for each behaviour"),
+    "canshaper": (64_915, "a new ability takes the room of an old one"),
+    "tests": (99_012, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (355, "one that only hands on is joined to its reader")}

@@ -35,6 +35,7 @@ NAMES = (
     "remote-forwarder",
     "forwarder-pump",
     "forwarder-load",
+    "bridge-crane",
 )
 CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
 MADE = {
@@ -102,12 +103,12 @@ def shipped(name: str) -> Shipped:
 def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
     """Numbers of every axis, and ranges in which it never moves quicker than by its file.
 
-    Profiles and gain schedules choose the numbers of an axis that has some.
+    Profiles, gain schedules and measured lengths choose the numbers of an axis that has some.
     """
     ranges: dict[str, tuple[float, float]] = {}
     for name, axis in machine.axes.items():
         config = load_config(machine.path)[0].axes[name]
-        if config.profiles or config.gain_schedule:
+        if config.profiles or config.gain_schedule or (config.sway and config.sway.length):
             continue
         ranges[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
         if axis.filter == "gff":

@@ -116,6 +116,7 @@ def test_a_motion_of_an_axis_with_a_rope_is_refused(tmp_path: Path) -> None:
     assert "sway.length: expected an axis that is in no motion, got one of one" in says
 
 
+@pytest.mark.slow
 def test_check_looks_at_both_ends_of_the_rope(tmp_path: Path) -> None:
     """The taps of the longest rope have to end in the tail, those of the shortest be slow."""
     from canshaper.commissioning.likely_mistakes import warnings_of

@@ -18,13 +18,14 @@ def export(
 
     The C is the same for every machine; only its tables are made, and equal this program to the
     last bit. What it has no part for (sway sensors, gain schedules, E2E, J1939, CANopen and more)
-    is refused by its key. The folder has a golden drive as self-test, for the target too.
+    is refused by its key. The folder has a golden drive as self-test, for the target too:
+    make -C axis && axis/selftest.
 
     Examples:
 
       canshaper export machine.yaml --out axis
 
-      make -C axis && axis/selftest
+      canshaper export machine.yaml --out axis --float
     """
     from canshaper.native.export import export as write
 

@@ -41,6 +41,7 @@ NEVER = {
     "R13": "no fault of an input: `canshaper set` with a number out of range",
     "R14": "no fault of an input: SIGHUP with a broken file",
     "R15": "fill the disk",
+    "LENGTH_LOST": "unplug the sensor of the rope's length",
 }
 """Why what no input makes is not rehearsed, or how else it is tried."""
 
