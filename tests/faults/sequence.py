@@ -256,7 +256,9 @@ class Sequence:
             world.at(at_ns, lambda healthy=healthy: setattr(world, "healthy", healthy))
         over_s = end_s + settle_s + 0.5
         world.every(self.machine.tick_ns, round(over_s * 1e9), lambda: self._moves(sign))
-        return over_s + MOVES_WITHIN_S
+        # A swing that a stop has left is taken away by the next move: it may wait half a swing.
+        rest_s = self.machine.rest_ticks * self.machine.tick_ns / 1e9
+        return over_s + max(MOVES_WITHIN_S, 0.3 * rest_s)
 
     def _moves(self, sign: float) -> None:
         for name, axis in self.rules.axes.items():
