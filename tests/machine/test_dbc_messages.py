@@ -56,6 +56,15 @@ def test_a_problem_is_at_the_line_of_its_message(tmp_path: Path) -> None:
     assert elsewhere.problem(moved, "x").line == 5
 
 
+def test_text_that_is_none_is_a_problem_without_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("canshaper.machine.dbc_text.MOST_MESSAGES", 1)
+    path = written(tmp_path, HEAD + OTHER + WIDE)
+    text = "not a DBC file that can be used: more than 1 messages or 300000 statements"
+    assert load_dbc(path) == (None, [Problem(str(path), None, "", text)])
+
+
 def test_the_size_of_one_file_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(tmp_path, HEAD + OTHER)
     monkeypatch.setattr("canshaper.machine.database.MOST_BYTES", path.stat().st_size)

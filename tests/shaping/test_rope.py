@@ -138,6 +138,13 @@ def test_a_filter_that_has_followed_is_the_one_of_that_length(kind: str, row: in
         fresh.step(0.9 * want)
 
 
+def test_poles_follow_the_period() -> None:
+    follows = KINDS["gff"].follows
+    assert follows is not None
+    poles = {"poles_rad_s": [-4.0, -2.0], "third_pole_rad_s": -8.0}
+    assert follows(poles, 2.0) == {"poles_rad_s": [-2.0, -1.0], "third_pole_rad_s": -4.0}
+
+
 @pytest.mark.parametrize("kind", ["gff", "robust"])
 @pytest.mark.parametrize("change_m_s", [-0.5, 0.5])
 def test_hoisting_in_motion_makes_no_step_and_leaves_no_swing(kind: str, change_m_s: float) -> None:
