@@ -54,12 +54,19 @@ def _has_settings(axis: AxisSection) -> bool:
 
 
 def settings(deployment: Deployment, axis: str) -> dict[str, Any]:
-    """The setting of the ``file``, and those to ``choose`` from, quickest first."""
+    """The setting of the ``file``, and those to ``choose`` from, quickest first.
+
+    A longer response that leaves more than a shorter one, as ``stop_distance_m`` cuts it, is none.
+    """
     config = deployment.axes[axis].config
     made = _front if config.filter.kind == "gff" else _responses
     own = _measured(deployment, axis, config.filter, config.limits.tail_s)[0]
     found = (_fitting(deployment, axis, *one) for one in made(deployment, axis))
-    return {"file": own, "choose": [one for one in found if one]}
+    choose: list[Setting] = []
+    for one in filter(None, found):
+        if config.filter.kind == "gff" or all(one["left"] <= other["left"] for other in choose):
+            choose.append(one)
+    return {"file": own, "choose": choose}
 
 
 def _front(deployment: Deployment, axis: str) -> Iterator[tuple[Filter, float]]:

@@ -67,8 +67,8 @@ LINES = {
         4_926,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (64_915, "a new ability takes the room of an old one"),
-    "tests": (99_030, "one level for each behaviour"),
+    "canshaper": (64_922, "a new ability takes the room of an old one"),
+    "tests": (99_032, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (355, "one that only hands on is joined to its reader")}

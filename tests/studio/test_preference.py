@@ -67,13 +67,15 @@ def test_settings_are_within_the_ends(name: str, tmp_path: Path) -> None:
         assert sway is not None
         own, choose = settings["file"], settings["choose"]
         assert own["tail_s"] == deployment.axes[axis].config.limits.tail_s
-        assert len(choose) >= 8
+        assert len(choose) >= 5
         run_on = [one["run_on_m"] for one in choose]
         assert run_on == sorted(run_on)
         assert run_on[-1] > 1.5 * run_on[0]
         assert max(one["left"] for one in choose) <= USELESS
         if name == "forwarder-robust.yaml":
-            assert choose[-1]["left"] < 0.1 * choose[0]["left"]
+            left = [one["left"] for one in choose]
+            assert left == sorted(left, reverse=True)  # those that stop_distance_m cuts are none
+            assert left[-1] < 0.06
             shortest = choose[0]["filter"]["designed_for"]["duration_s"]
             assert shortest == pytest.approx(0.5 * sway.mode().period_s, abs=0.02)
     for position in (0.0, 0.3, 1.0):
