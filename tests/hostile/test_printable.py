@@ -33,7 +33,8 @@ def test_what_is_shown(text: str, shown: str) -> None:
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_names_are_text_on_a_console(terminal: bool) -> None:
+def test_names_are_text_on_a_console(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")  # a dumb one has no colours
     file = io.StringIO()
     console = SafeConsole(file=file, force_terminal=terminal, width=100)
     table = Table("a name that is as long as what stands below it")
