@@ -16,7 +16,7 @@ from canshaper.config.uncertainty import MOST_FLOW, Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.axes import ALL_AXES, JOINT_AXES, NEAR_FAR, OVERHEAD_AXES, SLEW
+from canshaper_sim.axes import ALL_AXES, JOINTS, NEAR_FAR, OVERHEAD, SLEW, kind_of
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
@@ -110,9 +110,8 @@ def draw_drive(
     script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
     if (longer_s := dwell_s(deployment) - DWELL_S) > 0.0:
         script = replace(script, duration_s=script.duration_s + longer_s)
-    by_coordinate = {moved: axis for axis, moved in deployment.coordinates.items()}
     if deployment.config.crane:
-        script = script.moving(by_coordinate)
+        script = script.moving(deployment.by_coordinate)
     loads, of_loads = _loads(of_load, ranges, script.duration_s, parameters.grapple)
     if "rope_m" in factors:  # on a rope every load swings alike
         loads, of_loads = [], {}
@@ -140,7 +139,8 @@ def _crane(
         "length_pct": draw.between(*ranges.length_pct),
         "damping_pct": draw.between(*ranges.damping_pct),
     }
-    by_rope = bool({*axes} & {*OVERHEAD_AXES})
+    kind = kind_of(axes)
+    by_rope, by_joints = kind == OVERHEAD, kind == JOINTS
     start = "rope_m" if by_rope else "radius_m"
     factors[start] = draw.between(*getattr(ranges, start))
     damped = 1.0 + factors["damping_pct"] / 100.0
@@ -151,7 +151,6 @@ def _crane(
         c6_n_m_s_rad=damped * grapple.c6_n_m_s_rad,
     )
     crane, joints = replace(nominal, grapple=grapple), nominal.joints
-    by_joints = bool({*axes} & {*JOINT_AXES} - {SLEW})
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
     elif by_rope:
@@ -202,7 +201,7 @@ def _place(
 
     An overhead crane has none of them.
     """
-    if {*axes} & {*OVERHEAD_AXES}:
+    if kind_of(axes) == OVERHEAD:
         return crane, {}
     factors = {
         "pump_flow": draw.between(*ranges.pump_flow),

@@ -138,7 +138,7 @@ def at_work(
         source: the deployment.
         set_ups: with what they work.
         tasks: by name.
-        progress: told how much of what is done.
+        progress: called with the part that is done, 0 to 1, and a word for the work.
         seeds: working cycles of each task with each set-up.
 
     Returns:

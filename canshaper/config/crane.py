@@ -1,4 +1,4 @@
-"""What each axis does to the load: axes of a crane by the coordinates that they move."""
+"""Axes of a crane move coordinates of its tip, its trolley or its joints: which one moves which."""
 
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Final, Literal

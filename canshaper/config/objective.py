@@ -31,7 +31,8 @@ class Objective(Section):
     states: States = Field("sway", description="what Q weighs")
     preference: Annotated[float, number(0, 1, "", "instead: 0 quickest, 1 calmest")] | None = None
     pole_distance: Annotated[
-        PoleDistance, BeforeValidator(lambda word: word or "off")  # YAML 1.1 reads off as false
+        PoleDistance,
+        BeforeValidator(lambda word: "off" if word is False else word),  # as YAML 1.1 reads it
     ] = Field("text", description="sense of Eq. 14e")
     horizon_s: Annotated[float, number(0.2, 60, "s", "how long a step is watched")] = 3.0
     third_pole: bool = Field(False, description="three poles")

@@ -1,4 +1,4 @@
-"""YAML with line numbers, and the problems found in files: all of them, each with its place."""
+"""YAML with line numbers, and all problems of files, each with its place."""
 
 import errno
 import os

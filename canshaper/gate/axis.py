@@ -188,7 +188,7 @@ class AxisState(AxisInput):
             self.top = max(self.top - self.of.fall, min(self.top, reach))
 
     def fallen(self, velocity: float, periods: int) -> float:
-        """What it is on its way back to by then, in the direction of a velocity."""
+        """Return the speed to which the axis has to have fallen by then, in the direction given."""
         return self.top - self.of.fall * periods if velocity * self.last >= 0.0 else 0.0
 
     def held_at(self, velocity: float) -> float:

@@ -13,7 +13,7 @@ NEVER = -(1 << 62)
 
 
 class AxisInput:
-    """What was received for an axis; reasons to stop since it had its turn last, however short.
+    """Input of an axis: its demand, and each reason to stop since its last turn, however short.
 
     Attributes:
         demand: of the last joystick frame that counts, and ``changed_ns`` since when.

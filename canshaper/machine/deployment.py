@@ -148,6 +148,11 @@ class Deployment:
         """Coordinate of the crane that each axis moves, by its name."""
         return coordinates(self.config.crane, self.axes)
 
+    @property
+    def by_coordinate(self) -> dict[str, str]:
+        """Axis that moves each coordinate of the crane."""
+        return {moved: axis for axis, moved in self.coordinates.items()}
+
     def inputs(self) -> list[Bound[InputSection]]:
         """Joysticks, switches, positions, sway sensors, feedback and status words of the valves."""
         axes = self.axes.values()

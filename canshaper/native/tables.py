@@ -163,7 +163,7 @@ def _field(message: Message, name: str | None) -> Numbers:
 
 
 def _message(bound: BoundInput, buses: list[str]) -> Numbers:
-    """What ``cs_message_config`` has."""
+    """Return the members of ``cs_message_config``."""
     config, protection = bound.config, bound.protection
     bus, can_id, extended = bound.key
     sequence = SequenceChecker(protection, config.alive_max_step, config.qualify)
@@ -291,7 +291,7 @@ def _limits(axis: ShapedAxis) -> Numbers:
 def _motion(
     deployment: Deployment, name: str, runner: MotionRunner, axes: list[str], buses: list[str]
 ) -> Numbers:
-    """What ``cs_motion_config`` has."""
+    """Return the members of ``cs_motion_config``."""
     bound, motion = deployment.motions[name], runner._motion
     config, near_far = bound.config, bound.config.near_far
     members = [one for one in (motion._slew, motion._near_far) if one]

@@ -3,7 +3,7 @@
 from typing import Final, Literal
 
 Lost = Literal["longest", "hold", "neutral"]
-"""What holds while the length is not known: the longest rope, the last one, or no motion."""
+"""Reaction while no length is known: follow the longest rope, hold the last length, or stop."""
 
 # No hoist is faster. A message may come once in half a second, and round what it says.
 MOST_M_S: Final = 3.0

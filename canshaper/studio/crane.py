@@ -19,10 +19,10 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.sliders import adjustable, sliders
 from canshaper.studio.view import CraneView, Report
-from canshaper_sim.axes import ROTATOR
+from canshaper_sim.axes import OVERHEAD, ROTATOR
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.machines import AXES_OF, OVERHEAD, build_machine, machine_for
+from canshaper_sim.machines import AXES_OF, build_machine, machine_for
 
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0

@@ -121,7 +121,7 @@ def build_app(
 
 
 def pages_of(stage: Stage, hello: dict[str, Any]) -> BaseRoute:
-    """The connections of the pages of a stage; each is told what there is."""
+    """Return the route of the pages of a stage; each page first gets what there is."""
     numbers = itertools.count(1)
     open_pages: set[int] = set()
 

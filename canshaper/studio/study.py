@@ -147,7 +147,7 @@ class Session:
             self.phase, self._why, self._until_s = "pause", why, now_s
 
     def shown(self, now_s: float) -> dict[str, Any]:
-        """What the page shows; nothing of it says which setting it is."""
+        """Return the state that the page shows; it does not name the setting."""
         over = self.phase in ("shown", "done")
         one = self._last if over else self._todo[0]
         numbers, left = (

@@ -57,7 +57,7 @@ class Key:
 
 
 def read_key(path: Path) -> dict[str, Any]:
-    """What a key says.
+    """Read the settings of a study from its key.
 
     Raises:
         UsageError: it is none.

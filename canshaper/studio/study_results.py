@@ -1,4 +1,4 @@
-"""What the placements of a study say: of each person, and of all persons in pairs.
+"""Figures of a study, from its placements: of each person, and of all persons in pairs.
 
 Seconds are compared as logarithms: a setting makes a placement quicker by a part of it.
 """
@@ -22,7 +22,7 @@ from canshaper.studio.study_files import BROKEN, HIT, LETTERS, rows_of
 
 Rows = Sequence[Mapping[str, str]]
 SPREAD = 0.215
-"""Of a person's change of the mean logarithm, one sigma, before anyone was measured: chosen. Log
+"""Spread of the changes of the mean logarithm from person to person, one sigma: chosen. Log
 times of a simulated operator (``canshaper work``, empty grapple) have .15 to .26; changes of three
 kinds of them .26."""
 PAIRS = [*combinations(LETTERS, 2)]

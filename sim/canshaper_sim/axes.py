@@ -5,6 +5,7 @@ joint by joint. Slewing is the same axis in both. An overhead crane moves a trol
 deployment may call its axes otherwise: its ``coordinates`` say which is which.
 """
 
+from collections.abc import Iterable
 from typing import Final
 
 SLEW: Final = "slew"  # positive: theta1 grows, counter-clockwise from above
@@ -23,3 +24,20 @@ JOINT_AXES: Final = (SLEW, LIFT_CYLINDER, KNUCKLE, EXTENSION)
 OVERHEAD_AXES: Final = (BRIDGE, TROLLEY, HOIST)
 ALL_AXES: Final = (*TIP_AXES, *JOINT_AXES[1:], *OVERHEAD_AXES)
 WITHOUT_SWAY: Final = (LIFT, HOIST)  # they excite none by themselves
+
+# Machines by what their axes move.
+TIP: Final = "tip"
+JOINTS: Final = "joints"
+OVERHEAD: Final = "overhead"
+
+
+def kind_of(axes: Iterable[str]) -> str:
+    """Return what axes that move these coordinates drive.
+
+    One with a bridge, trolley or hoist is an overhead crane, one with a joint of the boom is driven
+    joint by joint, every other moves the tip.
+    """
+    moved = {*axes}
+    if moved & {*OVERHEAD_AXES}:
+        return OVERHEAD
+    return JOINTS if moved & {*JOINT_AXES} - {SLEW} else TIP

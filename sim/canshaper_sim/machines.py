@@ -11,16 +11,22 @@ from collections.abc import Iterable, Mapping
 from typing import Final, Protocol
 
 from canshaper.errors import DesignError
-from canshaper_sim.axes import JOINT_AXES, OVERHEAD_AXES, ROTATOR, SLEW, TIP_AXES
+from canshaper_sim.axes import (
+    JOINT_AXES,
+    JOINTS,
+    OVERHEAD,
+    OVERHEAD_AXES,
+    ROTATOR,
+    TIP,
+    TIP_AXES,
+    kind_of,
+)
 from canshaper_sim.crane import Crane, CraneParameters, OverheadCrane, joint_crane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.tip_controller import TipController
 
-TIP: Final = "tip"
 TIP_CONTROLLER: Final = "tip-controller"
-JOINTS: Final = "joints"
-OVERHEAD: Final = "overhead"
 AXES_OF: Final[Mapping[str, tuple[str, ...]]] = {
     TIP: TIP_AXES,
     TIP_CONTROLLER: TIP_AXES,
@@ -124,16 +130,13 @@ def build_machine(
 def machine_for(axes: Iterable[str], requested: str | None = None) -> str:
     """The machine for a deployment whose axes move these coordinates; `requested` may name one.
 
-    Without one a deployment with a joint of the boom is driven joint by joint, one with a bridge,
-    trolley or hoist is an overhead crane, every other moves the tip.
+    Without one the axes say it, see ``kind_of``.
 
     Raises:
         DesignError: no such machine, or it is no crane of this kind.
     """
-    moved = {*axes}
-    overhead, joints = moved & {*OVERHEAD_AXES}, moved & {*JOINT_AXES} - {SLEW}
     if requested is None:
-        return OVERHEAD if overhead else JOINTS if joints else TIP
+        return kind_of(axes)
     if requested not in AXES_OF:
         raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {requested!r}")
     return requested

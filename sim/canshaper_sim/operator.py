@@ -11,14 +11,13 @@ from canshaper_sim.axes import (
     BRIDGE,
     EXTENSION,
     HOIST,
-    JOINT_AXES,
     KNUCKLE,
     LIFT,
     LIFT_CYLINDER,
     NEAR_FAR,
-    OVERHEAD_AXES,
     SLEW,
     TROLLEY,
+    kind_of,
 )
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.scripts import SCRIPTS
@@ -113,9 +112,7 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     Raises:
         DesignError: no script of that name; lists the names.
     """
-    joints = {*JOINT_AXES} - {SLEW}
-    kind = "joints" if joints & {*axes} else "overhead" if {*OVERHEAD_AXES} & {*axes} else ""
-    script = SCRIPTS.get(f"{name}-{kind}") or SCRIPTS.get(name)
+    script = SCRIPTS.get(f"{name}-{kind_of(axes)}") or SCRIPTS.get(name)
     if script is not None:
         return script
     kind, _, seed = name.partition("-")
@@ -132,7 +129,7 @@ def script_for(deployment: Deployment, name: str) -> Script:
         DesignError: no script of that name, or it moves nothing of this crane.
     """
     moves = deployment.coordinates
-    axes = {moved: axis for axis, moved in moves.items()}
+    axes = deployment.by_coordinate
     pulse, _, axis = name.partition("-")
     if pulse == "pulse" and axis in moves:
         name = f"{pulse}-{moves[axis]}"

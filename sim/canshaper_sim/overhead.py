@@ -174,7 +174,14 @@ class OverheadBoom:
     def _acceleration(
         self, r: Vector, v: Vector, trolley: tuple[float, float], hoist: tuple[float, float, float]
     ) -> Vector:
-        """Of the load from the trolley; hoist: position, speed and acceleration of the hook."""
+        """Return that of the load relative to the trolley.
+
+        Args:
+            r: load from the trolley, m.
+            v: its rate, m/s.
+            trolley: acceleration, m/s^2.
+            hoist: position, speed and acceleration of the hook.
+        """
         length, change, change_2 = (-one for one in hoist)
         pull = (-trolley[0], -trolley[1], -self._p.g_m_s2)
         tension = (_dot(r, pull) + _dot(v, v) - change**2 - length * change_2) / length**2

@@ -10,12 +10,12 @@ from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundValue, Choosing
-from canshaper_sim.axes import ROTATOR
+from canshaper_sim.axes import JOINTS, OVERHEAD, ROTATOR, TIP
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.machines import AXES_OF, JOINTS, OVERHEAD, TIP, build_machine, machine_for
+from canshaper_sim.machines import AXES_OF, build_machine, machine_for
 from canshaper_sim.overhead import OverheadBoom
 from canshaper_sim.sensor_messages import sensor_messages
 from canshaper_sim.valve_frames import CommandReader
@@ -281,7 +281,7 @@ class PlantNode:
 
 
 def _overhead_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
-    """Of the signals of a feedback message of an overhead crane, in its order."""
+    """Return the values of a feedback message of an overhead crane, in the order of its signals."""
     bridge, trolley, hoist = boom.axes.values()
     if name == "CraneVelocity":
         return bridge.speed, trolley.speed, hoist.speed

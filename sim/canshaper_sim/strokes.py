@@ -100,7 +100,7 @@ class Script:
         return known + tuple(axis for axis in moved if axis not in ALL_AXES)
 
     def moving(self, axes: Mapping[str, str]) -> "Script":
-        """The same with the axes that move these coordinates, by coordinate; those alone."""
+        """Return the script with axes in place of the coordinates that they move; no others."""
         moved = tuple(replace(s, axis=axes[s.axis]) for s in self.strokes if s.axis in axes)
         return Script(self.name, moved, self.duration_s)
 

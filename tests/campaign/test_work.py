@@ -230,7 +230,7 @@ class Doing:
 
 @pytest.fixture
 def learned(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What practice teaches is known."""
+    """The operator knows its best technique after practice."""
     monkeypatch.setattr(work_results, "learn", lambda *_: known(bypass=True))
 
 

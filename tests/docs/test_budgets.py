@@ -67,7 +67,7 @@ LINES = {
         4_926,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (64_922, "a new ability takes the room of an old one"),
+    "canshaper": (64_919, "a new ability takes the room of an old one"),
     "tests": (99_069, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.

@@ -1,6 +1,6 @@
 """Kinds of faults that came later: a seed without them is the sequence that it was before.
 
-beside  a bad frame of a joystick in the same tick as a good one, before it or behind it
+paired  a bad frame of a joystick in the same tick as a good one, before it or behind it
 stamp   frames whose time of arrival is wrong: the clock was set, or an adapter has none
 hand    full strokes to and fro, also with the axis at its end stop
 set     another set of filters: the operator's choice, the load, a file with other filters
@@ -21,14 +21,14 @@ STAMPS: dict[str, Callable[[Fault], int]] = {
     "stamp: a tick back": lambda fault: -fault.machine.tick_ns,
     "stamp: anything": lambda fault: fault.rng.randint(-200_000_000, 0),
 }
-BESIDE = ("beside: bad first", "beside: bad last")
+PAIRED = ("paired: bad first", "paired: bad last")
 STROKES, PRESSED, CHOSEN = "hand: to and fro", "set: button", "set: load or switch"
 AT_ITS_END, REFILTERED = "hand: at its end stop", "set: other filters in the file"
 
 
 def kinds_for(machine: Machine) -> list[str]:
     """Those that a machine can have."""
-    kinds = [*STAMPS, *BESIDE, STROKES, REFILTERED]
+    kinds = [*STAMPS, *PAIRED, STROKES, REFILTERED]
     kinds += [PRESSED] * any(one.next_profile for one in machine.joysticks.values())
     return kinds + [CHOSEN] * bool(machine.choices) + [AT_ITS_END] * bool(machine.ends)
 
@@ -70,16 +70,16 @@ def hand(joystick: Joystick, raw: Raw, active: Iterable[Fault]) -> Raw:
     return raw
 
 
-def beside(joystick: Joystick, frames: list[bytes], active: Iterable[Fault]) -> list[bytes]:
+def paired(joystick: Joystick, frames: list[bytes], active: Iterable[Fault]) -> list[bytes]:
     """Frames of a tick with a bad one before or behind them."""
     for fault in active:
-        if fault.kind in BESIDE and fault.joystick is joystick and any(frames):
+        if fault.kind in PAIRED and fault.joystick is joystick and any(frames):
             rng, data = fault.rng, max(frames, key=len)
             flipped = bytearray(data)
             flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
             noise, old = rng.randbytes(len(data)), fault.memory.setdefault("old", data)
             bad = rng.choice((data[:-1], data + b"\0", bytes(flipped), noise, old, b""))
-            frames = [bad, *frames] if fault.kind == BESIDE[0] else [*frames, bad]
+            frames = [bad, *frames] if fault.kind == PAIRED[0] else [*frames, bad]
     return frames
 
 

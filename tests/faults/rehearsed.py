@@ -1,4 +1,4 @@
-"""Faults rehearsed at the real daemon, in front of an operator who does as he is told.
+"""Faults rehearsed at the real daemon, in front of an operator who does as the announcement says.
 
 The rules judge by the frames that are on the buses, and know of no rehearsal: for them every
 joystick is sound, so what the daemon does by a rehearsed fault beyond what they allow is a wrong
@@ -113,7 +113,7 @@ class Rehearsed:
         return self.answers
 
     def verdicts(self) -> list[Row]:
-        """What a person is shown."""
+        """Return the text that a person reads."""
         return [judged(self.faults[n], one, self.deployment) for n, one in self.answers.items()]
 
     # -- the client, and the operator ------------------------------------------------------------

@@ -49,7 +49,7 @@ MADE = {
         {JOYSTICK_COUNTER: JOYSTICK_COUNTER + ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n'},
     ),
 }
-"""What no shipped file has together: a gateway whose frames have checksums."""
+"""No shipped file has a gateway whose frames have checksums."""
 
 
 @dataclass(frozen=True)

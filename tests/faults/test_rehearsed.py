@@ -167,10 +167,10 @@ def test_a_frame_that_asks_for_more_is_never_handed_on() -> None:
     assert no_more({}, real)
     for wrong in ({"a": 0.51}, {"a": -0.1}, {"b": -0.6}, {"b": 0.1}, {"on": 1.0}):
         assert not no_more(wrong, real)
-    told = {"a": 0.5, "on": 1.0}
-    assert not takes_back({"a": 0.46, "b": 1.0, "on": 1.0}, told)
+    applied = {"a": 0.5, "on": 1.0}
+    assert not takes_back({"a": 0.46, "b": 1.0, "on": 1.0}, applied)
     for less in ({"a": 0.44}, {"a": 0.0}, {"a": -1.0}, {"on": 0.0}):
-        assert takes_back(less, told)
+        assert takes_back(less, applied)
     assert takes_back({"a": 0.0}, {"a": 0.04})  # into the neutral band
 
 
@@ -287,7 +287,7 @@ def test_a_fault_does_not_wait_for_its_axis_for_ever(monkeypatch: pytest.MonkeyP
 def test_an_emergency_that_is_real_outlives_the_rehearsed_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its end is not told by us."""
+    """Its client does not report the end."""
     monkeypatch.setattr(rehearsal, "ARMED_NS", 2 * 10**9)
 
     def hand(run: Rehearsed, since_s: float) -> tuple[int, int, float]:

@@ -154,7 +154,7 @@ class World:
         sender = self._joysticks[joystick.name]
         raw = sender.counted(later.hand(joystick, self._hand(joystick), self.active()))
         sent = joystick_frames(joystick, [raw], self.active())
-        for data in sender.passed(later.beside(joystick, sent, self.active())):
+        for data in sender.passed(later.paired(joystick, sent, self.active())):
             self._put_input(Frame(*joystick.key, data))
 
     def _switches(self, sender: Sender) -> None:

@@ -1,4 +1,4 @@
-"""What the axes of a crane move, and the rope that they follow: each fault is one clear line."""
+"""Each fault of the section crane, and of a rope, is one clear line."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What C has no part for is refused by its key; numbers are exact to the last bit."""
+"""Keys for which C has no part are refused by name; numbers are exact to the last bit."""
 
 from collections.abc import Callable
 from typing import Any

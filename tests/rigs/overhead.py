@@ -65,6 +65,6 @@ class OverheadRig:
         return [self.tick(**joystick)["Bridge"] for _ in range(ticks)]
 
     def news(self) -> list[str]:
-        """What the log says of the bridge's length."""
+        """Return the lines of the log about the bridge's length."""
         texts = (event.text for event in self.controller.events)
         return [text for text in texts if text.startswith("axis=bridge length")]

@@ -105,7 +105,7 @@ def test_the_model_swings_as_a_load_that_is_hoisted(change_m_s: float) -> None:
 
 
 def parameters(kind: str, mode: SwayMode) -> dict[str, object]:
-    """Of a filter for a mode."""
+    """Return the parameters of a filter for a mode."""
     if kind == "gff":
         return {
             "a1": 2.1 / mode.omega_rad_s,

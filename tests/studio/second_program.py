@@ -39,7 +39,7 @@ def middle(values: list[float]) -> float:
 
 
 def of_page(page: str) -> dict[str, dict[str, str]]:
-    """The same figures, as they stand in a page of a person."""
+    """Return those figures as the page of a person has them."""
     table = page.partition('<table class="figures">')[2].partition("</table>")[0]
     rows = [
         [" ".join(cell.split()) for cell in re.findall(r"<t[dh].*?>(.*?)</t[dh]>", row, re.S)]

@@ -62,18 +62,18 @@ def begun(page: Page) -> None:
     page.keyboard.press("e")
     expect(page.locator("#seat")).to_have_text("you drive")
     page.keyboard.press("Enter")
-    expect(page.locator("#told")).to_contain_text("red point into the blue circle")
+    expect(page.locator("#outcome")).to_contain_text("red point into the blue circle")
 
 
 def gripped(page: Page, drive: Callable[[], None], grip: Callable[[], None]) -> None:
     """Drive and grip; where a busy machine held up the page, once more."""
-    told = page.locator("#told")
+    outcome = page.locator("#outcome")
     for _ in range(TRIES):
-        expect(told).to_contain_text("red point into the blue circle")
+        expect(outcome).to_contain_text("red point into the blue circle")
         drive()
         grip()
-        expect(told).to_contain_text(re.compile("cm off|Not done"))
-        if "cm off" in told.inner_text():
+        expect(outcome).to_contain_text(re.compile("cm off|Not done"))
+        if "cm off" in outcome.inner_text():
             return
         page.keyboard.press("Enter")
         if page.inner_text("#seat") != "you drive":
@@ -90,9 +90,9 @@ def slew(page: Page) -> None:
 
 def moving(page: Page) -> None:
     """Slew until the placement is under way."""
-    expect(page.locator("#told")).to_contain_text("red point into the blue circle")
+    expect(page.locator("#outcome")).to_contain_text("red point into the blue circle")
     page.keyboard.down("a")
-    expect(page.locator("#told")).to_contain_text("Grip when", timeout=SOON_MS)
+    expect(page.locator("#outcome")).to_contain_text("Grip when", timeout=SOON_MS)
 
 
 def placed(page: Page, watcher: Watcher) -> None:
@@ -158,7 +158,7 @@ def test_a_page_that_is_loaded_again_and_a_program_that_ends_lose_nothing(
     gripped(page, lambda: slew(page), lambda: page.keyboard.press("g"))
     moving(page)
     page.reload()
-    expect(page.locator("#told")).to_contain_text("the page was gone")
+    expect(page.locator("#outcome")).to_contain_text("the page was gone")
     begun(page)
     rows = (one.folder / "P01.csv").read_text().splitlines()
     assert rows[-1].endswith(",broken,page")
@@ -184,11 +184,11 @@ def test_a_gamepad_grips_and_unplugged_it_breaks_off(
     page.evaluate(PAD)
     expect(page.locator("#gamepad")).to_contain_text("grip")
     gripped(page, lambda: page.evaluate(SLEW_BY_PAD), lambda: page.evaluate(GRIP_BY_PAD))
-    expect(page.locator("#told")).to_contain_text("red point into the blue circle")
+    expect(page.locator("#outcome")).to_contain_text("red point into the blue circle")
     page.evaluate("() => { pad.axes[0] = -1; }")
-    expect(page.locator("#told")).to_contain_text("Grip when", timeout=SOON_MS)
+    expect(page.locator("#outcome")).to_contain_text("Grip when", timeout=SOON_MS)
     page.evaluate(NO_GAMEPAD)
-    expect(page.locator("#told")).to_contain_text("the gamepad was unplugged", timeout=SOON_MS)
+    expect(page.locator("#outcome")).to_contain_text("the gamepad was unplugged", timeout=SOON_MS)
     rows = (one.folder / "P01.csv").read_text().splitlines()
     assert ",gamepad," in rows[-2] and rows[-1].endswith(",broken,unplugged")
 
@@ -204,7 +204,7 @@ def test_a_second_browser_says_that_another_drives(
     moving(first)
     expect(second.locator("#grip")).to_be_disabled()
     second.click("#take")
-    expect(first.locator("#told")).to_contain_text("the page was gone", timeout=SOON_MS)
+    expect(first.locator("#outcome")).to_contain_text("the page was gone", timeout=SOON_MS)
     first.keyboard.up("a")
     assert (one.folder / "P01.csv").read_text().endswith(",broken,page\n")
 
@@ -239,12 +239,12 @@ def test_it_speaks_every_language(
     study: Callable[..., Study], tab: Callable[..., Page], language: str
 ) -> None:
     page, table = in_language(tab, study(), language), texts(language)
-    expect(page.locator("#told")).to_have_text(table["study.begins"])
+    expect(page.locator("#outcome")).to_have_text(table["study.begins"])
     is_good(page, language)
     page.keyboard.press("e")
     expect(page.locator("#seat")).to_have_text(table["seat.drive"])
     page.keyboard.press("Enter")
-    expect(page.locator("#told")).to_have_text(table["study.ready"])
+    expect(page.locator("#outcome")).to_have_text(table["study.ready"])
     is_good(page, language)
 
 
@@ -257,7 +257,7 @@ def test_what_a_driver_needs_is_on_the_first_screen(
     page = tab(study(), viewport=size, color_scheme=scheme)
     begun(page)
     is_good(page, ENGLISH)
-    for name in ("#task", "#told", "#grip", "#stop", "#scene"):
+    for name in ("#task", "#outcome", "#grip", "#stop", "#scene"):
         box = page.locator(name).bounding_box()
         assert box and box["y"] >= 0 and box["y"] + box["height"] <= height, name
         assert box["x"] >= 0 and box["x"] + box["width"] <= width, name

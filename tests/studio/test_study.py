@@ -1,4 +1,4 @@
-"""A study with people: plan, key, what becomes of a placement, and a crane that tells nothing."""
+"""A study with people: plan, key, placements, and a crane that does not name its setting."""
 
 import math
 from collections import Counter
@@ -241,7 +241,7 @@ def stage(tmp_path: Path) -> StudyStage:
 
 
 def test_nothing_that_a_page_gets_depends_on_the_setting(stage: StudyStage) -> None:
-    """Of a crane at rest and one that slews: only where it is and how it swings."""
+    """The page gets pose and swing alone, at rest and while it slews."""
     seen = []
     for letter in "ABC":
         stage._put(letter)
@@ -270,7 +270,7 @@ def test_only_the_page_that_drives_begins_and_grips(stage: StudyStage) -> None:
 
 
 def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> None:
-    """What a real crane sends on their bus is not heard."""
+    """Frames of a real crane on their bus do not count."""
     bus = Bus(interface="udp_multicast", channel=free_groups()[0])
     deployment = load_deployment(deployment_path("forwarder-robust.yaml"))
     deployment.config.buses["crane"] = bus
@@ -295,8 +295,8 @@ def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> No
         assert len(listener.frames()) == sent  # nobody but the hand, and that crane
         for frame in (*hand.frames(0, Held()), pose):
             sender.send(frame)
-        heard = {frame.can_id for frame in joysticks.frames_of_tick(0, 20)}
-        assert heard == {frame.can_id for frame in hand.frames(0, Held())}
+        sent = {frame.can_id for frame in joysticks.frames_of_tick(0, 20)}
+        assert sent == {frame.can_id for frame in hand.frames(0, Held())}
     finally:
         for port in (joysticks, sender, listener.port):
             port.close()

@@ -1,30 +1,23 @@
 """Questions of ``canshaper init`` on what swings: each axis, and slew and near-far together."""
 
 import re
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, confirmed, number, one
+from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, confirmed, number, one, whole
 from canshaper.cli.interview.scaling import code_meanings
 
 if TYPE_CHECKING:
-    from cantools.database.can import Message
+    from cantools.database.can import Message, Signal
 
     from canshaper.cli.interview.first import (
         FirstAxis,
+        FirstLoad,
         FirstMotion,
         FirstSensor,
         FirstSlewing,
         Stopwatch,
     )
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
-
-from canshaper.cli.interview.answers import whole
-
-if TYPE_CHECKING:
-    from cantools.database.can import Message, Signal
-
-    from canshaper.cli.interview.first import FirstAxis, FirstLoad
 
 # By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
 CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)

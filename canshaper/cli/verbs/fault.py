@@ -27,7 +27,7 @@ def fault(
     The daemon has to run with control.rehearse_faults in its file, which needs reduced speed. Each
     fault is announced and needs your yes. The daemon then makes it on its inputs: frames are lost,
     frozen or wrong for controller and gate alike, never with a larger demand than the joystick's.
-    Whoever lets the joystick go ends the fault. It is over by itself after some seconds.
+    Let the joystick go, and the fault ends. It is over by itself after some seconds.
 
     Ctrl-C ends the fault, and what moves trips. The report of canshaper commission has the table.
 

@@ -115,7 +115,7 @@ def cut(whole: Segment, first: float, last: float, start: float | None = None) -
     return Segment(whole.source, start, time - start, whole.value[inside], whole.kind)
 
 
-# Starts of the frequencies of two swings, as parts of that of the one that was found.
+# Starts of the frequencies of two swings, as parts of the one that was fitted.
 _PAIRS = ((1.0, 1.06), (1.0, 0.94), (0.97, 1.03))
 
 

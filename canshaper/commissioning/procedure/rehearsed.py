@@ -56,7 +56,7 @@ def reaction_of(claim: str) -> str:
 
 
 def expected(fault: Fault) -> str:
-    """What a fault should do."""
+    """Return the reaction that the page on safety gives for a fault, and within which time."""
     if (reaction := reaction_of(fault.claim)) == NONE:
         return NONE
     within = f"{reaction} within {fault.within_ns / MS:g} ms"
@@ -90,7 +90,7 @@ def judged(fault: Fault, report: Mapping[str, Any], deployment: Deployment) -> R
 
 
 def refused(deployment: Deployment) -> dict[str, str]:
-    """What cannot be rehearsed at any machine, or not at this one, with the reasons."""
+    """Return the rows that no input can cause, here or at any machine, with the reasons."""
     made = {one.claim for one in rehearsed_faults(deployment).values()}
     stops = [one.name for one in Reason if REACTION_OF[one] is not Reaction.NONE]
     here = [one for one in stops if one not in made]

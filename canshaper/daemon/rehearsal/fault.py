@@ -17,11 +17,11 @@ MS, S = 1_000_000, 1_000_000_000
 SLACK = 0.05
 
 Asked = Mapping[str, float]
-"""What frames ask for, by signal: a demand of [-1, 1]; 1 of a switch that lets move, else 0."""
+"""Demands of frames by signal: a velocity in [-1, 1]; 1 of a switch that allows motion, else 0."""
 Alter = Callable[[Frame], tuple[Frame, ...]]
-"""What is received in place of a frame: itself alone, or others."""
+"""Function that returns the frames to receive in place of a frame."""
 Begin = Callable[[Recorder, int], object]
-"""What is made once, at a time, at what stands behind the fault."""
+"""Function that acts once on the recorder, at a time."""
 
 
 @dataclass(frozen=True)
@@ -115,20 +115,20 @@ def no_more(altered: Asked, real: Asked) -> bool:
     return all(min(0.0, of) <= altered.get(key, 0.0) <= max(0.0, of) for key, of in real.items())
 
 
-def takes_back(real: Asked, told: Asked) -> bool:
-    """Whether a frame asks for less than what was told, for nothing, or the other way."""
-    pairs = [(of, told.get(key, 0.0)) for key, of in real.items()]
+def takes_back(real: Asked, applied: Asked) -> bool:
+    """Whether a frame asks for less than what is applied, for nothing, or the other way."""
+    pairs = [(of, applied.get(key, 0.0)) for key, of in real.items()]
     return any(was and (of * was <= 0.0 or abs(of) < abs(was) - SLACK) for of, was in pairs)
 
 
 class Demands:
-    """What joysticks, switches and emergency stop ask for, and the rule: a fault only takes.
+    """Demands of joysticks, switches and emergency stop: a fault only reduces them.
 
     Nothing moves that the joystick did not ask for, and what it takes back acts as without a fault:
 
     - A frame is replaced only by one that asks, signal by signal, for no more than it does itself,
       and in no other direction (``no_more``).
-    - A frame that takes something back from what the controller was told, or holds, is never
+    - A frame that takes something back from what the controller has applied, or holds, is never
       replaced, held or dropped: it passes as it is and ends the fault (``takes_back``).
     - Where the controller does not follow that frame, what moves trips: it refuses the frame and so
       holds more than it asks for, because frames before were lost or had other counts; or an axis
@@ -159,7 +159,7 @@ class Demands:
             self._bands[key] = min(band, self._bands.get(key, 1.0))
 
     def read(self, frame: Frame) -> Asked:
-        """What a frame asks for; of another message nothing."""
+        """Return the demands of a frame; none of another message."""
         for name, editor, velocities, switches in self._inputs:
             if editor.has(frame):
                 raw = editor.raw(frame)
@@ -168,7 +168,7 @@ class Demands:
         return {}
 
     def held(self, controller: Controller, now_ns: int) -> Asked:
-        """What a controller goes by: the demands of its last good frames, while they are fresh."""
+        """Return the demands of the last good frames of a controller, while they are fresh."""
         held: dict[str, float] = {}
         for name, joystick in controller.joysticks.items():
             if joystick.lost(now_ns) is None:

@@ -54,7 +54,7 @@ class Rehearsal(Recorder):
         self._made_ns: int | None = None  # when the first input was another one
         self._neutral_ms: float | None = None  # after that
         self._tick = self._missed = 0
-        self._told: dict[str, float] = {}  # what frames that passed have asked for
+        self._applied: dict[str, float] = {}  # what frames that passed have asked for
         self._events: list[list[object]] = []
         self._spoken = False  # the sender of what ends it has sent the same message itself
 
@@ -123,7 +123,7 @@ class Rehearsal(Recorder):
             return super().receive(frame, now_ns)
         asked = self._demands.read(frame)
         if self._phase == MADE:
-            if takes_back(asked, self._told) or self._holds_more(asked, now_ns):
+            if takes_back(asked, self._applied) or self._holds_more(asked, now_ns):
                 self._end("the joystick was let go, or something was released")
             elif fault.stands and self._tick in fault.late:
                 return None
@@ -136,7 +136,7 @@ class Rehearsal(Recorder):
         if all(one is not frame for one in instead):
             return passed
         self._spoken |= fault.end is not None and frame[:3] == fault.end[:3]
-        self._told.update(asked)
+        self._applied.update(asked)
         if self._phase in (MADE, OVER) and (self._holds_more(asked, now_ns) or self._runs(asked)):
             log.warning("fault=over name=%s the joystick is not followed: it trips", fault.name)
             self.stalled()
@@ -155,7 +155,7 @@ class Rehearsal(Recorder):
         return any(axis.raw * asked.get(keys[name], 0.0) < 0.0 for name, axis in stopping.items())
 
     def _altered(self, frame: Frame, asked: Asked) -> tuple[Frame, ...]:
-        """What is received in place of a frame: never one that asks for more than it does."""
+        """Return the frames to receive in place of a frame: none asks for more than it does."""
         if self._fault.once and self._made_ns is not None:
             return (frame,)
         altered = self._fault.alter(frame)

@@ -1,4 +1,4 @@
-"""What is compared: filters, made for both axes of a deployment, and manoeuvres for each of them.
+"""The comparison drives each filter, made for both axes of a deployment, through manoeuvres.
 
 Manoeuvres are strokes of one axis and of both, loading, random joysticks.
 """

@@ -15,13 +15,13 @@ from canshaper.errors import DesignError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.shapers.fir import zv_taps
-from canshaper_sim.axes import BRIDGE, HOIST, OVERHEAD_AXES, TROLLEY
+from canshaper.shaping.sway import GRAVITY_M_S2
+from canshaper_sim.axes import BRIDGE, HOIST, OVERHEAD, OVERHEAD_AXES, TROLLEY, kind_of
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
 ROPES_M = (2.0, 5.0, 10.0, 25.0)
-_G = 9.81
 # Nobody waits longer than a swing to see what is left.
 _LONGEST_LOOK_S = 11.0
 
@@ -45,7 +45,7 @@ class RopeFilter:
 
 def is_overhead(deployment: Deployment) -> bool:
     """Whether its axes move a bridge, a trolley or a hoist."""
-    return bool({*deployment.coordinates.values()} & {*OVERHEAD_AXES})
+    return kind_of(deployment.coordinates.values()) == OVERHEAD
 
 
 def rope_filters(deployment: Deployment) -> list[RopeFilter]:
@@ -54,7 +54,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     Raises:
         DesignError: bridge or trolley is missing, or has no measured rope.
     """
-    by_coordinate = {moved: axis for axis, moved in deployment.coordinates.items()}
+    by_coordinate = deployment.by_coordinate
     if missing := [one for one in OVERHEAD_AXES if one not in by_coordinate]:
         raise DesignError(f"expected bridge, trolley and hoist in crane, without {missing[0]}")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
@@ -116,9 +116,8 @@ def left_deg(deployment: Deployment, job: Job) -> float:
     """Swing that is left of a drive, degrees."""
     one, rope_m, _, strokes = job
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
-    look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / _G), _LONGEST_LOOK_S)
-    axes = {moved: axis for axis, moved in deployment.coordinates.items()}
-    script = Script("rope", tuple(strokes), end_s + look_s).moving(axes)
+    look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
+    script = Script("rope", tuple(strokes), end_s + look_s).moving(deployment.by_coordinate)
     crane = CraneParameters()
     crane = replace(crane, overhead=replace(crane.overhead, rope_m=rope_m))
     recording = drive(_with(deployment, one), script, parameters=crane, bypass=one.bypass)

@@ -64,7 +64,7 @@ export class Panel {
     // The newest event stays in sight, also where the list gets another size, until a person scrolls up.
     this.follows = true;
     list.onscroll = () => {
-      if (sizeOf(list) !== this.size) this.follow(); // it was laid out anew, no person has scrolled
+      if (sizeOf(list) !== this.size) this.follow(); // it has another layout, no person has scrolled
       else this.follows = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
     };
     this.sized?.disconnect();

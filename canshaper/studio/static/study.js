@@ -58,8 +58,8 @@ export class Study {
     const crane = Object.values(cranes)[0];
     const ready = drawn && mine && study.phase === "pause" && !study.wait_s;
     set("task", drawn ? this.task(study) : text("study.nowebgl"));
-    set("told", drawn ? this.told(study) : "");
-    byId("told").className = study.result?.[0] ?? "";
+    set("outcome", drawn ? this.outcome(study) : "");
+    byId("outcome").className = study.result?.[0] ?? "";
     byId("begin").disabled = !ready;
     byId("begin").hidden = study.phase !== "pause";
     byId("grip").hidden = study.phase === "pause" || study.phase === "done";
@@ -88,7 +88,7 @@ export class Study {
   }
 
   /** What is to be done, or what has become of it. */
-  told({ phase, why, result, wait_s: wait, stands }) {
+  outcome({ phase, why, result, wait_s: wait, stands }) {
     if (phase === "done") return "";
     if (phase === "shown") return text(`study.${result[0]}`, { cm: Math.round(100 * result[1]) });
     if (phase === "moving") return text("study.moving");
