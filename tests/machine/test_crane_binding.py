@@ -22,6 +22,7 @@ def test_the_file_says_which_axis_moves_what() -> None:
 def test_without_it_the_names_say_it() -> None:
     moves = {"slew": "slew", "near_far": "near_far", "lift": "lift"}
     assert read(CONFIG / "forwarder.yaml").coordinates == moves
+    assert read(CONFIG / "forwarder.yaml").by_coordinate == moves
     assert set(read(CONFIG / "forwarder-joints.yaml").coordinates) == {
         "slew",
         "lift_cylinder",
