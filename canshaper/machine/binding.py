@@ -118,7 +118,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
 def _check_crane(lookup: Lookup) -> None:
     """Check that each coordinate of the crane has an axis of its own."""
     crane, taken = lookup.config.crane, dict[str, str]()
-    for key, name in crane.model_dump(exclude={"kind"}, exclude_none=True).items() if crane else ():
+    for key, name in crane.moved.items() if crane else ():
         place = ("crane", key)
         if lookup.diagnostics.check_axis(place, name, lookup.config.axes):
             if name in taken:

@@ -27,8 +27,8 @@ Vector = tuple[float, float, float]
 
 # name -> (lowest, highest) value that still describes an overhead crane.
 _ALLOWED = {
-    "bridge_full_speed_m_s": (0.05, 5.0),
-    "trolley_full_speed_m_s": (0.05, 5.0),
+    "bridge_full_speed_m_s": (0.05, 20.0),
+    "trolley_full_speed_m_s": (0.05, 20.0),
     "hoist_full_speed_m_s": (0.02, 3.0),
     "rope_min_m": (0.5, 150.0),
     "rope_max_m": (0.5, 150.0),

@@ -1,10 +1,13 @@
 """Parameters of the simulated crane by name, for the command line."""
 
 import dataclasses
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from canshaper.errors import DesignError, did_you_mean
 from canshaper_sim.crane import CraneParameters
+
+if TYPE_CHECKING:
+    from canshaper.machine.deployment import Deployment
 
 P = TypeVar("P")
 
@@ -22,9 +25,15 @@ def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float
     return values
 
 
-def changed_parameters(changes: list[str]) -> CraneParameters:
-    """The nominal crane with NAME=VALUE changes put in; see `changed`."""
-    return changed(CraneParameters(), changes, "--set")
+def changed_parameters(
+    changes: list[str], deployment: "Deployment | None" = None
+) -> CraneParameters:
+    """The nominal crane, as its file says, with NAME=VALUE changes put in; see `changed`."""
+    crane = CraneParameters()
+    if deployment and (section := deployment.config.crane):
+        own = [f"{name}={value}" for name, value in section.simulated.items()]
+        crane = changed(crane, own, f"{deployment.path}: crane.simulated:")
+    return changed(crane, changes, "--set")
 
 
 def changed(parameters: P, changes: list[str], option: str) -> P:

@@ -27,6 +27,7 @@ from canshaper_sim.axes import (
     TROLLEY,
 )
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recording import DWELL_S, AxisTrace, CraneTrace, Point, Recording
 
 _Handler = Callable[[bytes, float], None]  # data of the right length, time in s
@@ -56,7 +57,7 @@ class Recorder:
     """Takes every frame; one row for each sway feedback, from the first joystick frame on."""
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
-        crane = parameters or CraneParameters()
+        crane = parameters or changed_parameters([], deployment)
         self._full = crane.full_speeds
         self._grapple = crane.grapple
         self._moves = deployment.coordinates

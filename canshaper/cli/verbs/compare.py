@@ -154,7 +154,7 @@ def _ropes(
     from canshaper.design.comparison.ropes import compare_ropes
     from canshaper.report.console import new_table, progress_bar
 
-    with progress_bar("ropes of 2 to 25 m") as on_progress:
+    with progress_bar("ropes") as on_progress:
         table = compare_ropes(deployment, on_progress, processes)
     cells = [*next(iter(table.values()))]
     shown = new_table("left, deg", *(cell.replace(" m ", " m\n") for cell in cells))

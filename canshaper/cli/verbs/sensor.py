@@ -155,7 +155,7 @@ def _simulate(deployment: "Deployment", axes: Sequence[str], log: Path, changes:
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters
 
-    parameters = changed_parameters(changes)
+    parameters = changed_parameters(changes, deployment)
     with progress_bar("driving") as on_progress:
         log_simulated(log, deployment, parameters, hand_driven(axes), on_progress)
 

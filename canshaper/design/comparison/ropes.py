@@ -1,4 +1,7 @@
-"""Filters of an overhead crane on the same work, by the length of its rope."""
+"""Filters of an overhead crane on the same work, by the length of its rope.
+
+A rope without a length signal is compared as long as the file says, and a tenth wrong.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -16,8 +19,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.shapers.fir import zv_taps
 from canshaper.shaping.sway import GRAVITY_M_S2
-from canshaper_sim.axes import BRIDGE, HOIST, OVERHEAD, OVERHEAD_AXES, TROLLEY, kind_of
-from canshaper_sim.crane import CraneParameters
+from canshaper_sim.axes import BRIDGE, HOIST, OVERHEAD, TROLLEY, kind_of
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
@@ -52,16 +55,16 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     """Return what is compared.
 
     Raises:
-        DesignError: bridge or trolley is missing, or has no measured rope.
+        DesignError: bridge or trolley is missing.
     """
     by_coordinate = deployment.by_coordinate
-    if missing := [one for one in OVERHEAD_AXES if one not in by_coordinate]:
-        raise DesignError(f"expected bridge, trolley and hoist in crane, without {missing[0]}")
+    if missing := [one for one in (BRIDGE, TROLLEY) if one not in by_coordinate]:
+        raise DesignError(f"expected bridge and trolley in crane, without {missing[0]}")
+    nominal_m = changed_parameters([], deployment).overhead.rope_m
+    by_length = " by length" if is_measured(deployment) else ""
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
     for axis in (by_coordinate[BRIDGE], by_coordinate[TROLLEY]):
         sway = swinging_axis(deployment, axis)[1]
-        if sway.length is None:
-            raise DesignError(f"axes.{axis}.sway: expected length, by which filters are compared")
         mode, period_s = sway.mode(), tick_s(deployment, axis)
         taps = [round(tap, 8) for tap in zv_taps(mode, period_s)]
         zvd[axis] = filter_of("zvd")
@@ -70,11 +73,24 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
         gff[axis] = filter_of("gff", a1=2.000001 / omega, a2=1.0 / omega**2)
     return [
         RopeFilter("off", {}, bypass=True),
-        RopeFilter("ZVD for 8 m", zvd, rope_m=8.0),
-        RopeFilter("ZV by length", zv),
-        RopeFilter("G_FF by length", gff),
+        RopeFilter(f"ZVD for {nominal_m:g} m", zvd, rope_m=nominal_m),
+        RopeFilter(f"ZV{by_length}", zv),
+        RopeFilter(f"G_FF{by_length}", gff),
         RopeFilter("the file's", {}),
     ]
+
+
+def is_measured(deployment: Deployment) -> bool:
+    """Whether an axis follows the length of the rope."""
+    return any(axis.rope for axis in deployment.axes.values())
+
+
+def ropes_m(deployment: Deployment) -> tuple[float, ...]:
+    """Return the ropes with which filters are compared."""
+    if is_measured(deployment):
+        return ROPES_M
+    nominal_m = changed_parameters([], deployment).overhead.rope_m
+    return 0.9 * nominal_m, nominal_m, 1.1 * nominal_m
 
 
 def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
@@ -94,7 +110,7 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
     return replace(deployment, axes=axes)
 
 
-def tasks(rope_m: float) -> Iterator[tuple[str, list[Stroke]]]:
+def tasks(rope_m: float, hoist: bool = True) -> Iterator[tuple[str, list[Stroke]]]:
     """Kind of work and strokes with this rope: still, or hoisted in travel and after it."""
     up = 1.0 if rope_m >= 4.0 else -1.0
     hoist_s = min(6.0, 1.8 * rope_m - 3.0) if up > 0.0 else 5.0
@@ -104,6 +120,8 @@ def tasks(rope_m: float) -> Iterator[tuple[str, list[Stroke]]]:
     yield "still", [Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)]
     yield "still", [Stroke(TROLLEY, 0.5, 0.3, 1.0)]
     yield "still", both
+    if not hoist:
+        return
     yield "hoisted", [*both, Stroke(HOIST, 2.0, hoist_s, up)]
     yield "hoisted", [travel, Stroke(HOIST, 3.0, 8.0, -1.0)]
     yield "hoisted", [travel, Stroke(HOIST, 6.7, hoist_s, up)]
@@ -118,7 +136,7 @@ def left_deg(deployment: Deployment, job: Job) -> float:
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
     look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
     script = Script("rope", tuple(strokes), end_s + look_s).moving(deployment.by_coordinate)
-    crane = CraneParameters()
+    crane = changed_parameters([], deployment)
     crane = replace(crane, overhead=replace(crane.overhead, rope_m=rope_m))
     recording = drive(_with(deployment, one), script, parameters=crane, bypass=one.bypass)
     assert recording.crane is not None  # of an overhead crane
@@ -133,8 +151,8 @@ def compare_ropes(
     jobs: list[Job] = [
         (one, rope_m, work, strokes)
         for one in rope_filters(deployment)
-        for rope_m in ROPES_M
-        for work, strokes in tasks(rope_m)
+        for rope_m in ropes_m(deployment)
+        for work, strokes in tasks(rope_m, HOIST in deployment.by_coordinate)
     ]
     table: dict[str, dict[str, float]] = {job[0].name: {} for job in jobs}
     for one, rope_m, work, _ in jobs:

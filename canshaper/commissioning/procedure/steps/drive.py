@@ -51,7 +51,7 @@ def run(context: Context) -> Outcome:
     fastest = ", ".join(f"{n} {a.limits.max_pct:g} %" for n, a in deployment.config.axes.items())
     outcome.sheet.print(f"max_pct in both drives: {fastest}")
     if isinstance(context.bench, Simulated):
-        crane = context.bench.parameters
+        crane = context.bench.parameters(deployment)
         raw, shaped = (simulated_recording(log, deployment, crane) for log in outcome.files)
         _measured(context, outcome, raw, shaped)
         return outcome
