@@ -105,8 +105,9 @@ def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) ->
     for name in axes:
         sensor = deployment.axes[name].sway_sensor
         default = sensor.name if sensor else NONE
-        if name in SIMULATED and not isinstance(deployment.messages.find("GrappleSway"), str):
-            default = SIMULATED[name]
+        shown = SIMULATED.get(deployment.coordinates.get(name, ""), "")
+        if shown and not isinstance(deployment.messages.find(shown.partition(".")[0]), str):
+            default = shown
         question = (
             f"swing: {name}: what shows it: MESSAGE.SIGNAL of the bus, file of a phone (.csv), or"
             " stopwatch SWINGS SECONDS FIRST LAST such as 10 23.6 20 5"
