@@ -121,3 +121,19 @@ def test_bits_of_a_gateway() -> None:
         command=bound.command, valve=SimpleNamespace(bus="machine", message="LiftCommand")
     )
     assert [_forwarded(one, deployment) for one in (bound, elsewhere)] == [True, False]
+
+
+def test_what_may_leave_besides() -> None:
+    """Our node of J1939 on a bus whose status messages have 11 bits."""
+    deployment = load("forwarder")
+    bus = deployment.config.buses["crane"]
+    bus = bus.model_copy(update={"j1939": SimpleNamespace(address=0x9C), "canopen": None})
+    config = deployment.config.model_copy(update={"buses": {"crane": bus}})
+    others = record_of(replace(deployment, config=config)).others
+    ours = {0x18EEFF9C, 0x18EEFFFE, 0x18E8FF9C, 0x18FECA9C, 0x1CECFF9C, 0x1CEBFF9C}
+    longest = {(can_id, extended): max(one) for (_, can_id, extended), (one, _) in others.items()}
+    assert longest == {
+        **{(can_id, False): 64 for can_id in (0x300, 0x301, 0x302, 0x310, 0x311)},
+        **{(can_id, True): 8 for can_id in ours},
+        (0x18EAFFFE, True): 3,
+    }
