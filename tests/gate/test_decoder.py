@@ -12,7 +12,7 @@ from canshaper.config.limits import Limits
 from canshaper.config.schema import Command as Stick
 from canshaper.config.schema import Valve
 from canshaper.gate.fields import openings_of, word_of
-from canshaper.gate.signals import command_of, field_of, part_of, stick_of
+from canshaper.gate.signals import Scale, command_of, field_of, part_of, stick_of
 from canshaper.shaping.limits import without_deadband
 
 HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: JOYSTICK SHAPER\nBO_ 2 Message: 8 JOYSTICK\n'
@@ -112,6 +112,32 @@ def test_the_file_corrects_what_the_dbc_says(
     if keys == {"zero": 10}:
         one = message("Signal : 0|8@1+ (1,0) [0|20]")
     assert value(one, bytes([raw & 0xFF, *bytes(7)]), **keys) == pytest.approx(is_read)
+
+
+@pytest.mark.parametrize(
+    ("signal", "keys", "low", "high"),
+    [
+        ("8@1- (1,0) [-100|100]", {}, -100, 100),
+        ("8@1- (1,0) [-100|100]", {"zero": 10}, -110, 90),
+        ("8@1- (1,0) [-100|90]", {"invert": True}, -90, 100),
+        ("8@1- (1,0) [-100|100]", {"full": 80}, -80, 80),
+        # Two's complement reaches a step farther on one side, and not two.
+        ("8@1- (1,0) [-100|100]", {"full": 127}, -128, 127),
+        ("8@1- (1,0) [-100|100]", {"full": 126}, -126, 127),
+        ("8@1- (0.5,0) [-60|60]", {"full": 63.5}, -64, 63.5),
+        ("8@1- (-1,0) [-100|100]", {"full": 127}, -127, 128),
+        ("8@1+ (1,-128) [-100|100]", {"full": 127}, -128, 127),
+        ("8@1+ (1,0) [0|255]", {"full": 127, "zero": 128}, -128, 127),
+        ("8@1+ (1,0) [0|255]", {"full": 254, "negative": "Back"}, -254, 254),
+        ("32@1- (1,0) [-1|1]", {"full": 0.5}, -0.5, 0.5),
+    ],
+)
+def test_ends_of_a_velocity(signal: str, keys: dict[str, Any], low: float, high: float) -> None:
+    one = message(f"Signal : 0|{signal}", floats="Signal" if signal.startswith("32") else "")
+    magnitude = "negative" in keys
+    scale = Scale(one.signals[0], Stick(joystick="a", signal="b", **keys), magnitude=magnitude)
+    assert (scale.low, scale.high) == (low, high)
+    assert scale.full == min(-low, high)
 
 
 @pytest.mark.parametrize(
