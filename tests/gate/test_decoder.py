@@ -156,6 +156,9 @@ def test_neutral_may_have_its_name() -> None:
     assert value(one, bytes(8)) is None
     one = message("Signal : 0|8@1- (1,0) [-100|100]", tables='VAL_ 2 Signal 1 "Neutral" ;\n')
     assert value(one, b"\1" + bytes(7)) is None
+    table = 'VAL_ 2 Signal 100 "Neutral position" ;\n'
+    one = message("Signal : 0|8@1+ (0.5,-50) [-50|50]", tables=table)
+    assert value(one, b"\x64" + bytes(7)) == 0.0
 
 
 def test_what_the_file_lists_as_a_value_is_one() -> None:
@@ -164,6 +167,7 @@ def test_what_the_file_lists_as_a_value_is_one() -> None:
     assert value(one, b"\x80" + bytes(7), codes={"Full": "fault"}) is None
 
 
+SIDES = ("neutral", "negative", "positive")
 FLAGS = ("Neutral", "Negative", "Positive")
 
 
@@ -196,6 +200,18 @@ def test_a_rocker(forth: int, back: int, demand: float | None) -> None:
     section = Stick(joystick="left", signal="Forth", negative="Back")
     data = bytes([0, forth, 0, back, *bytes(4)])
     assert stick_of(one, section, one).demand(word_of(data)) == pytest.approx(demand)
+
+
+@pytest.mark.parametrize("keys", [{"negative": "Back"}, {"flags": dict.fromkeys(SIDES, "Back")}])
+def test_a_magnitude_is_not_beyond_full(keys: dict[str, Any]) -> None:
+    one = message("Forth : 8|8@1+ (1,0) [0|255]", "Back : 24|8@1+ (1,0) [0|255]")
+    section = Stick(joystick="left", signal="Forth", full=254, neutral_pct=5, **keys)
+    stick = stick_of(one, section, one)
+    assert stick.band == 0.05
+    assert [stick.part.value(word_of(bytes([0, raw, *bytes(6)]))) for raw in (254, 255)] == [
+        1.0,
+        None,
+    ]
 
 
 @pytest.mark.parametrize(("forth", "back"), [(50, -20), (-20, 50)])
