@@ -61,8 +61,7 @@ class ForwardedJoystick:
             stopped: the emergency stop is pressed, or missing.
         """
         self._passed_ns = arrived_ns
-        # The axes trip with the next tick only, however short the release was.
-        stopped = stopped or self._joystick.releases != self._releases
+        stopped = stopped or self._joystick.releases != self._releases  # they trip with the tick
         for runner in self._runners:
             if stopped or runner.tripping:  # the loop stood still, or the like: this is old
                 runner.put(0)
