@@ -156,7 +156,10 @@ class Controller:
             if rule.new_frame():
                 if self._stood_still:  # a frame that has waited is not passed on later either
                     return None
-                stopped = self._stop is not None and self._stop.stops(arrived_ns)
+                if (stop := self._stop) is not None:
+                    for runner in self.axes.values():
+                        runner.see(stop)
+                stopped = stop is not None and stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
                 self.moves = rule.moves
                 return passed
