@@ -33,6 +33,17 @@ def _direction(section: dict[str, Any] | None) -> tuple[str, dict[int, int]] | N
     return section["signal"], signs
 
 
+def _choices(data: dict[str, Any], messages: dict[str, Message]) -> list[tuple[Key, int, Field]]:
+    """Messages that choose a set of filters: length, and the signal."""
+    return [
+        (key_of(one["bus"], message, None), message.length, Field(signal))
+        for one in (data.get("load_state"), data.get("profile"))
+        for message in ([messages[one["message"]]] if one else [])
+        for signal in message.signals
+        if signal.name == one["signal"]
+    ]
+
+
 class Machine:
     """A deployment file with its DBC files."""
 
@@ -71,13 +82,7 @@ class Machine:
             self._motion(motion, messages)
             if aim := motion.get("aim"):
                 self.aims.add(self._sent(aim["bus"], messages[aim["message"]]))
-        self.choices = [  # messages that choose a set of filters: length, and the signal
-            (key_of(one["bus"], message, None), message.length, Field(signal))
-            for one in (data.get("load_state"), data.get("profile"))
-            for message in ([messages[one["message"]]] if one else [])
-            for signal in message.signals
-            if signal.name == one["signal"]
-        ]
+        self.choices = _choices(data, messages)
         self.hydraulics: dict[str, Any] | None = data.get("hydraulics")
         limits = {name: section.get("limits", {}) for name, section in data["axes"].items()}
         self.ends = {
@@ -89,8 +94,9 @@ class Machine:
         if stop := data.get("emergency_stop"):
             self.stop = Input("stop", stop, messages[stop["message"]])
             self.stop_field = self.stop.fields[stop["signal"]]
-        inputs = [*self.joysticks.values(), *self.switches, *([self.stop] if self.stop else [])]
-        self.inputs: dict[Key, Input] = {i.key: i for i in inputs}
+        inputs = [*self.joysticks.values(), *self.switches]
+        self.shortest_timeout_ns = min(v.timeout_ns for v in inputs)
+        self.inputs: dict[Key, Input] = {i.key: i for i in (*inputs, self.stop) if i}
         self.valves = {a.valve_key: a for a in self.axes.values()}
         self.statuses = {a.status_key: a for a in self.axes.values() if a.status_key}
         self.service: Key | None = None
@@ -99,8 +105,6 @@ class Machine:
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
         self.identity = self._identity(data, messages)
-        inputs = [*self.joysticks.values(), *self.switches]
-        self.shortest_timeout_ns = min(v.timeout_ns for v in inputs)
         # longest time between two ticks after which an axis in motion may go on
         waits_ms = [
             section["valve"]["timeout_ms"] - (self.axes[n].period_ticks - 1) * self.tick_ms

@@ -164,8 +164,8 @@ def _designed(file: Path, axis: "FirstAxis", load: "FirstLoad | None") -> bool:
         low_m, high_m = (round(GRAVITY_M_S2 * (0.1 * t / math.tau) ** 2, 2) for t in times_s)
         lengths_m = low_m, high_m
     try:
-        from canshaper.commissioning.loads import design_loads
-        from canshaper.commissioning.robust import design_robust, summary_line, write_design
+        from canshaper.commissioning.robust import design_loads, design_robust
+        from canshaper.commissioning.robust_report import summary_line, write_design
 
         deployment = loader(str(file))()
         if load and load.message:

@@ -6,7 +6,7 @@ from functools import partial
 
 from rich.table import Table
 
-from canshaper.commissioning import robust, tuned
+from canshaper.commissioning import robust_report, tuned
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging, swings
 from canshaper.commissioning.robust import RobustDesign, design_robust
@@ -154,8 +154,8 @@ def _show(deployment: Deployment, design: Design, outcome: Outcome) -> None:
     """Print and draw the design that was chosen."""
     name = design.bound.name
     if isinstance(design, RobustDesign):
-        robust.print_design(deployment, design, outcome.sheet)
-        outcome.figures[name] = partial(robust.figure, design)
+        robust_report.print_design(deployment, design, outcome.sheet)
+        outcome.figures[name] = partial(robust_report.figure, design)
     else:
         tuned.print_tuned(deployment, design, outcome.sheet)
         outcome.figures[name] = partial(tuned.figure, design)
@@ -165,7 +165,7 @@ def _write(deployment: Deployment, designs: list[Design]) -> list[str]:
     lines: list[str] = []
     for one in designs:
         lines += (
-            robust.write_design(deployment, one)
+            robust_report.write_design(deployment, one)
             if isinstance(one, RobustDesign)
             else tuned.write_tuned(deployment, one)
         )
