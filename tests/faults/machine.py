@@ -56,16 +56,15 @@ class Machine:
         self.ids = {(m.frame_id, m.is_extended_frame) for m in messages.values()}
         self.tick_ms: int = data["tick_ms"]
         self.tick_ns = self.tick_ms * 1_000_000
-        self.buses = list(data["buses"])
+        buses = data["buses"].items()
+        self.buses = [bus for bus, _section in buses]
         self.gateway = "gateway" in data
         self.nodes = {
             (bus, name): Node(bus, node["id"], node["heartbeat_ms"] * 1_000_000)
-            for bus, section in data["buses"].items()
+            for bus, section in buses
             for name, node in section.get("canopen", {}).get("nodes", {}).items()
         }
-        self.addresses: dict[str, int] = {
-            b: s["j1939"]["address"] for b, s in data["buses"].items() if "j1939" in s
-        }
+        self.addresses = {b: s["j1939"]["address"] for b, s in buses if "j1939" in s}
         self.joysticks = {
             n: Joystick(n, section, messages[section["message"]])
             for n, section in data["joysticks"].items()
@@ -73,8 +72,8 @@ class Machine:
         self.joystick_nodes = self._nodes(data["joysticks"])
         self.switches = self._switches(data, messages)
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
-        valves = {name: section["valve"] for name, section in data["axes"].items()}
-        self.drives = self._nodes(valves)  # without CiA 408
+        # without CiA 408
+        self.drives = self._nodes({name: one["valve"] for name, one in data["axes"].items()})
         self.sensors = self._sensors(data, messages)
         self.radius: tuple[Key, int, Field] | None = None
         self.aims: set[Key] = set()
@@ -84,11 +83,10 @@ class Machine:
                 self.aims.add(self._sent(aim["bus"], messages[aim["message"]]))
         self.choices = _choices(data, messages)
         self.hydraulics: dict[str, Any] | None = data.get("hydraulics")
-        limits = {name: section.get("limits", {}) for name, section in data["axes"].items()}
         self.ends = {
-            name: Ends.read(one["ends"], messages[one["ends"]["message"]])
-            for name, one in limits.items()
-            if "ends" in one
+            name: Ends.read(ends, messages[ends["message"]])
+            for name, section in data["axes"].items()
+            if (ends := section.get("limits", {}).get("ends"))
         }
         self.stop: Input | None = None
         if stop := data.get("emergency_stop"):
@@ -105,17 +103,18 @@ class Machine:
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
         self.identity = self._identity(data, messages)
-        # longest time between two ticks after which an axis in motion may go on
-        waits_ms = [
-            section["valve"]["timeout_ms"] - (self.axes[n].period_ticks - 1) * self.tick_ms
-            for n, section in data["axes"].items()
-        ]
-        self.longest_gap_ns = min(
-            *(v.timeout_ns for v in self.inputs.values()), *(ms * 1_000_000 for ms in waits_ms)
-        )
+        self.longest_gap_ns = self._longest_gap_ns()
         # longest time, in ticks, in which everything that runs on has come to rest
         longest = max((a.stop + a.tail + 4) * a.period_ticks for a in self.axes.values())
         self.rest_ticks = longest + self.shortest_timeout_ns // self.tick_ns
+
+    def _longest_gap_ns(self) -> int:
+        """Longest time between two ticks after which an axis in motion may go on."""
+        waits_ns = [
+            axis.valve_timeout_ns - (axis.period_ticks - 1) * self.tick_ns
+            for axis in self.axes.values()
+        ]
+        return min(*waits_ns, *(one.timeout_ns for one in self.inputs.values()))
 
     def _identity(self, data: dict[str, Any], messages: dict[str, Message]) -> Key | None:
         """Key of the message that says what runs, where there is one."""
