@@ -206,7 +206,12 @@ class OutputStage:
     def _ramp_with_added(
         self, held: float, own: float, added: float, *, no_run_on: bool
     ) -> tuple[float, float, float]:
-        """Advance both ramps; return own and added velocity together, and the range of that."""
+        """Advance both ramps; return own and added velocity together, and the range of that.
+
+        An added velocity is slow: a few steps of the grid, or less than one. What rounding leaves
+        out of it is carried, and corrected in the next ticks by at most one step in each. The carry
+        starts no movement: the operator would see a twitch.
+        """
         limits = self.limits
         low, high = range_with_added(
             held,
@@ -220,7 +225,10 @@ class OutputStage:
         target = total = own
         if added:
             total = within(own + added, low, high, 0.0)
-            target = self._with_carry(total, low, high)
+            step = 1.0 / self._grid_steps
+            target = within(total, low, high, max(limits.minimum, 0.5 * step))
+            if target:
+                target = within(target + within(self._carry, -step, step, 0.0), low, high, 0.0)
         self._own_ramp = rate_limited(own, self._own_ramp, *self._rates)
         self.ramp = rate_limited(target, self.ramp, *self._rates)
         if self._dropped_at * self.ramp < 0.0:  # the way to the other side begins at rest
@@ -254,24 +262,6 @@ class OutputStage:
         own_beyond = abs(own) - max(own_asked, 0.0)
         beyond = max(own_beyond, abs(sent) - max(asked, 0.0) - self.largest_added)
         return beyond if beyond > NOTHING else 0.0
-
-    def _with_carry(self, total: float, low: float, high: float) -> float:
-        """Correct a velocity for what rounding has left out in the ticks before.
-
-        An added velocity is slow: a few steps of the grid, or less than one. What rounding leaves
-        out of it is carried, and corrected in the next ticks by at most one step in each. The carry
-        starts no movement: the operator would see a twitch.
-
-        Args:
-            total: the axis' own velocity and the added one together, within the range.
-            low: lower end of the range.
-            high: upper end of the range.
-        """
-        step = 1.0 / self._grid_steps
-        target = within(total, low, high, max(self.limits.minimum, 0.5 * step))
-        if target:
-            target = within(target + within(self._carry, -step, step, 0.0), low, high, 0.0)
-        return target
 
     def drop_added(self) -> None:
         """Go back to the axis' own ramp at once, but never faster and not to the other side."""

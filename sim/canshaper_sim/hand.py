@@ -9,8 +9,8 @@ from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import full_scale
 from canshaper.config.schema import EmergencyStop
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import Bound, BoundInput, BoundJoystick
-from canshaper.machine.joysticks import BoundSwitches
+from canshaper.machine.inputs import Bound, BoundInput
+from canshaper.machine.joysticks import BoundJoystick, BoundSwitches
 
 # Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
 JOYSTICK_ADDRESS = 0x33
