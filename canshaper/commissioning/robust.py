@@ -43,7 +43,7 @@ _ALIKE_S = 0.5
 
 @dataclass(frozen=True)
 class RobustTask:
-    """What a shaper is designed for.
+    """Requirements of a shaper.
 
     Attributes:
         bound: its axis.

@@ -23,7 +23,7 @@ def add_axes(
     others: "list[Message]",
     nodes: Nodes,
 ) -> None:
-    """Add the axes of a joystick; ``others`` are messages that are left."""
+    """Ask for the axes of a joystick and add them; ``others`` are the messages of no joystick."""
     from canshaper.cli.interview.first import FirstAxis
     from canshaper.commissioning import suggest
 
