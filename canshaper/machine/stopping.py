@@ -146,7 +146,7 @@ def unstated(deployment: Deployment) -> Iterator[tuple[Place, str]]:
 
 
 class When(TypedDict):
-    """Times of an axis, as of ``allowed_m``."""
+    """Times on which the stopping distance of an axis depends, see ``allowed_m``."""
 
     timeout_ms: int
     period_s: float

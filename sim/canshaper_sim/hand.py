@@ -18,7 +18,7 @@ JOYSTICK_ADDRESS = 0x33
 
 @dataclass(frozen=True)
 class Held:
-    """What a hand does with the joysticks; it does not change, another one takes its place.
+    """State of a hand on the joysticks; it does not change, another one takes its place.
 
     Attributes:
         joysticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.

@@ -111,7 +111,7 @@ def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
     """Ask for the timeout of a valve; ``set_ms`` is what it has by its EDS, 0 for none.
 
     Returns:
-        It, and whether it is no mere proposal.
+        The timeout in ms, and whether EDS or operator say it: else it is our proposal.
     """
     from canshaper.cli.interview.first import VALVE_TIMEOUT_MS
 

@@ -46,20 +46,20 @@ def run(context: Context) -> Outcome:
         least, most = min(axis.joystick.value, default=0.0), max(axis.joystick.value, default=0.0)
         if min(-least, most) < LEAST:
             text = f"its joystick went from {100 * least:.0f} to {100 * most:.0f} %"
-            outcome.poor.append(f"{name}: {text}: move it to both ends, enable held")
+            outcome.problems.append(f"{name}: {text}: move it to both ends, enable held")
         elif axis.states and not {state for _, state, _ in axis.states} & DRIVEN:
             text = f"{name}: it was never {State.ACTIVE.name}, but {_reasons(axis)}"
             if context.bench.simulated and axis.states[-1][2] == Reason.NODE_FAULT.name:
                 text = f"NOTE: {text}: at the desk no other controller starts the nodes"
                 outcome.sheet.print(text)
             else:
-                outcome.poor.append(f"{text}: see docs/states.md for that reason")
+                outcome.problems.append(f"{text}: see docs/states.md for that reason")
     if context.bench.simulated:
         sent = sum(len(axis.valve.value) for axis in traffic.axes.values())
         outcome.numbers["valve_frames"] = sent
         outcome.sheet.print(f"valve frames: {sent}")
         if sent:
-            outcome.poor.append(f"expected no valve frame, got {sent}; do not go on")
+            outcome.problems.append(f"expected no valve frame, got {sent}; do not go on")
     outcome.figures[""] = lambda: figure(
         traffic, "Dry drive: the joysticks as the daemon sees them"
     )

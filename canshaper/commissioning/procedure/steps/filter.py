@@ -51,7 +51,7 @@ def run(context: Context) -> Outcome:
     offers = {name: _offers(deployment, name, outcome) for name in swinging(deployment)}
     kinds = [kind for kind in _NAMES if all(kind in one for one in offers.values())]
     if not kinds:
-        outcome.poor.append("no filter suits every axis; see above")
+        outcome.problems.append("no filter suits every axis; see above")
         return outcome
     recommended = min(kinds, key=lambda kind: max(_rank(one[kind]) for one in offers.values()))
     for name, by_kind in offers.items():
@@ -74,7 +74,7 @@ def run(context: Context) -> Outcome:
         designs.append(offer.design)
         _show(deployment, offer.design, outcome)
         if offer.verdict.useless:
-            outcome.poor.append(f"{name}: {offer.verdict}")
+            outcome.problems.append(f"{name}: {offer.verdict}")
     outcome.edit = partial(_write, designs=designs)
     return outcome
 

@@ -67,7 +67,7 @@ def run(context: Context) -> Outcome:
     missing = [name for name in axes if not _has(sources, name)]
     if missing:
         text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
-        outcome.poor.append(f"{text} table, or a stopwatch")
+        outcome.problems.append(f"{text} table, or a stopwatch")
     findings: list[Finding] = []
     logs: list[Path] = []
     if sources.signals:
@@ -172,7 +172,7 @@ def _origin(logs: Sequence[Path], deployment: Deployment, *, simulated: bool) ->
 def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
     for finding in findings:
         outcome.sheet.print("\n".join(lines(finding)))
-        outcome.poor += [f"{finding.axis}: {fault}" for fault in finding.poor]
+        outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
         if finding.period_s and finding.damping_ratio:
             outcome.numbers[finding.axis] = {
                 "period_s": round(finding.period_s.value, 4),
