@@ -97,7 +97,8 @@ def init(
             messages += nodes.messages
             of = ", ".join(map(str, (*files, *(eds or []))))
             echo(f"{len(messages)} messages in {of}.")
-            names = [_relative(path, folder) for path in (*files, *([own] if eds else []))]
+            used = (*files, *([own] if eds else []))
+            names = [os.path.relpath(path.resolve(), folder) for path in used]
             ask = partial(machine_of, messages, names, interface, nodes)
             machine = (None if answers else accepted(ask)) or ask()
             uses = uses_of(machine, messages)
@@ -213,7 +214,3 @@ def _write(file: Path, draft: Path, text: str) -> None:
         kept = f"{draft}: kept with all answers; fix it there and rename it to {file}"
         raise UsageError(f"{error}\n{kept}") from None
     draft.replace(file)
-
-
-def _relative(path: Path, folder: Path) -> str:
-    return os.path.relpath(path.resolve(), folder)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.procedure.bench import STILL_MOVES, Mode, Task
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.joysticks import LEAST
-from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
+from canshaper.commissioning.procedure.traffic import Traffic, read_traffic
 from canshaper.report import style
 from canshaper.report.console import axis_title, new_table
 from canshaper.shaping.states import Reason, State
@@ -48,7 +48,8 @@ def run(context: Context) -> Outcome:
             text = f"its joystick went from {100 * least:.0f} to {100 * most:.0f} %"
             outcome.problems.append(f"{name}: {text}: move it to both ends, enable held")
         elif axis.states and not {state for _, state, _ in axis.states} & DRIVEN:
-            text = f"{name}: it was never {State.ACTIVE.name}, but {_reasons(axis)}"
+            reasons = dict.fromkeys(f"{state} ({reason})" for _, state, reason in axis.states)
+            text = f"{name}: it was never {State.ACTIVE.name}, but {', '.join(reasons)}"
             if context.bench.simulated and axis.states[-1][2] == Reason.NODE_FAULT.name:
                 text = f"NOTE: {text}: at the desk no other controller starts the nodes"
                 outcome.sheet.print(text)
@@ -82,10 +83,6 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
     if traffic.missed_deadlines is not None:
         outcome.numbers["missed_deadlines"] = traffic.missed_deadlines
         outcome.sheet.print(f"missed deadlines: {traffic.missed_deadlines}")
-
-
-def _reasons(axis: AxisTraffic) -> str:
-    return ", ".join(dict.fromkeys(f"{state} ({reason})" for _, state, reason in axis.states))
 
 
 def figure(traffic: Traffic, title: str) -> Figure:

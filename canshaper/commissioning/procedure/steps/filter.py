@@ -53,7 +53,8 @@ def run(context: Context) -> Outcome:
     if not kinds:
         outcome.problems.append("no filter suits every axis; see above")
         return outcome
-    recommended = min(kinds, key=lambda kind: max(_rank(one[kind]) for one in offers.values()))
+    words = {kind: [by_kind[kind].verdict.word for by_kind in offers.values()] for kind in kinds}
+    recommended = min(kinds, key=lambda kind: max(map(_WORDS.index, words[kind])))
     for name, by_kind in offers.items():
         outcome.sheet.print(_table(name, by_kind))
     before = context.state.of(FILTER.name).numbers.get("chosen")
@@ -119,10 +120,6 @@ def _offer(deployment: Deployment, design: Design) -> Offer:
     if verdict.word != "good":
         verdict = replace(verdict, cures=design.verdict.cures or verdict.cures)
     return Offer(design, chosen, verdict, {key: round(one, 2) for key, one in figures.items()})
-
-
-def _rank(offer: Offer) -> int:
-    return _WORDS.index(offer.verdict.word)
 
 
 def _cells(offer: Offer) -> tuple[str, ...]:

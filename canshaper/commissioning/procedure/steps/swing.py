@@ -64,7 +64,8 @@ def run(context: Context) -> Outcome:
         text = "the length of the rope is measured, which says how it swings"
         outcome.sheet.print(f"ok: {', '.join(ropes)}: {text}")
     sources = _swing_sources(bench, deployment, axes)
-    missing = [name for name in axes if not _has(sources, name)]
+    shown = {**sources.signals, **sources.tables, **sources.timed}
+    missing = [name for name in axes if name not in shown]
     if missing:
         text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
         outcome.problems.append(f"{text} table, or a stopwatch")
@@ -126,10 +127,6 @@ def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) ->
         else:
             sources.signals[name] = answer
     return sources
-
-
-def _has(sources: _Sources, name: str) -> bool:
-    return name in {**sources.signals, **sources.tables, **sources.timed}
 
 
 def _task(axes: Sequence[str], mode: Mode) -> Task:
