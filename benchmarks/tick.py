@@ -101,7 +101,7 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
 
 
 def daemon(controller: Controller, port: Port, *, gated: bool) -> Callable[[int], None]:
-    """What the daemon does in a tick."""
+    """Work of the daemon in a tick."""
     driven = Guarded(controller) if gated else controller
 
     def body(now_ns: int) -> None:

@@ -18,8 +18,6 @@ from canshaper.shaping.registry import (
     build_shaper,
     position,
 )
-from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.sway import SwayModel
 
 # Shortest time between two changes of one axis: a noisy weight must not keep the loop busy.
 LEAST_BETWEEN_NS = 100_000_000
@@ -128,7 +126,10 @@ class SetChooser:
         self.number = self._first[name]
         if steps is not None:
             self.number += 1 + round(steps / STEPS_BETWEEN)
-        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway))
+        options = {"valve_rate_per_s": self._rate, **chosen.parameters}
+        self._axis.retune(
+            chosen.mode, lambda sway: build_shaper(chosen.kind, sway.tick_s, sway, **options)
+        )
 
     def _steady(self, now_ns: int) -> bool:
         """Whether another profile may be taken now."""
@@ -140,11 +141,6 @@ class SetChooser:
         if off > STEADY or self._restless_ns is None:
             self._restless_ns = now_ns
         return now_ns - self._restless_ns >= STEADY_NS
-
-    def _shaper(self, chosen: ParameterSet, sway: SwayModel) -> Shaper:
-        return build_shaper(
-            chosen.kind, sway.tick_s, sway, valve_rate_per_s=self._rate, **chosen.parameters
-        )
 
 
 def profile_by_number(bound: BoundAxis) -> list[str]:

@@ -4,7 +4,7 @@ from typing import Protocol, Self
 
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.input import GOOD, Input, Raw, Switch
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.shaping.states import CommandInput, Reason
 
 _new = tuple.__new__  # CommandInput(...) in half the time

@@ -33,7 +33,6 @@ from canshaper.machine.deployment import Deployment, bind_motions
 from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, bind_status, filter_lines
 from canshaper.machine.inputs import (
-    BoundJoystick,
     BoundValue,
     Choosing,
     bind_emergency_stop,
@@ -41,6 +40,7 @@ from canshaper.machine.inputs import (
     bind_switch,
 )
 from canshaper.machine.joysticks import (
+    BoundJoystick,
     bind_joystick,
     bind_switches,
     check_conditions,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.message import FieldSet
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import (

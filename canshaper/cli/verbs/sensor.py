@@ -113,7 +113,7 @@ def sensor(
 
         results.picture_line(results.picture(out / "sensor.png", figure))
     results.write()
-    if any(finding.poor for finding in findings):
+    if any(finding.problems for finding in findings):
         raise typer.Exit(EXIT_TOO_POOR)
 
 
@@ -175,7 +175,7 @@ def _print(
             results.print(table(deployment.axes[finding.axis], finding))
         for note in finding.notes:
             results.print(f"  note: {note}")
-        for fault in finding.poor:
+        for fault in finding.problems:
             results.print(f"  not enough data: {fault}")
     for line in written:
         results.print(line)
