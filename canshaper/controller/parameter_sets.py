@@ -27,6 +27,9 @@ LEAST_BETWEEN_NS = 100_000_000
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
 STEADY = 0.02
 STEADY_NS = 200_000_000
+# A load is gripped at rest: a signal of it that comes in the middle of a press, up to so long after
+# its beginning, is late.
+LATE_S = 1.0
 # A load is gripped and dropped once in so long; a signal that says so again does not settle.
 SETTLES_NS = 2_000_000_000
 _MOST_JUMPS = 3
@@ -103,9 +106,14 @@ class SetChooser:
         self._not_before_ns = 0
         self._maximum = config.limits.max_pct / 100.0
         self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
+        # What has driven the axis in each tick of this press, which began at rest; None: in another.
+        self._driven: list[float] | None = []
+        assert axis.sway is not None  # checked with the deployment
+        self._late = round(LATE_S / axis.sway.tick_s)
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
+        self._follow_press()
         name = self.profile.name(now_ns) if self.profile else ""
         if name not in self._programs:
             name = ""
@@ -128,7 +136,18 @@ class SetChooser:
         self.number = self._first[name]
         if steps is not None:
             self.number += 1 + round(steps / STEPS_BETWEEN)
-        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway))
+        late = (self._driven or ()) if name == before else ()
+        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway), late)
+
+    def _follow_press(self) -> None:
+        """Remember what the last tick drove the axis by, if its joystick has not let go since rest."""
+        axis, driven = self._axis, self._driven
+        if not axis.output.commanded:
+            self._driven = []
+        elif driven is not None:
+            driven.append(axis.applied)
+            if axis.command == 0.0 or len(driven) > self._late:
+                self._driven = None
 
     def _steady(self, now_ns: int) -> bool:
         """Whether another profile may be taken now."""

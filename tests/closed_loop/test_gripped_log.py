@@ -29,6 +29,10 @@ def late(time_s: float) -> float:
     return LOG_KG if time_s >= 1.0 else 0.0
 
 
+def a_second_late(time_s: float) -> float:
+    return LOG_KG if time_s >= 1.5 else 0.0
+
+
 def silent(_time_s: float) -> None:
     return None
 
@@ -51,13 +55,23 @@ def to_and_fro(time_s: float) -> float:
     [
         ("empty", None, (0.2, 0.5), (0.4, 0.9)),
         ("log", None, (0.2, 0.6), (0.6, 1.5)),
-        ("log", late, (1.2, 2.3), (1.0, 2.3)),
+        ("log", late, (0.2, 0.6), (0.6, 1.5)),
+        ("log", a_second_late, (0.3, 0.8), (1.0, 2.3)),
         ("empty", silent, (0.6, 1.1), (1.2, 3.0)),
         ("log", silent, (1.1, 1.7), (2.9, 5.0)),
         ("log", lost, (0.7, 2.0), (2.9, 6.2)),
         ("log", to_and_fro, (1.1, 1.7), (2.9, 5.0)),
     ],
-    ids=["empty", "log", "late", "empty unknown", "log unknown", "lost", "to and fro"],
+    ids=[
+        "empty",
+        "log",
+        "late",
+        "a second late",
+        "empty unknown",
+        "log unknown",
+        "lost",
+        "to and fro",
+    ],
 )
 def test_the_swing_that_is_left(
     load: str,
