@@ -27,8 +27,7 @@ LEAST_BETWEEN_NS = 100_000_000
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
 STEADY = 0.02
 STEADY_NS = 200_000_000
-# A load is gripped at rest: a signal of it that comes in the middle of a press, up to so long after
-# its beginning, is late.
+# A load is gripped at rest: its signal is late, if it comes so soon after a press has begun.
 LATE_S = 1.0
 # A load is gripped and dropped once in so long; a signal that says so again does not settle.
 SETTLES_NS = 2_000_000_000
@@ -106,7 +105,7 @@ class SetChooser:
         self._not_before_ns = 0
         self._maximum = config.limits.max_pct / 100.0
         self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
-        # What has driven the axis in each tick of this press, which began at rest; None: in another.
+        # What drove the axis in each tick of a press that began at rest; None: in another one.
         self._driven: list[float] | None = []
         assert axis.sway is not None  # checked with the deployment
         self._late = round(LATE_S / axis.sway.tick_s)
@@ -136,11 +135,11 @@ class SetChooser:
         self.number = self._first[name]
         if steps is not None:
             self.number += 1 + round(steps / STEPS_BETWEEN)
-        late = (self._driven or ()) if name == before else ()
-        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway), late)
+        past = (self._driven or ()) if name == before else ()
+        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway), past)
 
     def _follow_press(self) -> None:
-        """Remember what the last tick drove the axis by, if its joystick has not let go since rest."""
+        """Remember what drove the axis in the last tick, in its first press since rest."""
         axis, driven = self._axis, self._driven
         if not axis.output.commanded:
             self._driven = []

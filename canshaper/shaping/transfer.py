@@ -95,8 +95,8 @@ class BumplessTransfer:
         assert isinstance(self._shaper, Following)
         self._shaper.follow(factor)
 
-    def replace(self, shaper: Shaper, command: float, *, anew: bool = False) -> None:
-        """Go on with another filter; ``command`` is the one in force, ``anew`` see ``carry_over``."""
-        carry_over(self._shaper, shaper, command, anew=anew)
+    def replace(self, shaper: Shaper, command: float) -> None:
+        """Go on with another filter; ``command`` is the one that is in force."""
+        carry_over(self._shaper, shaper, command)
         self._shaper = shaper
         self._joins = True

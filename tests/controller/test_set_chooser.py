@@ -30,7 +30,7 @@ class Watched(ShapedAxis):
         super().__init__(TICK_S, bound.config.limits.output_limits(), sway=sway, shaper=shaper)
         self.at_rest = True
         self.retuned: list[Shaper] = []
-        self.driven: Sequence[float] = ()
+        self.past: Sequence[float] = ()
 
     @property
     def neutral(self) -> bool:
@@ -40,15 +40,15 @@ class Watched(ShapedAxis):
         self,
         mode: SwayMode,
         shaper_for: Callable[[SwayModel], Shaper],
-        driven: Sequence[float] = (),
+        past: Sequence[float] = (),
     ) -> None:
-        self.driven = driven
+        self.past = past
 
         def kept(sway: SwayModel) -> Shaper:
             self.retuned.append(shaper_for(sway))
             return self.retuned[-1]
 
-        super().retune(mode, kept, driven)
+        super().retune(mode, kept, past)
 
     def move(self, command: float, applied: float) -> None:
         """In motion, with this command and output."""
@@ -168,7 +168,7 @@ def test_a_profile_in_a_press_changes_no_swing(slew: Callable[..., BoundAxis]) -
     bench.axis.move(0.5, 0.5)
     bench.axis.output.commanded = True
     assert bench.changes(0, "fast") or bench.changes(200 * MS, "fast")
-    assert bench.axis.driven == ()
+    assert bench.axis.past == ()
 
 
 def test_a_fiftieth_off_the_speed_is_steady(slew: Callable[..., BoundAxis]) -> None:

@@ -53,23 +53,6 @@ def test_a_swing_that_a_sensor_shows_is_damped_as_one_that_a_limit_made(mode: Sw
     assert abs(one.step(0.5) - Fir([1.0]).step(0.5)) > 0.01
 
 
-def test_that_swings_anew_it_is_one_that_has_always_been_there() -> None:
-    sway = SwayModel(MODES[0], TICK_S)
-    old, new, always = (
-        LimitAware(sway, Fir(zv_taps(SwayMode.from_period(period_s, 0.0), TICK_S)))
-        for period_s in (1.8, 2.356, 2.356)
-    )
-    for command in restless(3, 200):
-        old.step(command)
-        always.step(command)
-        sway.step(0.5 * command)
-    new.copy_state(old)
-    new.swing_anew()
-    for command in restless(4, 50):
-        assert new.step(command) == pytest.approx(always.step(command), abs=1e-9)
-        sway.step(0.5 * command)
-
-
 def test_it_is_stretched_with_all_its_taps_at_the_same_period() -> None:
     kind = KINDS["robust"]
     assert kind.stretched

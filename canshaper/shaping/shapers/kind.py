@@ -147,19 +147,16 @@ class ShaperKind:
                 raise ValueError(f"filter {self.name}: the name {name!r} is not allowed here")
 
 
-def carry_over(old: Shaper, new: Shaper, command: float, *, anew: bool = False) -> None:
+def carry_over(old: Shaper, new: Shaper, command: float) -> None:
     """Give a new shaper a memory: that of the one before it, where both are of one kind.
 
     Args:
         old: the one before.
         new: the new one.
         command: the command now; without a better memory it counts as the one for long.
-        anew: the sway model of the new one swings as if it had always been that.
     """
     if type(old) is type(new) and hasattr(new, "copy_state"):
         new.copy_state(old)
-        if anew and hasattr(new, "swing_anew"):
-            new.swing_anew()
     elif hasattr(new, "reset_to_steady_state"):
         new.reset_to_steady_state(command)
 
