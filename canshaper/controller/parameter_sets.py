@@ -27,8 +27,7 @@ LEAST_BETWEEN_NS = 100_000_000
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
 STEADY = 0.02
 STEADY_NS = 200_000_000
-# A load is gripped at rest: its signal is late, if it comes so soon after a press has begun.
-LATE_S = 1.0
+LATE_S = 1.0  # a load is gripped at rest: so soon in a press its signal is late
 # A load is gripped and dropped once in so long; a signal that says so again does not settle.
 SETTLES_NS = 2_000_000_000
 _MOST_JUMPS = 3
@@ -107,8 +106,7 @@ class SetChooser:
         self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
         # What drove the axis in each tick of a press that began at rest; None: in another one.
         self._driven: list[float] | None = []
-        assert axis.sway is not None  # checked with the deployment
-        self._late = round(LATE_S / axis.sway.tick_s)
+        self._late = round(LATE_S / axis.sway.tick_s) if axis.sway else 0
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""

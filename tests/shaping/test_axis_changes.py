@@ -117,15 +117,6 @@ def test_a_retune_keeps_the_swing(drive: Drive) -> None:
     assert drive.axis.sway.sway_rad(1.5) == pytest.approx(shown, rel=1e-12)
 
 
-def test_a_retune_with_what_drove_it_swings_as_if_it_had_always_been_that(drive: Drive) -> None:
-    drive.moving()
-    truth, driven = SwayModel(NEW_MODE, TICK_S), [0.1, 0.3, 0.2]
-    drive.axis.retune(NEW_MODE, new_filter, driven)
-    for velocity in driven:
-        truth.step(velocity)
-    assert (drive.axis.sway.angle, drive.axis.sway.rate) == (truth.angle, truth.rate)
-
-
 def test_a_retune_to_the_same_filter_changes_next_to_nothing(drive_with: DriveWith) -> None:
     """Not even in the middle of a press, where a lag in the filter remembers the way there."""
     drive, other = (drive_with(grid_steps=FINE) for _ in range(2))
