@@ -25,6 +25,7 @@ LEAST_BETWEEN_NS = 100_000_000
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
 STEADY = 0.02
 STEADY_NS = 200_000_000
+LATE_S = 1.0  # a load is gripped at rest: so soon in a press its signal is late
 # A load is gripped and dropped once in so long; a signal that says so again does not settle.
 SETTLES_NS = 2_000_000_000
 _MOST_JUMPS = 3
@@ -101,9 +102,13 @@ class SetChooser:
         self._not_before_ns = 0
         self._maximum = config.limits.max_pct / 100.0
         self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
+        # What drove the axis in each tick of a press that began at rest; None: in another one.
+        self._driven: list[float] | None = []
+        self._late = round(LATE_S / axis.sway.tick_s) if axis.sway else 0
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
+        self._follow_press()
         name = self.profile.name(now_ns) if self.profile else ""
         if name not in self._programs:
             name = ""
@@ -126,10 +131,21 @@ class SetChooser:
         self.number = self._first[name]
         if steps is not None:
             self.number += 1 + round(steps / STEPS_BETWEEN)
+        past = (self._driven or ()) if name == before else ()
         options = {"valve_rate_per_s": self._rate, **chosen.parameters}
         self._axis.retune(
-            chosen.mode, lambda sway: build_shaper(chosen.kind, sway.tick_s, sway, **options)
+            chosen.mode, lambda sway: build_shaper(chosen.kind, sway.tick_s, sway, **options), past
         )
+
+    def _follow_press(self) -> None:
+        """Remember what drove the axis in the last tick, in its first press since rest."""
+        axis, driven = self._axis, self._driven
+        if not axis.output.commanded:
+            self._driven = []
+        elif driven is not None:
+            driven.append(axis.applied)
+            if axis.command == 0.0 or len(driven) > self._late:
+                self._driven = None
 
     def _steady(self, now_ns: int) -> bool:
         """Whether another profile may be taken now."""

@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 790,
     "docs/comparison.md": 610,
     "docs/decisions.md": 895,
-    "docs/deployment.md": 2210,
+    "docs/deployment.md": 2245,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
     "docs/export.md": 300,
@@ -64,11 +64,11 @@ BUDGET = {
 LINES = {
     "canshaper/gate": (2_100, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_925,
+        5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (64_892, "a new ability takes the room of an old one"),
-    "tests": (99_429, "one level for each behaviour"),
+    "canshaper": (65_012, "a new ability takes the room of an old one"),
+    "tests": (99_635, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (353, "one that only hands on is joined to its reader")}
