@@ -6,8 +6,9 @@ meet the same crane and the same operator.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +17,10 @@ from canshaper.config.uncertainty import MOST_FLOW, Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.axes import ALL_AXES, JOINTS, NEAR_FAR, OVERHEAD, SLEW, kind_of
+from canshaper_sim.axes import ALL_AXES, JOINTS, LUFFING, NEAR_FAR, ON_ROPE, OVERHEAD, SLEW, kind_of
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
-from canshaper_sim.overhead import OverheadParameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import DWELL_S
 from canshaper_sim.strokes import Script
@@ -140,9 +140,11 @@ def _crane(
         "damping_pct": draw.between(*ranges.damping_pct),
     }
     kind = kind_of(axes)
-    by_rope, by_joints = kind == OVERHEAD, kind == JOINTS
-    start = "rope_m" if by_rope else "radius_m"
-    factors[start] = draw.between(*getattr(ranges, start))
+    by_rope, by_joints = kind in ON_ROPE, kind == JOINTS
+    if by_rope:
+        factors["rope_m"] = draw.between(*ranges.rope_m)
+    if kind not in (OVERHEAD, LUFFING):
+        factors["radius_m"] = draw.between(*ranges.radius_m)
     damped = 1.0 + factors["damping_pct"] / 100.0
     grapple = nominal.grapple
     grapple = replace(
@@ -154,7 +156,7 @@ def _crane(
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
     elif by_rope:
-        crane = replace(crane, overhead=_overhead(nominal.overhead, factors))
+        crane = replace(crane, **{kind: _on_rope(getattr(nominal, kind), factors)})
     else:
         radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
         crane = replace(crane, start_radius_m=radius_m)
@@ -169,7 +171,7 @@ def _crane(
         gain_pct = draw.between(*ranges.valve_gain_pct)
         factors |= {f"{axis}_{name}": value for name, value in drawn.items()}
         factors[f"{axis}_gain_pct"] = gain_pct
-        owner = joints if by_joints and axis != SLEW else crane.overhead if by_rope else crane
+        owner = joints if by_joints and axis != SLEW else getattr(crane, kind) if by_rope else crane
         full = _FULL_SPEEDS[axis]
         changed = {
             axis: replace(getattr(owner, axis), **drawn),
@@ -178,16 +180,21 @@ def _crane(
         if owner is joints:
             joints = replace(joints, **changed)
         elif by_rope:
-            crane = replace(crane, overhead=replace(crane.overhead, **changed))
+            crane = replace(crane, **{kind: replace(owner, **changed)})
         else:
             crane = replace(crane, **changed)
     return replace(crane, joints=joints), factors
 
 
-def _overhead(nominal: OverheadParameters, factors: Mapping[str, float]) -> OverheadParameters:
-    """The rope that was drawn."""
+def _on_rope(nominal: Any, factors: dict[str, float]) -> Any:
+    """Return a crane with the rope that was drawn, and the radius where one was."""
+    own: dict[str, float] = {}
+    if "radius_m" in factors:
+        radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
+        own["start_radius_m"] = radius_m
     return replace(
         nominal,
+        **own,
         rope_m=min(max(factors["rope_m"], nominal.rope_min_m), nominal.rope_max_m),
         rope_error_pct=factors["length_pct"],
         damping_ratio=nominal.damping_ratio * (1.0 + factors["damping_pct"] / 100.0),
@@ -199,9 +206,9 @@ def _place(
 ) -> tuple[CraneParameters, dict[str, float]]:
     """Pump, ground and wind, and how near its stops the tip is; what was drawn of them.
 
-    An overhead crane has none of them.
+    A crane with a rope has none of them.
     """
-    if kind_of(axes) == OVERHEAD:
+    if kind_of(axes) in ON_ROPE:
         return crane, {}
     factors = {
         "pump_flow": draw.between(*ranges.pump_flow),

@@ -15,6 +15,7 @@ class CylindricalCrane(Section):
     slew: str | None = Field(None, description="axis that turns, positive counter-clockwise")
     near_far: str | None = Field(None, description="axis that moves the tip out, or a trolley")
     lift: str | None = Field(None, description="axis that moves the tip up")
+    hoist: str | None = Field(None, description="axis of a rope from it, positive up")
 
 
 class CartesianCrane(Section):
@@ -34,6 +35,7 @@ class JointCrane(Section):
     lift_cylinder: str | None = Field(None, description="axis that raises the main boom")
     knuckle: str | None = Field(None, description="axis that folds the outer boom out")
     extension: str | None = Field(None, description="axis that moves the telescope out")
+    hoist: str | None = Field(None, description="axis of a rope from its tip, positive up")
 
 
 CraneSection = Annotated[

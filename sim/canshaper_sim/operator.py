@@ -107,7 +107,7 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     """A built-in script, or `random-<seed>` of 30 s on these axes.
 
     Where they are joints of the boom, `demo` and `loading` are the same work joint by joint; where
-    they are those of an overhead crane, that of one.
+    they are those of a crane with a rope, that of one.
 
     Raises:
         DesignError: no script of that name; lists the names.

@@ -13,7 +13,7 @@ slack is none: the load never falls freely.
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import BRIDGE, HOIST, TROLLEY
@@ -24,6 +24,23 @@ if TYPE_CHECKING:
     from canshaper_sim.grapple import Sway
 
 Vector = tuple[float, float, float]
+
+
+class RopeParameters(Protocol):
+    """What the load on a rope needs to know of its crane."""
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of the swing."""
+
+    @property
+    def rope_error_pct(self) -> float:
+        """How much more than its length the length signal says."""
+
+    @property
+    def g_m_s2(self) -> float:
+        """Gravity."""
+
 
 # name -> (lowest, highest) value that still describes an overhead crane.
 _ALLOWED = {
@@ -40,7 +57,7 @@ _ALLOWED = {
 }
 
 
-def _drive() -> ValveParameters:
+def drive() -> ValveParameters:
     """An inverter follows every command, within its ramp."""
     return ValveParameters(deadband=0.0, rate_limit_1_s=5.0, lag_s=0.1)
 
@@ -49,9 +66,9 @@ def _drive() -> ValveParameters:
 class OverheadParameters:
     """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
 
-    bridge: ValveParameters = field(default_factory=_drive)
-    trolley: ValveParameters = field(default_factory=_drive)
-    hoist: ValveParameters = field(default_factory=_drive)
+    bridge: ValveParameters = field(default_factory=drive)
+    trolley: ValveParameters = field(default_factory=drive)
+    hoist: ValveParameters = field(default_factory=drive)
     bridge_full_speed_m_s: float = 1.0
     trolley_full_speed_m_s: float = 1.0
     hoist_full_speed_m_s: float = 0.5
@@ -97,7 +114,7 @@ class OverheadBoom:
         rate: its velocity, from the trolley's, m/s.
     """
 
-    def __init__(self, axes: dict[str, Actuator], parameters: OverheadParameters) -> None:
+    def __init__(self, axes: dict[str, Actuator], parameters: RopeParameters) -> None:
         self.axes = axes
         self._p = parameters
         self.load: Vector = (0.0, 0.0, axes[HOIST].position)
@@ -143,14 +160,23 @@ class OverheadBoom:
         return math.atan2(y, x), radius, hoist.position, turn, out, hoist.speed
 
     def advance(self, step_s: float) -> None:
-        """Move on by step_s seconds: a classical Runge-Kutta step, and back onto the rope."""
-        bridge, trolley, hoist = self.axes.values()
-        before = hoist.position, hoist.speed
-        for axis in (bridge, trolley, hoist):
+        """Move on by step_s seconds."""
+        bridge, trolley, _ = self.axes.values()
+        for axis in (bridge, trolley):
             axis.advance(step_s)
-        start = (bridge.start_acceleration, trolley.start_acceleration)
-        middle = (bridge.middle_acceleration, trolley.middle_acceleration)
-        end = (bridge.end_acceleration, trolley.end_acceleration)
+        start = (bridge.start_acceleration, trolley.start_acceleration, 0.0)
+        middle = (bridge.middle_acceleration, trolley.middle_acceleration, 0.0)
+        end = (bridge.end_acceleration, trolley.end_acceleration, 0.0)
+        self._hang(step_s, start, middle, end)
+
+    def _hang(self, step_s: float, start: Vector, middle: Vector, end: Vector) -> None:
+        """Move rope and load on below a trolley with these accelerations, m/s^2.
+
+        A classical Runge-Kutta step, and back onto the rope.
+        """
+        hoist = self.axes[HOIST]
+        before = hoist.position, hoist.speed
+        hoist.advance(step_s)
         ropes = (
             (*before, hoist.start_acceleration),
             (hoist.middle_position, hoist.middle_speed, hoist.middle_acceleration),
@@ -172,7 +198,7 @@ class OverheadBoom:
         self.rate = _plus(v, (change * length - _dot(r, v)) / length**2, r)
 
     def _acceleration(
-        self, r: Vector, v: Vector, trolley: tuple[float, float], hoist: tuple[float, float, float]
+        self, r: Vector, v: Vector, trolley: Vector, hoist: tuple[float, float, float]
     ) -> Vector:
         """Return that of the load relative to the trolley.
 
@@ -183,7 +209,7 @@ class OverheadBoom:
             hoist: position, speed and acceleration of the hook.
         """
         length, change, change_2 = (-one for one in hoist)
-        pull = (-trolley[0], -trolley[1], -self._p.g_m_s2)
+        pull = (-trolley[0], -trolley[1], -trolley[2] - self._p.g_m_s2)
         tension = (_dot(r, pull) + _dot(v, v) - change**2 - length * change_2) / length**2
         damping = 2.0 * self._p.damping_ratio * math.sqrt(self._p.g_m_s2 / length)
         return _plus(_plus(pull, damping * change / length - tension, r), -damping, v)

@@ -10,7 +10,7 @@ from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundValue, Choosing
-from canshaper_sim.axes import JOINTS, OVERHEAD, ROTATOR, TIP
+from canshaper_sim.axes import HOIST, JOINTS, OVERHEAD, ROTATOR, TIP, TOWER
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
@@ -38,6 +38,9 @@ OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "CraneVelocity": ("BridgeSpeed", "TrolleySpeed", "HoistSpeed"),
     "LoadSway": ("SwayBridge", "SwayTrolley"),
 }
+
+# Sent first by other cranes with a rope: how far down it hangs.
+HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {"HookPosition": ("RopeLength", "HoistSpeed")}
 
 # Frames of a valve that are kept once read.
 MOST_KNOWN = 4096
@@ -166,6 +169,8 @@ class PlantNode:
         self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
         if name == OVERHEAD:
             self._feedback = OVERHEAD_FEEDBACK
+        elif name == TOWER:
+            self._feedback = {**HOOK_FEEDBACK, **FEEDBACK}
         self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
         measured = [motion.radius for motion in deployment.motions.values()]
@@ -272,7 +277,7 @@ class PlantNode:
             return math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)
         boom = self.crane.boom
         if isinstance(boom, OverheadBoom):
-            return _overhead_values(name, boom)
+            return _rope_values(name, boom)
         assert isinstance(boom, JointBoom)
         if name == "JointVelocity":
             return boom.joint_rates
@@ -280,8 +285,13 @@ class PlantNode:
         return math.degrees(slew), math.degrees(lift), math.degrees(knuckle), extension
 
 
-def _overhead_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
-    """Return the values of a feedback message of an overhead crane, in the order of its signals."""
+def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
+    """Return the values of a feedback message of a crane with a rope, in the order of its signals.
+
+    But for the hook's they are those of an overhead crane.
+    """
+    if name == "HookPosition":
+        return boom.signal_m, boom.axes[HOIST].speed
     bridge, trolley, hoist = boom.axes.values()
     if name == "CraneVelocity":
         return bridge.speed, trolley.speed, hoist.speed

@@ -36,6 +36,7 @@ NAMES = (
     "forwarder-pump",
     "forwarder-load",
     "bridge-crane",
+    "tower-crane",
 )
 CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
 MADE = {

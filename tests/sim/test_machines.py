@@ -55,12 +55,12 @@ def test_axes_choose_the_machine() -> None:
     assert machine_for(dict.fromkeys(TIP_AXES), "tip-controller") == "tip-controller"
     with pytest.raises(
         ValueError,
-        match="machine: expected one of tip, tip-controller, joints, overhead, got 'crab'",
+        match="machine: expected one of tip, tip-controller, joints, overhead, tower, got 'crab'",
     ):
         machine_for({}, "crab")
     with pytest.raises(
         ValueError,
-        match="machine: expected one of tip, tip-controller, joints, overhead, got 'crab'",
+        match="machine: expected one of tip, tip-controller, joints, overhead, tower, got 'crab'",
     ):
         build_machine("crab")
     assert [type(build_machine(name).crane.boom).__name__ for name in MACHINES] == [
@@ -68,6 +68,7 @@ def test_axes_choose_the_machine() -> None:
         "JointBoom",
         "JointBoom",
         "OverheadBoom",
+        "RopedBoom",
     ]
 
 
@@ -176,7 +177,7 @@ def test_shipped_deployments_are_good(file: Path) -> None:
         (["sim", str(JOINT_FILE), "--machine", "tip"], "axes.knuckle: machine tip has slew"),
         (
             ["sim", str(TIP_FILE), "--machine", "crab"],
-            "machine: expected one of tip, tip-controller, joints, overhead, got 'crab'",
+            "machine: expected one of tip, tip-controller, joints, overhead, tower, got 'crab'",
         ),
         (
             ["operator", str(JOINT_FILE), "--script", "pulse-near_far"],

@@ -1,10 +1,11 @@
-"""Filters of an overhead crane on the same work, by the length of its rope."""
+"""Filters of a crane with a rope on the same work, by the length of the rope."""
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.design.comparison.manoeuvres import tick_s
@@ -16,19 +17,35 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.shapers.fir import zv_taps
 from canshaper.shaping.sway import GRAVITY_M_S2
-from canshaper_sim.axes import BRIDGE, HOIST, OVERHEAD, OVERHEAD_AXES, TROLLEY, kind_of
+from canshaper_sim.axes import (
+    BRIDGE,
+    HOIST,
+    NEAR_FAR,
+    ON_ROPE,
+    OVERHEAD,
+    SLEW,
+    TOWER,
+    TROLLEY,
+    WITHOUT_SWAY,
+    kind_of,
+)
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.machines import AXES_OF
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
 ROPES_M = (2.0, 5.0, 10.0, 25.0)
+# Of a tower crane: rope and radius at the start, m.
+PLACES_M = ((10.0, 40.0), (30.0, 20.0), (30.0, 40.0), (30.0, 60.0), (50.0, 40.0))
+# The rope that a filter is made for which follows none.
+_FOR_M = {OVERHEAD: 8.0, TOWER: 20.0}
 # Nobody waits longer than a swing to see what is left.
 _LONGEST_LOOK_S = 11.0
 
 
 @dataclass(frozen=True)
 class RopeFilter:
-    """A filter of bridge and trolley.
+    """A filter of the axes that swing the load.
 
     Attributes:
         name: for the table.
@@ -43,22 +60,43 @@ class RopeFilter:
     bypass: bool = False
 
 
-def is_overhead(deployment: Deployment) -> bool:
-    """Whether its axes move a bridge, a trolley or a hoist."""
-    return kind_of(deployment.coordinates.values()) == OVERHEAD
+@dataclass(frozen=True)
+class Work:
+    """Work that each filter does.
+
+    Attributes:
+        name: of its column, such as ``5 m hoisted``.
+        rope_m: the rope at the start.
+        strokes: of the joysticks, by coordinates.
+        radius_m: of a tower crane, at the start.
+    """
+
+    name: str
+    rope_m: float
+    strokes: tuple[Stroke, ...]
+    radius_m: float | None = None
+
+
+def on_rope(deployment: Deployment) -> str | None:
+    """Return the kind of crane where it is one with a rope; else None."""
+    kind = kind_of(deployment.coordinates.values())
+    return kind if kind in ON_ROPE else None
 
 
 def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     """Return what is compared.
 
     Raises:
-        DesignError: bridge or trolley is missing, or has no measured rope.
+        DesignError: an axis is missing, or has no measured rope.
     """
     by_coordinate = deployment.by_coordinate
-    if missing := [one for one in OVERHEAD_AXES if one not in by_coordinate]:
-        raise DesignError(f"expected bridge, trolley and hoist in crane, without {missing[0]}")
+    kind = kind_of(by_coordinate)
+    axes = AXES_OF[kind]
+    if missing := [one for one in axes if one not in by_coordinate]:
+        names = f"{', '.join(axes[:-1])} and {axes[-1]}"
+        raise DesignError(f"expected {names} in crane, without {missing[0]}")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
-    for axis in (by_coordinate[BRIDGE], by_coordinate[TROLLEY]):
+    for axis in (by_coordinate[one] for one in axes if one not in WITHOUT_SWAY):
         sway = swinging_axis(deployment, axis)[1]
         if sway.length is None:
             raise DesignError(f"axes.{axis}.sway: expected length, by which filters are compared")
@@ -70,7 +108,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
         gff[axis] = filter_of("gff", a1=2.000001 / omega, a2=1.0 / omega**2)
     return [
         RopeFilter("off", {}, bypass=True),
-        RopeFilter("ZVD for 8 m", zvd, rope_m=8.0),
+        RopeFilter(f"ZVD for {_FOR_M[kind]:g} m", zvd, rope_m=_FOR_M[kind]),
         RopeFilter("ZV by length", zv),
         RopeFilter("G_FF by length", gff),
         RopeFilter("the file's", {}),
@@ -94,32 +132,66 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
     return replace(deployment, axes=axes)
 
 
-def tasks(rope_m: float) -> Iterator[tuple[str, list[Stroke]]]:
-    """Kind of work and strokes with this rope: still, or hoisted in travel and after it."""
+def works(kind: str) -> Iterator[Work]:
+    """What a crane of this kind does: with each rope still, or hoisted in travel and after it."""
+    if kind == TOWER:
+        for rope_m, radius_m in PLACES_M:
+            yield from _of_tower(rope_m, radius_m)
+        return
+    for rope_m in ROPES_M:
+        for name, *strokes in _of_bridge(rope_m):
+            yield Work(f"{rope_m:g} m {name}", rope_m, tuple(strokes))
+
+
+def _of_bridge(rope_m: float) -> Iterator[tuple[Any, ...]]:
     up = 1.0 if rope_m >= 4.0 else -1.0
     hoist_s = min(6.0, 1.8 * rope_m - 3.0) if up > 0.0 else 5.0
     travel = Stroke(BRIDGE, 0.5, 6.0, 1.0)
-    both = [travel, Stroke(TROLLEY, 2.0, 5.0, 1.0)]
-    yield "still", [travel]
-    yield "still", [Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)]
-    yield "still", [Stroke(TROLLEY, 0.5, 0.3, 1.0)]
-    yield "still", both
-    yield "hoisted", [*both, Stroke(HOIST, 2.0, hoist_s, up)]
-    yield "hoisted", [travel, Stroke(HOIST, 3.0, 8.0, -1.0)]
-    yield "hoisted", [travel, Stroke(HOIST, 6.7, hoist_s, up)]
+    both = (travel, Stroke(TROLLEY, 2.0, 5.0, 1.0))
+    yield "still", travel
+    yield "still", Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)
+    yield "still", Stroke(TROLLEY, 0.5, 0.3, 1.0)
+    yield "still", *both
+    yield "hoisted", *both, Stroke(HOIST, 2.0, hoist_s, up)
+    yield "hoisted", travel, Stroke(HOIST, 3.0, 8.0, -1.0)
+    yield "hoisted", travel, Stroke(HOIST, 6.7, hoist_s, up)
 
 
-Job = tuple[RopeFilter, float, str, list[Stroke]]
+def _of_tower(rope_m: float, radius_m: float) -> Iterator[Work]:
+    """Slew and trolley at once, each alone, turned round; hoisted in travel and after it."""
+    out = 1.0 if radius_m < 50.0 else -1.0
+    turn, run = Stroke(SLEW, 0.5, 10.0, 1.0), Stroke(NEAR_FAR, 2.5, 8.0, out)
+    back = Stroke(SLEW, 6.5, 6.0, -1.0)
+    still = (
+        (turn, run),
+        (Stroke(SLEW, 0.5, 6.0, 1.0), back, Stroke(NEAR_FAR, 3.0, 6.0, out)),
+        (turn,),
+        (Stroke(NEAR_FAR, 0.5, 0.6, out),),
+    )
+    hoist = 1.0 if rope_m > 20.0 else -1.0
+    hoisted = (
+        (turn, run, Stroke(HOIST, 3.0, 8.0, hoist)),
+        (turn, run, Stroke(HOIST, 10.5, 8.0, hoist)),
+    )
+    for name, each in (("still", still), ("hoisted", hoisted)):
+        for strokes in each:
+            yield Work(f"{rope_m:g} m at {radius_m:g} m {name}", rope_m, strokes, radius_m)
+
+
+Job = tuple[RopeFilter, Work]
 
 
 def left_deg(deployment: Deployment, job: Job) -> float:
     """Swing that is left of a drive, degrees."""
-    one, rope_m, _, strokes = job
+    (one, work), crane = job, CraneParameters()
+    strokes, rope_m = work.strokes, work.rope_m
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
     look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
-    script = Script("rope", tuple(strokes), end_s + look_s).moving(deployment.by_coordinate)
-    crane = CraneParameters()
-    crane = replace(crane, overhead=replace(crane.overhead, rope_m=rope_m))
+    script = Script("rope", strokes, end_s + look_s).moving(deployment.by_coordinate)
+    kind, start = kind_of(deployment.coordinates.values()), {"rope_m": rope_m}
+    if work.radius_m is not None:
+        start["start_radius_m"] = work.radius_m
+    crane = replace(crane, **{kind: replace(getattr(crane, kind), **start)})
     recording = drive(_with(deployment, one), script, parameters=crane, bypass=one.bypass)
     assert recording.crane is not None  # of an overhead crane
     swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
@@ -130,19 +202,15 @@ def compare_ropes(
     deployment: Deployment, on_progress: Callable[[float], None], processes: int | None = None
 ) -> dict[str, dict[str, float]]:
     """Largest swing that each filter leaves, degrees, by rope and work, such as ``5 m hoisted``."""
-    jobs: list[Job] = [
-        (one, rope_m, work, strokes)
-        for one in rope_filters(deployment)
-        for rope_m in ROPES_M
-        for work, strokes in tasks(rope_m)
-    ]
-    table: dict[str, dict[str, float]] = {job[0].name: {} for job in jobs}
-    for one, rope_m, work, _ in jobs:
-        table[one.name][f"{rope_m:g} m {work}"] = 0.0
+    kind = kind_of(deployment.coordinates.values())
+    jobs: list[Job] = [(one, work) for one in rope_filters(deployment) for work in works(kind)]
+    table: dict[str, dict[str, float]] = {one.name: {} for one, _ in jobs}
+    for one, work in jobs:
+        table[one.name][work.name] = 0.0
     done = Processes(processes).run(partial(_left, deployment.path), jobs)
-    for count, ((one, rope_m, work, _), left) in enumerate(done, 1):
-        cell, row = f"{rope_m:g} m {work}", table[one.name]
-        row[cell] = max(row[cell], left)
+    for count, ((one, work), left) in enumerate(done, 1):
+        row = table[one.name]
+        row[work.name] = max(row[work.name], left)
         on_progress(count / len(jobs))
     return table
 
