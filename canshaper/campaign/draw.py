@@ -156,7 +156,7 @@ def _crane(
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
     elif by_rope:
-        crane = replace(crane, **{kind: _on_rope(getattr(nominal, kind), factors)})
+        crane = _with(crane, kind, _on_rope(getattr(nominal, kind), factors))
     else:
         radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
         crane = replace(crane, start_radius_m=radius_m)
@@ -171,7 +171,9 @@ def _crane(
         gain_pct = draw.between(*ranges.valve_gain_pct)
         factors |= {f"{axis}_{name}": value for name, value in drawn.items()}
         factors[f"{axis}_gain_pct"] = gain_pct
-        owner = joints if by_joints and axis != SLEW else getattr(crane, kind) if by_rope else crane
+        owner: Any = getattr(crane, kind) if by_rope else crane
+        if by_joints and axis != SLEW:
+            owner = joints
         full = _FULL_SPEEDS[axis]
         changed = {
             axis: replace(getattr(owner, axis), **drawn),
@@ -180,10 +182,16 @@ def _crane(
         if owner is joints:
             joints = replace(joints, **changed)
         elif by_rope:
-            crane = replace(crane, **{kind: replace(owner, **changed)})
+            crane = _with(crane, kind, replace(owner, **changed))
         else:
             crane = replace(crane, **changed)
     return replace(crane, joints=joints), factors
+
+
+def _with(crane: CraneParameters, kind: str, own: Any) -> CraneParameters:
+    """A crane whose numbers of a kind with a rope are these."""
+    changes: dict[str, Any] = {kind: own}
+    return replace(crane, **changes)
 
 
 def _on_rope(nominal: Any, factors: dict[str, float]) -> Any:

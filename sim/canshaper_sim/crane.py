@@ -20,6 +20,7 @@ from canshaper_sim.axes import (
     KNUCKLE,
     LIFT,
     LIFT_CYLINDER,
+    LUFFING,
     NEAR_FAR,
     OVERHEAD,
     ROTATOR,
@@ -34,6 +35,7 @@ from canshaper_sim.contact import ContactParameters
 from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
+from canshaper_sim.luffing import LuffingParameters
 from canshaper_sim.overhead import OverheadBoom, OverheadParameters
 from canshaper_sim.pump import Pump, PumpParameters
 from canshaper_sim.ranges import check_ranges
@@ -119,6 +121,7 @@ class CraneParameters:
     rotator: RotatorParameters = field(default_factory=RotatorParameters)
     overhead: OverheadParameters = field(default_factory=OverheadParameters)
     tower: TowerParameters = field(default_factory=TowerParameters)
+    luffing: LuffingParameters = field(default_factory=LuffingParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -136,6 +139,14 @@ class CraneParameters:
                 SLEW: tower.slew_full_speed_rad_s,
                 NEAR_FAR: tower.near_far_full_speed_m_s,
                 HOIST: tower.hoist_full_speed_m_s,
+            }
+        if kind == LUFFING:
+            luffing = self.luffing
+            return {
+                SLEW: luffing.slew_full_speed_rad_s,
+                LIFT_CYLINDER: luffing.lift_cylinder_full_speed_rad_s,
+                EXTENSION: luffing.extension_full_speed_m_s,
+                HOIST: luffing.hoist_full_speed_m_s,
             }
         return {
             SLEW: self.slew_full_speed_rad_s,
@@ -371,11 +382,17 @@ class RopeCrane(Crane):
         kind: str = OVERHEAD,
     ) -> None:
         p = parameters or CraneParameters()
-        owner = p.tower if kind == TOWER else p.overhead
+        owner: OverheadParameters | TowerParameters | LuffingParameters = p.overhead
+        if kind != OVERHEAD:
+            owner = p.tower if kind == TOWER else p.luffing
         self._rope: OverheadBoom = owner.boom(p.ends)
         self._rope.swing(sway or Sway())
         own = CraneParameters(
-            overhead=p.overhead, tower=p.tower, ends=p.ends, sway_sensor=p.sway_sensor
+            overhead=p.overhead,
+            tower=p.tower,
+            luffing=p.luffing,
+            ends=p.ends,
+            sway_sensor=p.sway_sensor,
         )
         super().__init__(own, sway, cast("CraneBoom", self._rope))
 

@@ -5,6 +5,7 @@
 - ``joints``: one valve a joint; the operator drives the joints.
 - ``overhead``: bridge, trolley and hoist, a drive each; the load hangs from a rope.
 - ``tower``: slew, trolley and hoist, a drive each; the load hangs from a rope.
+- ``luffing``: slew, luffing, telescope and hoist, a valve each; the load hangs from a rope.
 """
 
 import math
@@ -15,6 +16,8 @@ from canshaper.errors import DesignError
 from canshaper_sim.axes import (
     JOINT_AXES,
     JOINTS,
+    LUFFING,
+    LUFFING_AXES,
     ON_ROPE,
     OVERHEAD,
     OVERHEAD_AXES,
@@ -37,6 +40,7 @@ AXES_OF: Final[Mapping[str, tuple[str, ...]]] = {
     JOINTS: JOINT_AXES,
     OVERHEAD: OVERHEAD_AXES,
     TOWER: TOWER_AXES,
+    LUFFING: LUFFING_AXES,
 }
 MACHINES: Final = tuple(AXES_OF)
 

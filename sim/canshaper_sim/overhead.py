@@ -30,6 +30,26 @@ class RopeParameters(Protocol):
     """What the load on a rope needs to know of its crane."""
 
     @property
+    def hoist(self) -> ValveParameters:
+        """Its drive."""
+
+    @property
+    def hoist_full_speed_m_s(self) -> float:
+        """Speed of the hook."""
+
+    @property
+    def rope_m(self) -> float:
+        """Rope at the start."""
+
+    @property
+    def rope_min_m(self) -> float:
+        """Shortest rope."""
+
+    @property
+    def rope_max_m(self) -> float:
+        """Longest rope."""
+
+    @property
     def damping_ratio(self) -> float:
         """Of the swing."""
 

@@ -10,7 +10,17 @@ from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundValue, Choosing
-from canshaper_sim.axes import HOIST, JOINTS, OVERHEAD, ROTATOR, TIP, TOWER
+from canshaper_sim.axes import (
+    EXTENSION,
+    HOIST,
+    JOINTS,
+    LIFT_CYLINDER,
+    LUFFING,
+    OVERHEAD,
+    ROTATOR,
+    TIP,
+    TOWER,
+)
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
@@ -41,6 +51,7 @@ OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
 
 # Sent first by other cranes with a rope: how far down it hangs.
 HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {"HookPosition": ("RopeLength", "HoistSpeed")}
+BOOM_FEEDBACK: Mapping[str, tuple[str, ...]] = {"BoomVelocity": ("LuffRate", "ExtensionSpeed")}
 
 # Frames of a valve that are kept once read.
 MOST_KNOWN = 4096
@@ -171,6 +182,8 @@ class PlantNode:
             self._feedback = OVERHEAD_FEEDBACK
         elif name == TOWER:
             self._feedback = {**HOOK_FEEDBACK, **FEEDBACK}
+        elif name == LUFFING:
+            self._feedback = {**BOOM_FEEDBACK, **HOOK_FEEDBACK, **FEEDBACK}
         self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
         measured = [motion.radius for motion in deployment.motions.values()]
@@ -288,10 +301,12 @@ class PlantNode:
 def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
     """Return the values of a feedback message of a crane with a rope, in the order of its signals.
 
-    But for the hook's they are those of an overhead crane.
+    But for those of hook and boom they are those of an overhead crane.
     """
     if name == "HookPosition":
         return boom.signal_m, boom.axes[HOIST].speed
+    if name == "BoomVelocity":
+        return boom.axes[LIFT_CYLINDER].speed, boom.axes[EXTENSION].speed
     bridge, trolley, hoist = boom.axes.values()
     if name == "CraneVelocity":
         return bridge.speed, trolley.speed, hoist.speed

@@ -41,6 +41,7 @@ _SPEED_SIGNALS = {
         KNUCKLE: "KnuckleRate",
         EXTENSION: "ExtensionSpeed",
     },
+    "BoomVelocity": {LIFT_CYLINDER: "LuffRate", EXTENSION: "ExtensionSpeed"},
     "CraneVelocity": {BRIDGE: "BridgeSpeed", TROLLEY: "TrolleySpeed", HOIST: "HoistSpeed"},
 }
 _SWAY_SIGNALS = ACROSS, ALONG = "SwayPerpendicular", "SwayParallel"
@@ -86,6 +87,7 @@ class Recorder:
         for name, feedback in (
             ("TipVelocity", self._speed),
             ("JointVelocity", self._speed),
+            ("BoomVelocity", self._speed),
             ("CraneVelocity", self._speed),
             ("CranePosition", self._trolley),
             ("HookPosition", self._hook_position),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import HOIST, LIFT, SLEW
 from canshaper_sim.grapple import TipMotion
-from canshaper_sim.overhead import OverheadBoom, Vector, drive
+from canshaper_sim.overhead import OverheadBoom, RopeParameters, Vector, drive
 from canshaper_sim.ranges import check_ranges
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.valve import ValveParameters
@@ -91,7 +91,7 @@ class RopedBoom(OverheadBoom):
         self,
         carrier: CraneBoom,
         fixed: str,
-        parameters: TowerParameters,
+        parameters: RopeParameters,
         ends: EndParameters,
     ) -> None:
         p = parameters

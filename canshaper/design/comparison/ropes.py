@@ -191,7 +191,8 @@ def left_deg(deployment: Deployment, job: Job) -> float:
     kind, start = kind_of(deployment.coordinates.values()), {"rope_m": rope_m}
     if work.radius_m is not None:
         start["start_radius_m"] = work.radius_m
-    crane = replace(crane, **{kind: replace(getattr(crane, kind), **start)})
+    changes = {kind: replace(getattr(crane, kind), **start)}
+    crane = replace(crane, **changes)
     recording = drive(_with(deployment, one), script, parameters=crane, bypass=one.bypass)
     assert recording.crane is not None  # of an overhead crane
     swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
