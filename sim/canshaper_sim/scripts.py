@@ -174,6 +174,22 @@ _DEMO_TOWER = Script(
     68.0,
 )
 
+# Of a telehandler: up, round and out, back with a correction.
+_DEMO_LUFFING = Script(
+    "demo-luffing",
+    (
+        Stroke(HOIST, 0.5, 4.0, 1.0),
+        Stroke(LIFT_CYLINDER, 1.0, 4.0, 1.0),
+        Stroke(SLEW, 3.0, 8.0, 1.0),
+        Stroke(EXTENSION, 4.0, 6.0, 1.0),
+        Stroke(SLEW, 22.0, 6.0, -1.0),
+        Stroke(EXTENSION, 23.0, 5.0, -1.0),
+        Stroke(SLEW, 31.0, 0.6, 0.5),
+        Stroke(HOIST, 24.0, 3.0, -1.0),
+    ),
+    46.0,
+)
+
 # From the start pose of the default boom each joint stays clear of its stops.
 _JOINT_PULSES = ((LIFT_CYLINDER, -0.6), (KNUCKLE, 0.8), (EXTENSION, 0.9))
 
@@ -198,5 +214,10 @@ SCRIPTS: dict[str, Script] = {
             for axis in (SLEW, NEAR_FAR)
         ),
         _DEMO_TOWER,
+        *(
+            Script(f"pulse-{axis}-luffing", (Stroke(axis, 0.5, 5.0, 1.0, _PULSE_RAMP_S),), 22.0)
+            for axis in (SLEW, LIFT_CYLINDER, EXTENSION)
+        ),
+        _DEMO_LUFFING,
     )
 }

@@ -9,7 +9,7 @@ from canshaper_sim.axes import BRIDGE, HOIST, NEAR_FAR, SLEW
 from canshaper_sim.crane import Crane, CraneParameters, RopeCrane
 from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.overhead import OverheadParameters, drive
-from canshaper_sim.tower import TowerParameters
+from canshaper_sim.tower import RopedBoom, TowerParameters
 
 TOWER = "tower"
 
@@ -75,3 +75,31 @@ def test_where_it_begins_is_within_its_ways() -> None:
     full = replace(CraneParameters(), tower=TowerParameters()).full_speeds(TOWER)
     assert full == {SLEW: 0.07, NEAR_FAR: 1.0, HOIST: 1.0}
     assert math.isclose(crane().state.radius_m, 35.0)
+
+
+def test_the_tip_of_a_telehandler_goes_as_its_boom() -> None:
+    one = RopeCrane(kind="luffing")
+    for _ in range(300):
+        one.step(0.01, {"lift_cylinder": 0.5, "extension": 1.0, "hoist": -1.0})
+    luff = one.boom.axes["lift_cylinder"].position
+    long_m = 10.0 + one.boom.axes["extension"].position
+    state = one.state
+    assert math.degrees(luff) == pytest.approx(45.0 + 0.5 * 2.8648 * 2.9, abs=0.4)
+    assert state.radius_m == pytest.approx(long_m * math.cos(luff), abs=0.02)
+    assert state.height_m == pytest.approx(2.5 + long_m * math.sin(luff), abs=0.02)
+    assert one.boom.axes[HOIST].position == pytest.approx(-8.0 - 0.8 * 2.85, abs=0.15)
+
+
+def test_a_tip_that_rises_faster_swings_faster() -> None:
+    """l theta'' + (g + z'') sin theta = 0: rising with half of gravity, in 0.82 of the time."""
+    periods = []
+    for lift in (0.0, 0.5 * 9.81):
+        boom = crane(Sway(theta5_rad=0.02), rope_m=10.0).boom
+        assert isinstance(boom, RopedBoom)
+        steps = 0
+        while boom.angles[0] > 0.0:
+            boom._hang(0.01, (0.0, 0.0, lift), (0.0, 0.0, lift), (0.0, 0.0, lift))
+            steps += 1
+        periods.append(0.04 * steps)
+    assert periods[0] == pytest.approx(2.0 * math.pi * math.sqrt(10.0 / 9.81), abs=0.05)
+    assert periods[1] == pytest.approx(periods[0] / math.sqrt(1.5), abs=0.05)

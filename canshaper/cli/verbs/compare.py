@@ -67,8 +67,8 @@ def compare(
     30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
     shows what is done until then.
 
-    Of a crane with a rope it is one table of the swing left by the length of the rope, still and
-    hoisted, next to ZVD for one length and ZV by length.
+    Of a crane with a rope it is one table of the swing left by the length of the rope and the
+    work, next to ZVD for one length and ZV by length.
 
     Examples:
 

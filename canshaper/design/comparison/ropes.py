@@ -19,7 +19,11 @@ from canshaper.shaping.shapers.fir import zv_taps
 from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.axes import (
     BRIDGE,
+    EXTENSION,
     HOIST,
+    LIFT_CYLINDER,
+    LUFFING,
+    LUFFING_AXES,
     NEAR_FAR,
     ON_ROPE,
     OVERHEAD,
@@ -31,6 +35,7 @@ from canshaper_sim.axes import (
 )
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.machines import AXES_OF
+from canshaper_sim.operator import random_script
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
@@ -38,7 +43,8 @@ ROPES_M = (2.0, 5.0, 10.0, 25.0)
 # Of a tower crane: rope and radius at the start, m.
 PLACES_M = ((10.0, 40.0), (30.0, 20.0), (30.0, 40.0), (30.0, 60.0), (50.0, 40.0))
 # The rope that a filter is made for which follows none.
-_FOR_M = {OVERHEAD: 8.0, TOWER: 20.0}
+_FOR_M = {OVERHEAD: 8.0, TOWER: 20.0, LUFFING: 8.0}
+_LUFFING_ROPES_M, _SEEDS, _RANDOM_S = (4.0, 8.0, 16.0), 3, 30.0
 # Nobody waits longer than a swing to see what is left.
 _LONGEST_LOOK_S = 11.0
 
@@ -138,9 +144,14 @@ def works(kind: str) -> Iterator[Work]:
         for rope_m, radius_m in PLACES_M:
             yield from _of_tower(rope_m, radius_m)
         return
+    if kind == LUFFING:
+        for rope_m in _LUFFING_ROPES_M:
+            for name, strokes in _of_luffing():
+                yield Work(f"{rope_m:g} m {name}", rope_m, strokes)
+        return
     for rope_m in ROPES_M:
-        for name, *strokes in _of_bridge(rope_m):
-            yield Work(f"{rope_m:g} m {name}", rope_m, tuple(strokes))
+        for name, *own in _of_bridge(rope_m):
+            yield Work(f"{rope_m:g} m {name}", rope_m, tuple(own))
 
 
 def _of_bridge(rope_m: float) -> Iterator[tuple[Any, ...]]:
@@ -176,6 +187,19 @@ def _of_tower(rope_m: float, radius_m: float) -> Iterator[Work]:
     for name, each in (("still", still), ("hoisted", hoisted)):
         for strokes in each:
             yield Work(f"{rope_m:g} m at {radius_m:g} m {name}", rope_m, strokes, radius_m)
+
+
+def _of_luffing() -> Iterator[tuple[str, tuple[Stroke, ...]]]:
+    """Each axis pressed and turned round, all at once, and a random operator."""
+    for axis, press_s in ((SLEW, 8.0), (LIFT_CYLINDER, 5.0), (EXTENSION, 6.0)):
+        yield "pulse", (Stroke(axis, 0.5, press_s, 1.0),)
+        half_s = 0.5 * press_s + 1.0
+        yield "reversal", (Stroke(axis, 0.5, half_s, 1.0), Stroke(axis, 0.5 + half_s, half_s, -1.0))
+    for luff in (1.0, -1.0):
+        luffs, out = Stroke(LIFT_CYLINDER, 2.0, 4.0, luff), Stroke(EXTENSION, 3.0, 5.0, 1.0)
+        yield "all", (Stroke(SLEW, 0.5, 8.0, 1.0), luffs, out)
+    for seed in range(_SEEDS):
+        yield "random", random_script(seed, _RANDOM_S, LUFFING_AXES).strokes
 
 
 Job = tuple[RopeFilter, Work]
