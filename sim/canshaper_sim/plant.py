@@ -10,17 +10,7 @@ from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundValue, Choosing
-from canshaper_sim.axes import (
-    EXTENSION,
-    HOIST,
-    JOINTS,
-    LIFT_CYLINDER,
-    LUFFING,
-    OVERHEAD,
-    ROTATOR,
-    TIP,
-    TOWER,
-)
+from canshaper_sim.axes import JOINTS, LUFFING, OVERHEAD, ROTATOR, SLEW, TIP, TOWER
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
@@ -50,8 +40,13 @@ OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
 }
 
 # Sent first by other cranes with a rope: how far down it hangs.
-HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {"HookPosition": ("RopeLength", "HoistSpeed")}
-BOOM_FEEDBACK: Mapping[str, tuple[str, ...]] = {"BoomVelocity": ("LuffRate", "ExtensionSpeed")}
+HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {
+    "HookPosition": ("RopeLength",),
+    "CraneVelocity": ("HoistSpeed",),
+}
+BOOM_FEEDBACK: Mapping[str, tuple[str, ...]] = {
+    "JointVelocity": ("SlewRate", "LiftRate", "ExtensionSpeed"),
+}
 
 # Frames of a valve that are kept once read.
 MOST_KNOWN = 4096
@@ -301,15 +296,16 @@ class PlantNode:
 def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
     """Return the values of a feedback message of a crane with a rope, in the order of its signals.
 
-    But for those of hook and boom they are those of an overhead crane.
+    An overhead crane sends its own ones, see ``OVERHEAD_FEEDBACK``.
     """
     if name == "HookPosition":
-        return boom.signal_m, boom.axes[HOIST].speed
-    if name == "BoomVelocity":
-        return boom.axes[LIFT_CYLINDER].speed, boom.axes[EXTENSION].speed
-    bridge, trolley, hoist = boom.axes.values()
+        return (boom.signal_m,)
+    axes = boom.axes.values()
     if name == "CraneVelocity":
-        return bridge.speed, trolley.speed, hoist.speed
+        return tuple(axis.speed for axis in ([*axes][-1:] if SLEW in boom.axes else axes))
+    if name == "JointVelocity":
+        return tuple(axis.speed for axis in axes)[:-1]
+    bridge, trolley, _ = axes
     if name == "CranePosition":
         return bridge.position, trolley.position, boom.signal_m
     return tuple(math.degrees(angle) for angle in boom.angles[:2])

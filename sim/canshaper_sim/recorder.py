@@ -41,7 +41,6 @@ _SPEED_SIGNALS = {
         KNUCKLE: "KnuckleRate",
         EXTENSION: "ExtensionSpeed",
     },
-    "BoomVelocity": {LIFT_CYLINDER: "LuffRate", EXTENSION: "ExtensionSpeed"},
     "CraneVelocity": {BRIDGE: "BridgeSpeed", TROLLEY: "TrolleySpeed", HOIST: "HoistSpeed"},
 }
 _SWAY_SIGNALS = ACROSS, ALONG = "SwayPerpendicular", "SwayParallel"
@@ -87,7 +86,6 @@ class Recorder:
         for name, feedback in (
             ("TipVelocity", self._speed),
             ("JointVelocity", self._speed),
-            ("BoomVelocity", self._speed),
             ("CraneVelocity", self._speed),
             ("CranePosition", self._trolley),
             ("HookPosition", self._hook_position),
@@ -211,14 +209,9 @@ class Recorder:
         return receive
 
     def _hook_position(self, fields: FieldSet) -> _Handler:
-        hoists = [self._now[name] for name, moved in self._moves.items() if moved == HOIST]
-        value, full = fields.value, self._full.get(HOIST, 1.0)
-
         def receive(data: bytes, _time_s: float) -> None:
             raw = fields.layout.decode(data)
-            self._hangs = 0.0, value("RopeLength", raw["RopeLength"])
-            for now in hoists:
-                now[2] = value("HoistSpeed", raw["HoistSpeed"]) / full
+            self._hangs = 0.0, fields.value("RopeLength", raw["RopeLength"])
 
         return receive
 

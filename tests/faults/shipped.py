@@ -37,6 +37,7 @@ NAMES = (
     "forwarder-load",
     "bridge-crane",
     "tower-crane",
+    "telehandler",
 )
 CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
 MADE = {

@@ -19,7 +19,7 @@ from tests.promises.worst import Worst
 
 SOME = ("forwarder", "forwarder-robust", "gateway-forwarder", "canfd-forwarder")
 # What is planted as right rises by 5 of full speed a second; the cranes' with a rope by less.
-ROPES = "bridge-crane", "tower-crane"
+ROPES = "bridge-crane", "tower-crane", "telehandler"
 MACHINES = ("forwarder", *(name for name in NAMES if name not in (*ALIKE, *ROPES)))
 DIRECT = tuple(name for name in MACHINES if not name.startswith("gateway"))
 MOTION = ("forwarder-robust", "forwarder-pump")
