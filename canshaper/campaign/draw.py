@@ -18,7 +18,7 @@ from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import ALL_AXES, JOINTS, LUFFING, NEAR_FAR, ON_ROPE, OVERHEAD, SLEW, kind_of
-from canshaper_sim.crane import CraneParameters
+from canshaper_sim.crane import FULL_SPEEDS, CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.recorder import dwell_s
@@ -30,17 +30,6 @@ _NEAR_M = 1.5
 _GUSTS = 0.25  # standard deviation of the wind, of its mean
 # Parts of the drive in which a load is picked up, and put down.
 _PICK_UP, _PUT_DOWN = (0.1, 0.5), (0.5, 0.9)
-_FULL_SPEEDS = {
-    "slew": "slew_full_speed_rad_s",
-    "near_far": "near_far_full_speed_m_s",
-    "lift": "lift_full_speed_m_s",
-    "lift_cylinder": "lift_cylinder_full_speed_rad_s",
-    "knuckle": "knuckle_full_speed_rad_s",
-    "extension": "extension_full_speed_m_s",
-    "bridge": "bridge_full_speed_m_s",
-    "trolley": "trolley_full_speed_m_s",
-    "hoist": "hoist_full_speed_m_s",
-}
 
 
 @dataclass(frozen=True)
@@ -156,7 +145,8 @@ def _crane(
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
     elif by_rope:
-        crane = _with(crane, kind, _on_rope(getattr(nominal, kind), factors))
+        own: Any = {kind: _on_rope(getattr(nominal, kind), factors)}
+        crane = replace(crane, **own)
     else:
         radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
         crane = replace(crane, start_radius_m=radius_m)
@@ -174,24 +164,17 @@ def _crane(
         owner: Any = getattr(crane, kind) if by_rope else crane
         if by_joints and axis != SLEW:
             owner = joints
-        full = _FULL_SPEEDS[axis]
+        full = FULL_SPEEDS[axis]
         changed = {
             axis: replace(getattr(owner, axis), **drawn),
             full: (1.0 + gain_pct / 100.0) * getattr(owner, full),
         }
         if owner is joints:
             joints = replace(joints, **changed)
-        elif by_rope:
-            crane = _with(crane, kind, replace(owner, **changed))
         else:
+            changed = {kind: replace(owner, **changed)} if by_rope else changed
             crane = replace(crane, **changed)
     return replace(crane, joints=joints), factors
-
-
-def _with(crane: CraneParameters, kind: str, own: Any) -> CraneParameters:
-    """A crane whose numbers of a kind with a rope are these."""
-    changes: dict[str, Any] = {kind: own}
-    return replace(crane, **changes)
 
 
 def _on_rope(nominal: Any, factors: dict[str, float]) -> Any:

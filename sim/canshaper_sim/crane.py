@@ -20,12 +20,11 @@ from canshaper_sim.axes import (
     KNUCKLE,
     LIFT,
     LIFT_CYLINDER,
-    LUFFING,
     NEAR_FAR,
+    ON_ROPE,
     OVERHEAD,
     ROTATOR,
     SLEW,
-    TOWER,
     TROLLEY,
 )
 from canshaper_sim.axes import TIP_AXES as AXES
@@ -65,6 +64,19 @@ __all__ = [
 INTERNAL_STEP_S: Final = 0.010
 
 _HORIZONTAL: Final = math.pi / 2.0
+
+# Of a crane or its joints, or of another kind of crane by its own name.
+FULL_SPEEDS: Final = {
+    SLEW: "slew_full_speed_rad_s",
+    NEAR_FAR: "near_far_full_speed_m_s",
+    LIFT: "lift_full_speed_m_s",
+    LIFT_CYLINDER: "lift_cylinder_full_speed_rad_s",
+    KNUCKLE: "knuckle_full_speed_rad_s",
+    EXTENSION: "extension_full_speed_m_s",
+    BRIDGE: "bridge_full_speed_m_s",
+    TROLLEY: "trolley_full_speed_m_s",
+    HOIST: "hoist_full_speed_m_s",
+}
 
 # name -> (lowest, highest) value that still describes a forestry or loader crane.
 _ALLOWED = {
@@ -133,32 +145,9 @@ class CraneParameters:
 
     def full_speeds(self, kind: str) -> dict[str, float]:
         """Full speed of every axis that a crane of this kind may have, rad/s or m/s."""
-        if kind == TOWER:
-            tower = self.tower
-            return {
-                SLEW: tower.slew_full_speed_rad_s,
-                NEAR_FAR: tower.near_far_full_speed_m_s,
-                HOIST: tower.hoist_full_speed_m_s,
-            }
-        if kind == LUFFING:
-            luffing = self.luffing
-            return {
-                SLEW: luffing.slew_full_speed_rad_s,
-                LIFT_CYLINDER: luffing.lift_cylinder_full_speed_rad_s,
-                EXTENSION: luffing.extension_full_speed_m_s,
-                HOIST: luffing.hoist_full_speed_m_s,
-            }
-        return {
-            SLEW: self.slew_full_speed_rad_s,
-            NEAR_FAR: self.near_far_full_speed_m_s,
-            LIFT: self.lift_full_speed_m_s,
-            LIFT_CYLINDER: self.joints.lift_cylinder_full_speed_rad_s,
-            KNUCKLE: self.joints.knuckle_full_speed_rad_s,
-            EXTENSION: self.joints.extension_full_speed_m_s,
-            BRIDGE: self.overhead.bridge_full_speed_m_s,
-            TROLLEY: self.overhead.trolley_full_speed_m_s,
-            HOIST: self.overhead.hoist_full_speed_m_s,
-        }
+        owners = (getattr(self, kind),) if kind in ON_ROPE else (self, self.joints)
+        named = [(axis, name, one) for axis, name in FULL_SPEEDS.items() for one in owners]
+        return {axis: getattr(one, name) for axis, name, one in named if hasattr(one, name)}
 
     def tip_boom(self) -> TipBoom:
         """The boom whose tip is moved directly, in the start pose."""
@@ -382,18 +371,9 @@ class RopeCrane(Crane):
         kind: str = OVERHEAD,
     ) -> None:
         p = parameters or CraneParameters()
-        owner: OverheadParameters | TowerParameters | LuffingParameters = p.overhead
-        if kind != OVERHEAD:
-            owner = p.tower if kind == TOWER else p.luffing
-        self._rope: OverheadBoom = owner.boom(p.ends)
+        self._rope: OverheadBoom = getattr(p, kind).boom(p.ends)
         self._rope.swing(sway or Sway())
-        own = CraneParameters(
-            overhead=p.overhead,
-            tower=p.tower,
-            luffing=p.luffing,
-            ends=p.ends,
-            sway_sensor=p.sway_sensor,
-        )
+        own = CraneParameters(ends=p.ends, sway_sensor=p.sway_sensor)
         super().__init__(own, sway, cast("CraneBoom", self._rope))
 
     def _advance(self, step_s: float) -> None:

@@ -10,26 +10,20 @@ from dataclasses import dataclass, field
 from canshaper_sim.actuator import EndParameters
 from canshaper_sim.axes import KNUCKLE
 from canshaper_sim.joints import JointBoom, JointParameters
-from canshaper_sim.ranges import check_ranges
+from canshaper_sim.overhead import RopeParameters
 from canshaper_sim.tower import RopedBoom
 from canshaper_sim.valve import ValveParameters
 
 # name -> (lowest, highest) value that still describes such a crane; its boom is checked by joints.
 _ALLOWED = {
     "slew_full_speed_rad_s": (0.01, 1.0),
-    "hoist_full_speed_m_s": (0.02, 3.0),
     "boom_m": (2.0, 40.0),
     "start_luff_deg": (-20.0, 85.0),
-    "rope_min_m": (0.5, 150.0),
-    "rope_max_m": (0.5, 150.0),
-    "damping_ratio": (0.0, 0.5),
-    "rope_error_pct": (-50.0, 50.0),
-    "g_m_s2": (1.0, 25.0),
 }
 
 
 @dataclass(frozen=True, slots=True)
-class LuffingParameters:
+class LuffingParameters(RopeParameters):
     """Valves, full speeds and ways of one such crane, its rope and where it begins."""
 
     slew: ValveParameters = field(default_factory=ValveParameters)
@@ -45,16 +39,11 @@ class LuffingParameters:
     extension_max_m: float = 12.0
     start_extension_m: float = 4.0
     start_luff_deg: float = 45.0
-    rope_m: float = 8.0  # from the tip to the middle of the load, at the start
     rope_min_m: float = 2.0
     rope_max_m: float = 20.0
-    damping_ratio: float = 0.005
-    rope_error_pct: float = 0.0  # how much more than that the length signal says
-    g_m_s2: float = 9.81
 
     def __post_init__(self) -> None:
-        start = {"rope_m": (self.rope_min_m, self.rope_max_m)}
-        check_ranges("luffing", self, _ALLOWED | start)
+        self.check("luffing", _ALLOWED)
 
     def boom(self, ends: EndParameters) -> RopedBoom:
         """Boom and rope at the start."""

@@ -12,8 +12,9 @@ slack is none: the load never falls freely.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import BRIDGE, HOIST, TROLLEY
@@ -25,52 +26,17 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
-
-class RopeParameters(Protocol):
-    """What the load on a rope needs to know of its crane."""
-
-    @property
-    def hoist(self) -> ValveParameters:
-        """Its drive."""
-
-    @property
-    def hoist_full_speed_m_s(self) -> float:
-        """Speed of the hook."""
-
-    @property
-    def rope_m(self) -> float:
-        """Rope at the start."""
-
-    @property
-    def rope_min_m(self) -> float:
-        """Shortest rope."""
-
-    @property
-    def rope_max_m(self) -> float:
-        """Longest rope."""
-
-    @property
-    def damping_ratio(self) -> float:
-        """Of the swing."""
-
-    @property
-    def rope_error_pct(self) -> float:
-        """How much more than its length the length signal says."""
-
-    @property
-    def g_m_s2(self) -> float:
-        """Gravity."""
-
-
 # name -> (lowest, highest) value that still describes an overhead crane.
 _ALLOWED = {
     "bridge_full_speed_m_s": (0.05, 5.0),
     "trolley_full_speed_m_s": (0.05, 5.0),
+    "runway_m": (1.0, 1000.0),
+    "span_m": (1.0, 200.0),
+}
+_ROPE = {
     "hoist_full_speed_m_s": (0.02, 3.0),
     "rope_min_m": (0.5, 150.0),
     "rope_max_m": (0.5, 150.0),
-    "runway_m": (1.0, 1000.0),
-    "span_m": (1.0, 200.0),
     "damping_ratio": (0.0, 0.5),
     "rope_error_pct": (-50.0, 50.0),
     "g_m_s2": (1.0, 25.0),
@@ -83,31 +49,46 @@ def drive() -> ValveParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class OverheadParameters:
-    """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
+class RopeParameters:
+    """Hoist and rope of a crane, and how its load swings."""
 
-    bridge: ValveParameters = field(default_factory=drive)
-    trolley: ValveParameters = field(default_factory=drive)
     hoist: ValveParameters = field(default_factory=drive)
-    bridge_full_speed_m_s: float = 1.0
-    trolley_full_speed_m_s: float = 1.0
     hoist_full_speed_m_s: float = 0.5
-    runway_m: float = 100.0  # it begins in the middle of both
-    span_m: float = 60.0
-    rope_m: float = 8.0  # from the trolley to the middle of the load, at the start
+    rope_m: float = 8.0  # down to the middle of the load, at the start
     rope_min_m: float = 1.5
     rope_max_m: float = 30.0
     damping_ratio: float = 0.005
     rope_error_pct: float = 0.0  # how much more than that the length signal says
     g_m_s2: float = 9.81
 
+    def check(self, owner: str, allowed: Mapping[str, tuple[float, float]]) -> None:
+        """Refuse values that describe no crane; see ``check_ranges``."""
+        start = {"rope_m": (self.rope_min_m, self.rope_max_m)}
+        check_ranges(owner, self, {**allowed, **_ROPE, **start})
+
+    def winch(self, ends: EndParameters) -> Actuator:
+        """The hoist at the start; its position is the height below what the rope hangs from."""
+        rope = (-self.rope_m, -self.rope_max_m, -self.rope_min_m)
+        return Actuator(self.hoist, self.hoist_full_speed_m_s, *rope, ends=ends)
+
+
+@dataclass(frozen=True, slots=True)
+class OverheadParameters(RopeParameters):
+    """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
+
+    bridge: ValveParameters = field(default_factory=drive)
+    trolley: ValveParameters = field(default_factory=drive)
+    bridge_full_speed_m_s: float = 1.0
+    trolley_full_speed_m_s: float = 1.0
+    runway_m: float = 100.0  # it begins in the middle of both
+    span_m: float = 60.0
+
     def __post_init__(self) -> None:
-        check_ranges("overhead", self, _ALLOWED | {"rope_m": (self.rope_min_m, self.rope_max_m)})
+        self.check("overhead", _ALLOWED)
 
     def boom(self, ends: EndParameters) -> "OverheadBoom":
         """Trolley and rope at the start."""
         runway, span = 0.5 * self.runway_m, 0.5 * self.span_m
-        rope = (-self.rope_m, -self.rope_max_m, -self.rope_min_m)
         return OverheadBoom(
             {
                 BRIDGE: Actuator(
@@ -116,7 +97,7 @@ class OverheadParameters:
                 TROLLEY: Actuator(
                     self.trolley, self.trolley_full_speed_m_s, 0.0, -span, span, ends=ends
                 ),
-                HOIST: Actuator(self.hoist, self.hoist_full_speed_m_s, *rope, ends=ends),
+                HOIST: self.winch(ends),
             },
             self,
         )

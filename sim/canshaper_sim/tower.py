@@ -14,7 +14,6 @@ from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import HOIST, LIFT, SLEW
 from canshaper_sim.grapple import TipMotion
 from canshaper_sim.overhead import OverheadBoom, RopeParameters, Vector, drive
-from canshaper_sim.ranges import check_ranges
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.valve import ValveParameters
 
@@ -25,25 +24,18 @@ if TYPE_CHECKING:
 _ALLOWED = {
     "slew_full_speed_rad_s": (0.005, 1.0),
     "near_far_full_speed_m_s": (0.05, 5.0),
-    "hoist_full_speed_m_s": (0.02, 3.0),
     "radius_min_m": (0.5, 120.0),
     "radius_max_m": (0.5, 120.0),
     "jib_m": (1.0, 500.0),
-    "rope_min_m": (0.5, 150.0),
-    "rope_max_m": (0.5, 150.0),
-    "damping_ratio": (0.0, 0.5),
-    "rope_error_pct": (-50.0, 50.0),
-    "g_m_s2": (1.0, 25.0),
 }
 
 
 @dataclass(frozen=True, slots=True)
-class TowerParameters:
+class TowerParameters(RopeParameters):
     """Drives, full speeds and ways of one tower crane, its rope and where it begins."""
 
     slew: ValveParameters = field(default_factory=drive)
     near_far: ValveParameters = field(default_factory=drive)  # the trolley
-    hoist: ValveParameters = field(default_factory=drive)
     slew_full_speed_rad_s: float = 0.07
     near_far_full_speed_m_s: float = 1.0
     hoist_full_speed_m_s: float = 1.0
@@ -51,19 +43,13 @@ class TowerParameters:
     radius_max_m: float = 65.0
     start_radius_m: float = 35.0
     jib_m: float = 70.0  # of the trolley above the ground
-    rope_m: float = 30.0  # from the trolley to the middle of the load, at the start
+    rope_m: float = 30.0
     rope_min_m: float = 4.0
     rope_max_m: float = 62.0
-    damping_ratio: float = 0.005
-    rope_error_pct: float = 0.0  # how much more than that the length signal says
-    g_m_s2: float = 9.81
 
     def __post_init__(self) -> None:
-        start = {
-            "start_radius_m": (self.radius_min_m, self.radius_max_m),
-            "rope_m": (self.rope_min_m, self.rope_max_m),
-        }
-        check_ranges("tower", self, _ALLOWED | start)
+        reach = {"start_radius_m": (self.radius_min_m, self.radius_max_m)}
+        self.check("tower", _ALLOWED | reach)
 
     def boom(self, ends: EndParameters) -> "RopedBoom":
         """Trolley and rope at the start."""
@@ -94,11 +80,8 @@ class RopedBoom(OverheadBoom):
         parameters: RopeParameters,
         ends: EndParameters,
     ) -> None:
-        p = parameters
-        rope = (-p.rope_m, -p.rope_max_m, -p.rope_min_m)
         axes = {name: axis for name, axis in carrier.axes.items() if name != fixed}
-        hoist = Actuator(p.hoist, p.hoist_full_speed_m_s, *rope, ends=ends)
-        super().__init__({**axes, HOIST: hoist}, p)
+        super().__init__({**axes, HOIST: parameters.winch(ends)}, parameters)
         self.carrier = carrier
 
     def swing(self, sway: "Sway") -> None:
