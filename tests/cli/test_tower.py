@@ -29,7 +29,7 @@ def test_demo_shows_what_the_filters_do(tmp_path: Path, file: Path, script: str)
     run("demo", str(file), "--lockstep", "--script", script, "--out", str(tmp_path))
     crane = json.loads((tmp_path / "report.json").read_text())["crane"]
     assert crane["raw"]["residual_deg"] > 3.0
-    assert crane["shaped"]["residual_deg"] < 0.1 * crane["raw"]["residual_deg"]
+    assert crane["shaped"]["residual_deg"] < 0.15 * crane["raw"]["residual_deg"]
 
 
 @pytest.mark.slow
