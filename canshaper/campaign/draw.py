@@ -6,8 +6,9 @@ meet the same crane and the same operator.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +17,10 @@ from canshaper.config.uncertainty import MOST_FLOW, Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.axes import ALL_AXES, JOINTS, NEAR_FAR, OVERHEAD, SLEW, kind_of
-from canshaper_sim.crane import CraneParameters
+from canshaper_sim.axes import ALL_AXES, JOINTS, LUFFING, NEAR_FAR, ON_ROPE, OVERHEAD, SLEW, kind_of
+from canshaper_sim.crane import FULL_SPEEDS, CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
-from canshaper_sim.overhead import OverheadParameters
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import DWELL_S
@@ -31,17 +31,6 @@ _NEAR_M = 1.5
 _GUSTS = 0.25  # standard deviation of the wind, of its mean
 # Parts of the drive in which a load is picked up, and put down.
 _PICK_UP, _PUT_DOWN = (0.1, 0.5), (0.5, 0.9)
-_FULL_SPEEDS = {
-    "slew": "slew_full_speed_rad_s",
-    "near_far": "near_far_full_speed_m_s",
-    "lift": "lift_full_speed_m_s",
-    "lift_cylinder": "lift_cylinder_full_speed_rad_s",
-    "knuckle": "knuckle_full_speed_rad_s",
-    "extension": "extension_full_speed_m_s",
-    "bridge": "bridge_full_speed_m_s",
-    "trolley": "trolley_full_speed_m_s",
-    "hoist": "hoist_full_speed_m_s",
-}
 
 
 @dataclass(frozen=True)
@@ -143,9 +132,11 @@ def _crane(
         "damping_pct": draw.between(*ranges.damping_pct),
     }
     kind = kind_of(axes)
-    by_rope, by_joints = kind == OVERHEAD, kind == JOINTS
-    start = "rope_m" if by_rope else "radius_m"
-    factors[start] = draw.between(*getattr(ranges, start))
+    by_rope, by_joints = kind in ON_ROPE, kind == JOINTS
+    if by_rope:
+        factors["rope_m"] = draw.between(*ranges.rope_m)
+    if kind not in (OVERHEAD, LUFFING):
+        factors["radius_m"] = draw.between(*ranges.radius_m)
     damped = 1.0 + factors["damping_pct"] / 100.0
     grapple = nominal.grapple
     grapple = replace(
@@ -157,7 +148,8 @@ def _crane(
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
     elif by_rope:
-        crane = replace(crane, overhead=_overhead(nominal.overhead, factors))
+        own: Any = {kind: _on_rope(getattr(nominal, kind), factors)}
+        crane = replace(crane, **own)
     else:
         radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
         crane = replace(crane, start_radius_m=radius_m)
@@ -172,25 +164,31 @@ def _crane(
         gain_pct = draw.between(*ranges.valve_gain_pct)
         factors |= {f"{axis}_{name}": value for name, value in drawn.items()}
         factors[f"{axis}_gain_pct"] = gain_pct
-        owner = joints if by_joints and axis != SLEW else crane.overhead if by_rope else crane
-        full = _FULL_SPEEDS[axis]
+        owner: Any = getattr(crane, kind) if by_rope else crane
+        if by_joints and axis != SLEW:
+            owner = joints
+        full = FULL_SPEEDS[axis]
         changed = {
             axis: replace(getattr(owner, axis), **drawn),
             full: (1.0 + gain_pct / 100.0) * getattr(owner, full),
         }
         if owner is joints:
             joints = replace(joints, **changed)
-        elif by_rope:
-            crane = replace(crane, overhead=replace(crane.overhead, **changed))
         else:
+            changed = {kind: replace(owner, **changed)} if by_rope else changed
             crane = replace(crane, **changed)
     return replace(crane, joints=joints), factors
 
 
-def _overhead(nominal: OverheadParameters, factors: Mapping[str, float]) -> OverheadParameters:
-    """The rope that was drawn."""
+def _on_rope(nominal: Any, factors: dict[str, float]) -> Any:
+    """Return a crane with the rope that was drawn, and the radius where one was."""
+    own: dict[str, float] = {}
+    if "radius_m" in factors:
+        radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
+        own["start_radius_m"] = radius_m
     return replace(
         nominal,
+        **own,
         rope_m=min(max(factors["rope_m"], nominal.rope_min_m), nominal.rope_max_m),
         rope_error_pct=factors["length_pct"],
         damping_ratio=nominal.damping_ratio * (1.0 + factors["damping_pct"] / 100.0),
@@ -202,9 +200,9 @@ def _place(
 ) -> tuple[CraneParameters, dict[str, float]]:
     """Pump, ground and wind, and how near its stops the tip is; what was drawn of them.
 
-    An overhead crane has none of them.
+    A crane with a rope has none of them.
     """
-    if kind_of(axes) == OVERHEAD:
+    if kind_of(axes) in ON_ROPE:
         return crane, {}
     factors = {
         "pump_flow": draw.between(*ranges.pump_flow),

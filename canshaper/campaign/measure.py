@@ -11,7 +11,7 @@ from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
 from canshaper.machine.deployment import Deployment
 from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
-from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY
+from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY, kind_of
 from canshaper_sim.crane import CraneParameters, CraneState
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
@@ -100,7 +100,7 @@ class _Tracks:
         self._plant, self._script = plant, setting.script
         self._tick_s = deployment.config.tick_ms / 1000.0
         self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}
-        self._full = nominal.full_speeds
+        self._full = nominal.full_speeds(kind_of(moves.values()))
         self._still_deg = deployment.config.still_deg
         self._t_s: list[float] = []
         self._commands: dict[str, list[float]] = {name: [] for name in axes}

@@ -10,7 +10,7 @@ import numpy as np
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Joysticks
 from canshaper_sim.axes import WITHOUT_SWAY
-from canshaper_sim.operator import REACH_S, random_script
+from canshaper_sim.operator import random_script, reach_s
 from canshaper_sim.strokes import Script, Stroke
 
 # After the last stroke: the dwell of the residual, and more than a swing to see it in.
@@ -45,14 +45,14 @@ class Draw:
 class _Hand:
     """Strokes that do not carry the boom out of its reach."""
 
-    def __init__(self, draw: Draw) -> None:
-        self._draw = draw
+    def __init__(self, draw: Draw, axes: Sequence[str]) -> None:
+        self._draw, self._reach_s = draw, reach_s(axes)
         self._travel_s: dict[str, float] = {}
         self.strokes: list[Stroke] = []
 
     def stroke(self, axis: str, start_s: float, duration_s: float, level: float) -> Stroke:
         """One more; turned round or shorter where it would go too far."""
-        low_s, high_s = REACH_S[axis]
+        low_s, high_s = self._reach_s[axis]
         travel_s = self._travel_s.get(axis, 0.0)
         if not low_s <= travel_s + level * duration_s <= high_s:
             level = -level
@@ -76,7 +76,7 @@ def _random(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
 
 def _taps(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
     """Short strokes of one axis, one after the other."""
-    hand, axis, at_s = _Hand(draw), draw.one_of(_swinging(axes)), _START_S
+    hand, axis, at_s = _Hand(draw, axes), draw.one_of(_swinging(axes)), _START_S
     for _ in range(draw.one_of((2, 3, 4, 5))):
         stroke = hand.stroke(axis, at_s, draw.between(0.12, 0.6), hand.level())
         at_s = stroke.end_s + draw.between(0.2, 1.5)
@@ -85,7 +85,7 @@ def _taps(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
 
 def _reversals(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
     """To and fro on one axis, without a pause."""
-    hand, axis, at_s, level = _Hand(draw), draw.one_of(_swinging(axes)), _START_S, 0.0
+    hand, axis, at_s, level = _Hand(draw, axes), draw.one_of(_swinging(axes)), _START_S, 0.0
     for _ in range(draw.one_of((2, 3, 4))):
         size = abs(hand.level())
         level = -size if level > 0.0 else size
@@ -96,7 +96,7 @@ def _reversals(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
 
 def _both(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
     """A stroke of each of two axes, at once or one a little later."""
-    hand, at_s = _Hand(draw), _START_S
+    hand, at_s = _Hand(draw, axes), _START_S
     for axis in _swinging(axes)[:2]:
         hand.stroke(axis, at_s, draw.between(0.8, 3.0), hand.level())
         at_s = _START_S + draw.between(0.0, 1.2)

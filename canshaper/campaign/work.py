@@ -18,7 +18,7 @@ from canshaper.design.lockstep import DriveOptions, OnFrame, Simulation
 from canshaper.design.profiles import choosing
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.axes import NEAR_FAR, SLEW
+from canshaper_sim.axes import HOIST, NEAR_FAR, SLEW
 from canshaper_sim.crane import Crane, CraneParameters
 from canshaper_sim.operator_model import Known, OperatorModel, Skill
 from canshaper_sim.parameters import changed_parameters
@@ -120,8 +120,9 @@ def learn(source: Source, set_up: SetUp) -> tuple[Known, ...]:
     deployment = set_up.deployment(source)
     nominal = changed_parameters([*source.changes], deployment)
     crane, axes = driven_axes(deployment)
-    if not {*AXES} <= {*axes}:
+    if not {*AXES} <= {*axes} or HOIST in axes:
         text = f"expected axes {' and '.join(AXES)}, got {', '.join(axes)}"
+        text += ": its operator knows no rope" if HOIST in axes else ""
         raise CampaignError(f"{deployment.path}: {text}")
     middle_m, known = 0.5 * (nominal.radius_min_m + nominal.radius_max_m), []
     start = replace(nominal, start_radius_m=middle_m)

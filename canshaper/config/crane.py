@@ -26,6 +26,7 @@ class CylindricalCrane(_Crane):
     slew: str | None = Field(None, description="axis that turns, positive counter-clockwise")
     near_far: str | None = Field(None, description="axis that moves the tip out, or a trolley")
     lift: str | None = Field(None, description="axis that moves the tip up")
+    hoist: str | None = Field(None, description="axis of a rope from it, positive up")
 
 
 class CartesianCrane(_Crane):
@@ -45,6 +46,7 @@ class JointCrane(_Crane):
     lift_cylinder: str | None = Field(None, description="axis that raises the main boom")
     knuckle: str | None = Field(None, description="axis that folds the outer boom out")
     extension: str | None = Field(None, description="axis that moves the telescope out")
+    hoist: str | None = Field(None, description="axis of a rope from its tip, positive up")
 
 
 CraneSection = Annotated[

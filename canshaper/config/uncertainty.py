@@ -56,7 +56,7 @@ class Uncertainty(Section):
         2.5, 6.5, "radius of the tip at the start; joint by joint it is not drawn"
     )
     rope_m: Range[Annotated[float, _end(0.5, 150, "m")]] = _usual(
-        3.0, 15.0, "rope of an overhead crane at the start; its signal is wrong by length_pct"
+        3.0, 15.0, "rope of a crane that has one, at the start; its signal is wrong by length_pct"
     )
     sway_deg: Range[Annotated[float, _end(0, 30, "deg")]] = _usual(
         0.0, 3.0, "swing at the start, along and across the boom"

@@ -85,6 +85,7 @@ class MotionRunner:
         turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]
+        self._roped = [one for one in self._members if one.runner.bound.rope]
         self._name = name
         self._apart = slew.bound.name  # what keeps the axes apart: at the start that they wait
         for member in self._members:
@@ -122,6 +123,8 @@ class MotionRunner:
             member.update(tick_s, last, now)
             if not (apart or member.moving.able):
                 apart = member.runner.bound.name
+        for member in self._roped:  # of which the model swings otherwise now
+            member.moving.follow(member.moving.sway)
         tip_m = self._radius.fresh(now_ns) if self._radius else None
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:

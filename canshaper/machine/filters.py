@@ -110,9 +110,6 @@ def check_rope(lookup: Lookup, place: Place, axis: AxisSection) -> None:
     for key in ("gain_schedule", "profiles", "sway_sensor"):
         if getattr(axis, key):
             add(at, f"expected no {key} with it: sway and filter follow the length alone")
-    for name, motion in lookup.config.motion.items():
-        if place[-1] in (motion.slew, motion.near_far):
-            add(at, f"expected an axis that is in no motion, got one of {name}")
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:

@@ -22,7 +22,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.sliders import adjustable, sliders
 from canshaper.studio.view import CraneView, Report
-from canshaper_sim.axes import OVERHEAD, ROTATOR
+from canshaper_sim.axes import ON_ROPE, ROTATOR
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.joints import JointBoom
@@ -212,7 +212,7 @@ class SimulatedPose:
         moves = deployment.coordinates
         axes = {moves.get(name, name) for name in deployment.axes.keys() - {ROTATOR}}
         kind = machine_for(moves.values())
-        return kind != OVERHEAD and axes <= {*AXES_OF[kind]}
+        return kind not in ON_ROPE and axes <= {*AXES_OF[kind]}
 
     def advance(self, dt_s: float, now_s: float) -> None:
         """Hold the last valve commands for so long."""

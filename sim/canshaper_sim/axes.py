@@ -29,15 +29,24 @@ WITHOUT_SWAY: Final = (LIFT, HOIST)  # they excite none by themselves
 TIP: Final = "tip"
 JOINTS: Final = "joints"
 OVERHEAD: Final = "overhead"
+TOWER: Final = "tower"
+LUFFING: Final = "luffing"
+TOWER_AXES: Final = (SLEW, NEAR_FAR, HOIST)
+LUFFING_AXES: Final = (SLEW, LIFT_CYLINDER, EXTENSION, HOIST)
+# Those whose load hangs from a rope.
+ON_ROPE: Final = (OVERHEAD, TOWER, LUFFING)
 
 
 def kind_of(axes: Iterable[str]) -> str:
     """Return what axes that move these coordinates drive.
 
-    One with a bridge, trolley or hoist is an overhead crane, one with a joint of the boom is driven
-    joint by joint, every other moves the tip.
+    One with a joint of the boom is driven joint by joint, or is a luffing crane where it has a
+    hoist; one that slews or goes out and has a hoist is a tower crane; any other with a bridge,
+    trolley or hoist is an overhead crane. Every other moves the tip.
     """
     moved = {*axes}
-    if moved & {*OVERHEAD_AXES}:
-        return OVERHEAD
-    return JOINTS if moved & {*JOINT_AXES} - {SLEW} else TIP
+    if moved & {*JOINT_AXES} - {SLEW}:
+        return LUFFING if HOIST in moved else JOINTS
+    if moved & {SLEW, NEAR_FAR}:
+        return TOWER if HOIST in moved else TIP
+    return OVERHEAD if moved & {*OVERHEAD_AXES} else TIP

@@ -2,8 +2,9 @@
 
 Three booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
 (slew angle theta1, radius x, height z), one valve a coordinate; `JointBoom` moves the joints, and
-the tip by their kinematics; `OverheadBoom` moves a trolley and a rope. All follow their valves
-exactly. By default the pump delivers what all valves ask for and no boom bends, as in the paper.
+the tip by their kinematics; `OverheadBoom` moves a trolley and a rope, `RopedBoom` a boom with a
+rope at its tip. All follow their valves exactly. By default the pump delivers what all valves ask
+for and no boom bends, as in the paper.
 """
 
 import math
@@ -20,6 +21,8 @@ from canshaper_sim.axes import (
     LIFT,
     LIFT_CYLINDER,
     NEAR_FAR,
+    ON_ROPE,
+    OVERHEAD,
     ROTATOR,
     SLEW,
     TROLLEY,
@@ -31,7 +34,8 @@ from canshaper_sim.contact import ContactParameters
 from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.log import LogParameters, SecondSwing
-from canshaper_sim.overhead import OverheadParameters
+from canshaper_sim.luffing import LuffingParameters
+from canshaper_sim.overhead import OverheadBoom, OverheadParameters
 from canshaper_sim.pump import Pump, PumpParameters
 from canshaper_sim.ranges import check_ranges
 from canshaper_sim.rotator import Rotator, RotatorParameters
@@ -39,6 +43,7 @@ from canshaper_sim.surroundings import Surroundings
 from canshaper_sim.sway_sensor import SwaySensorParameters
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.tip_controller import TipControllerParameters
+from canshaper_sim.tower import TowerParameters
 from canshaper_sim.valve import ValveParameters
 from canshaper_sim.wind import Wind, WindParameters
 
@@ -50,7 +55,7 @@ __all__ = [
     "Crane",
     "CraneParameters",
     "CraneState",
-    "OverheadCrane",
+    "RopeCrane",
     "joint_crane",
 ]
 
@@ -59,6 +64,19 @@ __all__ = [
 INTERNAL_STEP_S: Final = 0.010
 
 _HORIZONTAL: Final = math.pi / 2.0
+
+# Of a crane or its joints, or of another kind of crane by its own name.
+FULL_SPEEDS: Final = {
+    SLEW: "slew_full_speed_rad_s",
+    NEAR_FAR: "near_far_full_speed_m_s",
+    LIFT: "lift_full_speed_m_s",
+    LIFT_CYLINDER: "lift_cylinder_full_speed_rad_s",
+    KNUCKLE: "knuckle_full_speed_rad_s",
+    EXTENSION: "extension_full_speed_m_s",
+    BRIDGE: "bridge_full_speed_m_s",
+    TROLLEY: "trolley_full_speed_m_s",
+    HOIST: "hoist_full_speed_m_s",
+}
 
 # name -> (lowest, highest) value that still describes a forestry or loader crane.
 _ALLOWED = {
@@ -114,6 +132,8 @@ class CraneParameters:
     wind: WindParameters = field(default_factory=WindParameters)
     rotator: RotatorParameters = field(default_factory=RotatorParameters)
     overhead: OverheadParameters = field(default_factory=OverheadParameters)
+    tower: TowerParameters = field(default_factory=TowerParameters)
+    luffing: LuffingParameters = field(default_factory=LuffingParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -123,20 +143,11 @@ class CraneParameters:
         }
         check_ranges("crane", self, _ALLOWED | start)
 
-    @property
-    def full_speeds(self) -> dict[str, float]:
-        """Full speed of every axis that a crane may have, rad/s or m/s."""
-        return {
-            SLEW: self.slew_full_speed_rad_s,
-            NEAR_FAR: self.near_far_full_speed_m_s,
-            LIFT: self.lift_full_speed_m_s,
-            LIFT_CYLINDER: self.joints.lift_cylinder_full_speed_rad_s,
-            KNUCKLE: self.joints.knuckle_full_speed_rad_s,
-            EXTENSION: self.joints.extension_full_speed_m_s,
-            BRIDGE: self.overhead.bridge_full_speed_m_s,
-            TROLLEY: self.overhead.trolley_full_speed_m_s,
-            HOIST: self.overhead.hoist_full_speed_m_s,
-        }
+    def full_speeds(self, kind: str) -> dict[str, float]:
+        """Full speed of every axis that a crane of this kind may have, rad/s or m/s."""
+        owners = (getattr(self, kind),) if kind in ON_ROPE else (self, self.joints)
+        named = [(axis, name, one) for axis, name in FULL_SPEEDS.items() for one in owners]
+        return {axis: getattr(one, name) for axis, name, one in named if hasattr(one, name)}
 
     def tip_boom(self) -> TipBoom:
         """The boom whose tip is moved directly, in the start pose."""
@@ -345,19 +356,24 @@ def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = N
     return Crane(p, sway, JointBoom(p.joints, p.slew, p.slew_full_speed_rad_s, start, p.ends))
 
 
-class OverheadCrane(Crane):
-    """A load on a rope below a trolley; see `OverheadBoom`.
+class RopeCrane(Crane):
+    """A load on a rope: of an overhead crane, see `OverheadBoom`, or another one, see `RopedBoom`.
 
-    It stands on level rails without wind: of the parameters, overhead, ends and sway sensor count.
+    It stands level and without wind: of the parameters its own, ends and sway sensor count.
     """
 
     __slots__ = ("_rope",)
 
-    def __init__(self, parameters: CraneParameters | None = None, sway: Sway | None = None) -> None:
+    def __init__(
+        self,
+        parameters: CraneParameters | None = None,
+        sway: Sway | None = None,
+        kind: str = OVERHEAD,
+    ) -> None:
         p = parameters or CraneParameters()
-        self._rope = p.overhead.boom(p.ends)
+        self._rope: OverheadBoom = getattr(p, kind).boom(p.ends)
         self._rope.swing(sway or Sway())
-        own = CraneParameters(overhead=p.overhead, ends=p.ends, sway_sensor=p.sway_sensor)
+        own = CraneParameters(ends=p.ends, sway_sensor=p.sway_sensor)
         super().__init__(own, sway, cast("CraneBoom", self._rope))
 
     def _advance(self, step_s: float) -> None:

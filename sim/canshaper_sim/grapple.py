@@ -114,8 +114,13 @@ class Grapple:
 
     def offset_m(self, theta5_rad: float, theta6_rad: float) -> tuple[float, float]:
         """How far from the tip it hangs, seen from above: outwards, and in slew direction, m."""
-        l3_m = self.l1_m + self.l2_m * math.cos(theta6_rad)
-        return -self.l2_m * math.sin(theta6_rad), l3_m * math.sin(theta5_rad)
+        return offset_m(self.l1_m, self.l2_m, theta5_rad, theta6_rad)
+
+
+def offset_m(l1_m: float, l2_m: float, theta5_rad: float, theta6_rad: float) -> tuple[float, float]:
+    """How far from the tip it hangs, seen from above; a rope is all l2."""
+    l3_m = l1_m + l2_m * math.cos(theta6_rad)
+    return -l2_m * math.sin(theta6_rad), l3_m * math.sin(theta5_rad)
 
 
 def accelerations(

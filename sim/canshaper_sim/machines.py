@@ -4,6 +4,8 @@
 - ``tip-controller``: tip commands go to the machine's tip controller, which drives the joints.
 - ``joints``: one valve a joint; the operator drives the joints.
 - ``overhead``: bridge, trolley and hoist, a drive each; the load hangs from a rope.
+- ``tower``: slew, trolley and hoist, a drive each; the load hangs from a rope.
+- ``luffing``: slew, luffing, telescope and hoist, a valve each; the load hangs from a rope.
 """
 
 import math
@@ -14,14 +16,19 @@ from canshaper.errors import DesignError
 from canshaper_sim.axes import (
     JOINT_AXES,
     JOINTS,
+    LUFFING,
+    LUFFING_AXES,
+    ON_ROPE,
     OVERHEAD,
     OVERHEAD_AXES,
     ROTATOR,
     TIP,
     TIP_AXES,
+    TOWER,
+    TOWER_AXES,
     kind_of,
 )
-from canshaper_sim.crane import Crane, CraneParameters, OverheadCrane, joint_crane
+from canshaper_sim.crane import Crane, CraneParameters, RopeCrane, joint_crane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.tip_controller import TipController
@@ -32,6 +39,8 @@ AXES_OF: Final[Mapping[str, tuple[str, ...]]] = {
     TIP_CONTROLLER: TIP_AXES,
     JOINTS: JOINT_AXES,
     OVERHEAD: OVERHEAD_AXES,
+    TOWER: TOWER_AXES,
+    LUFFING: LUFFING_AXES,
 }
 MACHINES: Final = tuple(AXES_OF)
 
@@ -122,8 +131,8 @@ def build_machine(
         return TipControlledCrane(parameters, sway)
     if name == JOINTS:
         return ValveDrivenCrane(joint_crane(parameters, sway))
-    if name == OVERHEAD:
-        return ValveDrivenCrane(OverheadCrane(parameters, sway))
+    if name in ON_ROPE:
+        return ValveDrivenCrane(RopeCrane(parameters, sway, name))
     raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {name!r}")
 
 

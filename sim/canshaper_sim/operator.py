@@ -14,8 +14,10 @@ from canshaper_sim.axes import (
     KNUCKLE,
     LIFT,
     LIFT_CYLINDER,
+    LUFFING,
     NEAR_FAR,
     SLEW,
+    TOWER,
     TROLLEY,
     kind_of,
 )
@@ -34,6 +36,7 @@ def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXE
     round or cut short. The last second is neutral.
     """
     strokes: list[Stroke] = []
+    reach = reach_s(axes)
     for axis in axes:
         if axis not in ALL_AXES:
             raise DesignError(
@@ -42,7 +45,7 @@ def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXE
         # A source for each axis: its strokes do not depend on which other axes move. A string
         # seeds the same way in every Python version.
         source = random.Random(f"canshaper operator {seed} {axis}")
-        strokes += _random_strokes(source, axis, duration_s - 1.0)
+        strokes += _random_strokes(source, axis, duration_s - 1.0, reach[axis])
     return Script(f"random-{seed}", tuple(strokes), duration_s)
 
 
@@ -60,6 +63,11 @@ REACH_S = {
     TROLLEY: (-20.0, 20.0),
     HOIST: (-6.0, 6.0),
 }
+# Of cranes that are larger than their speeds.
+_REACH_OF = {
+    TOWER: {NEAR_FAR: (-15.0, 15.0)},
+    LUFFING: {LIFT_CYLINDER: (-4.0, 4.0), EXTENSION: (-4.0, 10.0)},
+}
 LARGEST_LEVEL = {
     SLEW: 0.6,
     NEAR_FAR: 1.0,
@@ -76,9 +84,16 @@ LARGEST_LEVEL = {
 _PAUSE_SHARE = 0.33
 
 
-def _random_strokes(source: random.Random, axis: str, end_s: float) -> list[Stroke]:
+def reach_s(axes: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """How far from the start the strokes of each axis of a crane with these may add up to, s."""
+    return REACH_S | _REACH_OF.get(kind_of(axes), {})
+
+
+def _random_strokes(
+    source: random.Random, axis: str, end_s: float, reach_s: tuple[float, float]
+) -> list[Stroke]:
     strokes: list[Stroke] = []
-    low_s, high_s = REACH_S[axis]
+    low_s, high_s = reach_s
     travel_s = 0.0
     start_s = source.uniform(0.2, 1.0)
     # One ramp for all strokes up to the next pause, so that level to level is one movement.
@@ -107,7 +122,7 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     """A built-in script, or `random-<seed>` of 30 s on these axes.
 
     Where they are joints of the boom, `demo` and `loading` are the same work joint by joint; where
-    they are those of an overhead crane, that of one.
+    they are those of a crane with a rope, that of one.
 
     Raises:
         DesignError: no script of that name; lists the names.

@@ -12,6 +12,7 @@ slack is none: the load never falls freely.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -29,48 +30,65 @@ Vector = tuple[float, float, float]
 _ALLOWED = {
     "bridge_full_speed_m_s": (0.05, 20.0),
     "trolley_full_speed_m_s": (0.05, 20.0),
+    "runway_m": (1.0, 1000.0),
+    "span_m": (1.0, 200.0),
+}
+_ROPE = {
     "hoist_full_speed_m_s": (0.02, 3.0),
     "rope_min_m": (0.5, 150.0),
     "rope_max_m": (0.5, 150.0),
-    "runway_m": (1.0, 1000.0),
-    "span_m": (1.0, 200.0),
     "damping_ratio": (0.0, 0.5),
     "rope_error_pct": (-50.0, 50.0),
     "g_m_s2": (1.0, 25.0),
 }
 
 
-def _drive() -> ValveParameters:
+def drive() -> ValveParameters:
     """An inverter follows every command, within its ramp."""
     return ValveParameters(deadband=0.0, rate_limit_1_s=5.0, lag_s=0.1)
 
 
 @dataclass(frozen=True, slots=True)
-class OverheadParameters:
-    """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
+class RopeParameters:
+    """Hoist and rope of a crane, and how its load swings."""
 
-    bridge: ValveParameters = field(default_factory=_drive)
-    trolley: ValveParameters = field(default_factory=_drive)
-    hoist: ValveParameters = field(default_factory=_drive)
-    bridge_full_speed_m_s: float = 1.0
-    trolley_full_speed_m_s: float = 1.0
+    hoist: ValveParameters = field(default_factory=drive)
     hoist_full_speed_m_s: float = 0.5
-    runway_m: float = 100.0  # it begins in the middle of both
-    span_m: float = 60.0
-    rope_m: float = 8.0  # from the trolley to the middle of the load, at the start
+    rope_m: float = 8.0  # down to the middle of the load, at the start
     rope_min_m: float = 1.5
     rope_max_m: float = 30.0
     damping_ratio: float = 0.005
     rope_error_pct: float = 0.0  # how much more than that the length signal says
     g_m_s2: float = 9.81
 
+    def check(self, owner: str, allowed: Mapping[str, tuple[float, float]]) -> None:
+        """Refuse values that describe no crane; see ``check_ranges``."""
+        start = {"rope_m": (self.rope_min_m, self.rope_max_m)}
+        check_ranges(owner, self, {**allowed, **_ROPE, **start})
+
+    def winch(self, ends: EndParameters) -> Actuator:
+        """The hoist at the start; its position is the height below what the rope hangs from."""
+        rope = (-self.rope_m, -self.rope_max_m, -self.rope_min_m)
+        return Actuator(self.hoist, self.hoist_full_speed_m_s, *rope, ends=ends)
+
+
+@dataclass(frozen=True, slots=True)
+class OverheadParameters(RopeParameters):
+    """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
+
+    bridge: ValveParameters = field(default_factory=drive)
+    trolley: ValveParameters = field(default_factory=drive)
+    bridge_full_speed_m_s: float = 1.0
+    trolley_full_speed_m_s: float = 1.0
+    runway_m: float = 100.0  # it begins in the middle of both
+    span_m: float = 60.0
+
     def __post_init__(self) -> None:
-        check_ranges("overhead", self, _ALLOWED | {"rope_m": (self.rope_min_m, self.rope_max_m)})
+        self.check("overhead", _ALLOWED)
 
     def boom(self, ends: EndParameters) -> "OverheadBoom":
         """Trolley and rope at the start."""
         runway, span = 0.5 * self.runway_m, 0.5 * self.span_m
-        rope = (-self.rope_m, -self.rope_max_m, -self.rope_min_m)
         return OverheadBoom(
             {
                 BRIDGE: Actuator(
@@ -79,7 +97,7 @@ class OverheadParameters:
                 TROLLEY: Actuator(
                     self.trolley, self.trolley_full_speed_m_s, 0.0, -span, span, ends=ends
                 ),
-                HOIST: Actuator(self.hoist, self.hoist_full_speed_m_s, *rope, ends=ends),
+                HOIST: self.winch(ends),
             },
             self,
         )
@@ -97,7 +115,7 @@ class OverheadBoom:
         rate: its velocity, from the trolley's, m/s.
     """
 
-    def __init__(self, axes: dict[str, Actuator], parameters: OverheadParameters) -> None:
+    def __init__(self, axes: dict[str, Actuator], parameters: RopeParameters) -> None:
         self.axes = axes
         self._p = parameters
         self.load: Vector = (0.0, 0.0, axes[HOIST].position)
@@ -143,14 +161,23 @@ class OverheadBoom:
         return math.atan2(y, x), radius, hoist.position, turn, out, hoist.speed
 
     def advance(self, step_s: float) -> None:
-        """Move on by step_s seconds: a classical Runge-Kutta step, and back onto the rope."""
-        bridge, trolley, hoist = self.axes.values()
-        before = hoist.position, hoist.speed
-        for axis in (bridge, trolley, hoist):
+        """Move on by step_s seconds."""
+        bridge, trolley, _ = self.axes.values()
+        for axis in (bridge, trolley):
             axis.advance(step_s)
-        start = (bridge.start_acceleration, trolley.start_acceleration)
-        middle = (bridge.middle_acceleration, trolley.middle_acceleration)
-        end = (bridge.end_acceleration, trolley.end_acceleration)
+        start = (bridge.start_acceleration, trolley.start_acceleration, 0.0)
+        middle = (bridge.middle_acceleration, trolley.middle_acceleration, 0.0)
+        end = (bridge.end_acceleration, trolley.end_acceleration, 0.0)
+        self._hang(step_s, start, middle, end)
+
+    def _hang(self, step_s: float, start: Vector, middle: Vector, end: Vector) -> None:
+        """Move rope and load on below a trolley with these accelerations, m/s^2.
+
+        A classical Runge-Kutta step, and back onto the rope.
+        """
+        hoist = self.axes[HOIST]
+        before = hoist.position, hoist.speed
+        hoist.advance(step_s)
         ropes = (
             (*before, hoist.start_acceleration),
             (hoist.middle_position, hoist.middle_speed, hoist.middle_acceleration),
@@ -172,7 +199,7 @@ class OverheadBoom:
         self.rate = _plus(v, (change * length - _dot(r, v)) / length**2, r)
 
     def _acceleration(
-        self, r: Vector, v: Vector, trolley: tuple[float, float], hoist: tuple[float, float, float]
+        self, r: Vector, v: Vector, trolley: Vector, hoist: tuple[float, float, float]
     ) -> Vector:
         """Return that of the load relative to the trolley.
 
@@ -183,7 +210,7 @@ class OverheadBoom:
             hoist: position, speed and acceleration of the hook.
         """
         length, change, change_2 = (-one for one in hoist)
-        pull = (-trolley[0], -trolley[1], -self._p.g_m_s2)
+        pull = (-trolley[0], -trolley[1], -trolley[2] - self._p.g_m_s2)
         tension = (_dot(r, pull) + _dot(v, v) - change**2 - length * change_2) / length**2
         damping = 2.0 * self._p.damping_ratio * math.sqrt(self._p.g_m_s2 / length)
         return _plus(_plus(pull, damping * change / length - tension, r), -damping, v)

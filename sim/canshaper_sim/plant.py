@@ -10,7 +10,7 @@ from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundValue, Choosing
-from canshaper_sim.axes import JOINTS, OVERHEAD, ROTATOR, TIP
+from canshaper_sim.axes import JOINTS, LUFFING, OVERHEAD, ROTATOR, SLEW, TIP, TOWER
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
@@ -38,6 +38,15 @@ OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "CranePosition": ("Bridge", "Trolley", "RopeLength"),
     "CraneVelocity": ("BridgeSpeed", "TrolleySpeed", "HoistSpeed"),
     "LoadSway": ("SwayBridge", "SwayTrolley"),
+}
+
+# Sent first by other cranes with a rope: how far down it hangs.
+HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {
+    "HookPosition": ("RopeLength",),
+    "CraneVelocity": ("HoistSpeed",),
+}
+BOOM_FEEDBACK: Mapping[str, tuple[str, ...]] = {
+    "JointVelocity": ("SlewRate", "LiftRate", "ExtensionSpeed"),
 }
 
 # Frames of a valve that are kept once read.
@@ -168,6 +177,10 @@ class PlantNode:
         self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
         if name == OVERHEAD:
             self._feedback = OVERHEAD_FEEDBACK
+        elif name == TOWER:
+            self._feedback = {**HOOK_FEEDBACK, **FEEDBACK}
+        elif name == LUFFING:
+            self._feedback = {**BOOM_FEEDBACK, **HOOK_FEEDBACK, **FEEDBACK}
         self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
         measured = [motion.radius for motion in deployment.motions.values()]
@@ -274,7 +287,7 @@ class PlantNode:
             return math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)
         boom = self.crane.boom
         if isinstance(boom, OverheadBoom):
-            return _overhead_values(name, boom)
+            return _rope_values(name, boom)
         assert isinstance(boom, JointBoom)
         if name == "JointVelocity":
             return boom.joint_rates
@@ -282,11 +295,19 @@ class PlantNode:
         return math.degrees(slew), math.degrees(lift), math.degrees(knuckle), extension
 
 
-def _overhead_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
-    """Return the values of a feedback message of an overhead crane, in the order of its signals."""
-    bridge, trolley, hoist = boom.axes.values()
+def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
+    """Return the values of a feedback message of a crane with a rope, in the order of its signals.
+
+    An overhead crane sends its own ones, see ``OVERHEAD_FEEDBACK``.
+    """
+    if name == "HookPosition":
+        return (boom.signal_m,)
+    axes = boom.axes.values()
     if name == "CraneVelocity":
-        return bridge.speed, trolley.speed, hoist.speed
+        return tuple(axis.speed for axis in ([*axes][-1:] if SLEW in boom.axes else axes))
+    if name == "JointVelocity":
+        return tuple(axis.speed for axis in axes)[:-1]
+    bridge, trolley, _ = axes
     if name == "CranePosition":
         return bridge.position, trolley.position, boom.signal_m
     return tuple(math.degrees(angle) for angle in boom.angles[:2])

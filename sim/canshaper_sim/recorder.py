@@ -25,8 +25,10 @@ from canshaper_sim.axes import (
     NEAR_FAR,
     SLEW,
     TROLLEY,
+    kind_of,
 )
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.grapple import offset_m
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recording import DWELL_S, AxisTrace, CraneTrace, Point, Recording
 
@@ -58,9 +60,9 @@ class Recorder:
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
         crane = parameters or changed_parameters([], deployment)
-        self._full = crane.full_speeds
-        self._grapple = crane.grapple
         self._moves = deployment.coordinates
+        self._full = crane.full_speeds(kind_of(self._moves.values()))
+        self._hangs = crane.grapple.l1_m, crane.grapple.l2_m
         self._dwell_s = dwell_s(deployment)
         self._tip = (0.0, 0.0)  # slew angle in rad, radius in m
         self._hook = (0.0, 0.0, 0.0)  # of an overhead crane: bridge, trolley, rope, m
@@ -87,6 +89,7 @@ class Recorder:
             ("JointVelocity", self._speed),
             ("CraneVelocity", self._speed),
             ("CranePosition", self._trolley),
+            ("HookPosition", self._hook_position),
             ("LoadSway", self._load),
             ("TipPosition", self._position),
             ("GrappleSway", self._sway),
@@ -196,13 +199,20 @@ class Recorder:
             self._t_s.append(time_s - self._start_s)
             across, along = sways.values()
             heading, radius_m = self._tip
-            offset = self._grapple.offset_m(math.radians(across), math.radians(along))
+            offset = offset_m(*self._hangs, math.radians(across), math.radians(along))
             tip = _from_above(heading, radius_m, 0.0)
             grapple = _from_above(heading, radius_m + offset[0], offset[1])
             self._crane.append((tip, grapple, math.hypot(across, along)))
             for now, kept, signal in rows:
                 now[3] = sways.get(signal, 0.0)
                 kept.append(now.copy())
+
+        return receive
+
+    def _hook_position(self, fields: FieldSet) -> _Handler:
+        def receive(data: bytes, _time_s: float) -> None:
+            raw = fields.layout.decode(data)
+            self._hangs = 0.0, fields.value("RopeLength", raw["RopeLength"])
 
         return receive
 

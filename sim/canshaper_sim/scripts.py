@@ -1,4 +1,4 @@
-"""Built-in operator scripts: pulses, a demonstration, loading; of tips, joints and trolleys."""
+"""Built-in operator scripts: pulses, a demonstration, loading; of tips, joints and ropes."""
 
 from canshaper_sim.axes import (
     BRIDGE,
@@ -159,6 +159,37 @@ _DEMO_OVERHEAD = Script(
     52.0,
 )
 
+# Of a tower crane: a load goes round and out with both at once, comes back on a shorter rope.
+_DEMO_TOWER = Script(
+    "demo-tower",
+    (
+        Stroke(HOIST, 0.5, 6.0, 1.0),
+        Stroke(SLEW, 2.0, 10.0, 1.0),
+        Stroke(NEAR_FAR, 4.0, 8.0, 0.8),
+        Stroke(SLEW, 34.0, 8.0, -0.8),
+        Stroke(NEAR_FAR, 36.0, 6.0, -1.0),
+        Stroke(SLEW, 46.0, 0.8, 0.4),
+        Stroke(HOIST, 38.0, 6.0, -1.0),
+    ),
+    68.0,
+)
+
+# Of a telehandler: up, round and out, back with a correction.
+_DEMO_LUFFING = Script(
+    "demo-luffing",
+    (
+        Stroke(HOIST, 0.5, 4.0, 1.0),
+        Stroke(LIFT_CYLINDER, 1.0, 4.0, 1.0),
+        Stroke(SLEW, 3.0, 8.0, 1.0),
+        Stroke(EXTENSION, 4.0, 6.0, 1.0),
+        Stroke(SLEW, 22.0, 6.0, -1.0),
+        Stroke(EXTENSION, 23.0, 5.0, -1.0),
+        Stroke(SLEW, 31.0, 0.6, 0.5),
+        Stroke(HOIST, 24.0, 3.0, -1.0),
+    ),
+    46.0,
+)
+
 # From the start pose of the default boom each joint stays clear of its stops.
 _JOINT_PULSES = ((LIFT_CYLINDER, -0.6), (KNUCKLE, 0.8), (EXTENSION, 0.9))
 
@@ -178,5 +209,15 @@ SCRIPTS: dict[str, Script] = {
             for axis in OVERHEAD_AXES
         ),
         _DEMO_OVERHEAD,
+        *(
+            Script(f"pulse-{axis}-tower", (Stroke(axis, 0.5, 8.0, 1.0, _PULSE_RAMP_S),), 34.0)
+            for axis in (SLEW, NEAR_FAR)
+        ),
+        _DEMO_TOWER,
+        *(
+            Script(f"pulse-{axis}-luffing", (Stroke(axis, 0.5, 5.0, 1.0, _PULSE_RAMP_S),), 22.0)
+            for axis in (SLEW, LIFT_CYLINDER, EXTENSION)
+        ),
+        _DEMO_LUFFING,
     )
 }

@@ -1,17 +1,17 @@
 """The shipped bridge crane on the simulated one, whose rope is no model of the controller's."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from canshaper.design.comparison.ropes import (
-    ROPES_M,
     RopeFilter,
     compare_ropes,
     left_deg,
     rope_filters,
-    tasks,
+    works,
 )
 from canshaper.design.lockstep import drive
 from canshaper.errors import DesignError
@@ -27,7 +27,7 @@ from tests.rigs.overhead import FILE, changed
 OWN = RopeFilter("the file's", {})
 
 
-def residual_deg(file: Path, error_pct: float, strokes: list[Stroke], rope_m: float) -> float:
+def residual_deg(file: Path, error_pct: float, strokes: Sequence[Stroke], rope_m: float) -> float:
     """Swing that is left 10 s after the last stroke."""
     end_s = max(one.end_s for one in strokes) + 10.0
     overhead = replace(CraneParameters().overhead, rope_m=rope_m, rope_error_pct=error_pct)
@@ -46,11 +46,7 @@ def test_both_axes_while_the_load_is_hoisted() -> None:
 
 @pytest.mark.slow
 def test_what_the_file_leaves_with_every_rope_still_and_hoisted() -> None:
-    left = [
-        left_deg(read(FILE), (OWN, rope_m, work, strokes))
-        for rope_m in ROPES_M
-        for work, strokes in tasks(rope_m)
-    ]
+    left = [left_deg(read(FILE), (OWN, work)) for work in works(read(FILE))]
     assert sum(left) / len(left) < 0.15
     assert max(left) < 0.4
 
@@ -58,20 +54,16 @@ def test_what_the_file_leaves_with_every_rope_still_and_hoisted() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("error_pct", [-5.0, 5.0])
 def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
-    for rope_m in ROPES_M:
-        for _, strokes in tasks(rope_m):
-            assert residual_deg(FILE, error_pct, strokes, rope_m) < 2.0
+    for work in works(read(FILE)):
+        assert residual_deg(FILE, error_pct, work.strokes, work.rope_m) < 2.0
 
 
 @pytest.mark.slow
 def test_every_filter_that_is_compared_is_driven() -> None:
     """With ropes of another length the filter for one leaves more, those that follow do not."""
     deployment = read(FILE)
-    strokes = dict(tasks(5.0))["still"]
-    left = {
-        one.name: left_deg(deployment, (one, 5.0, "still", strokes))
-        for one in rope_filters(deployment)
-    }
+    work = {one.name: one for one in works(read(FILE))}["5 m still"]
+    left = {one.name: left_deg(deployment, (one, work)) for one in rope_filters(deployment)}
     assert left["off"] > 10.0
     assert left["ZVD for 8 m"] > 1.0
     assert max(left[name] for name in ("ZV by length", "G_FF by length", "the file's")) < 0.3

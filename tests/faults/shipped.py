@@ -38,6 +38,8 @@ NAMES = (
     "bridge-crane",
     "excavator",
     "multicopter",
+    "tower-crane",
+    "telehandler",
 )
 CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
 MADE = {

@@ -107,16 +107,6 @@ def test_numbers_that_the_length_chooses_are_not_adjustable(tmp_path: Path) -> N
     assert "axis bridge has a measured length, which chooses its numbers" in says
 
 
-def test_a_motion_of_an_axis_with_a_rope_is_refused(tmp_path: Path) -> None:
-    motion = "motion: { one: { slew: bridge } }\nuncertainty:"
-    slewing = (
-        "    sway:\n      length_m",
-        "    slewing: { full_speed_rad_s: 1, largest_radius_m: 5 }\n    sway:\n      length_m",
-    )
-    says = rope_problems(tmp_path, ("uncertainty:", motion), slewing)
-    assert "sway.length: expected an axis that is in no motion, got one of one" in says
-
-
 @pytest.mark.slow
 def test_check_looks_at_both_ends_of_the_rope(tmp_path: Path) -> None:
     """The taps of the longest rope have to end in the tail, those of the shortest be slow."""

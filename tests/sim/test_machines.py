@@ -24,6 +24,7 @@ from canshaper_sim.plant import FEEDBACK, JOINT_FEEDBACK, PlantNode
 ROOT = Path(__file__).resolve().parents[2]
 TIP_FILE = ROOT / "config" / "forwarder.yaml"
 JOINT_FILE = ROOT / "config" / "forwarder-joints.yaml"
+KINDS = "tip, tip-controller, joints, overhead, tower, luffing"
 
 
 def renamed(tmp_path: Path, file: Path, *changes: tuple[str, str]) -> Deployment:
@@ -55,12 +56,12 @@ def test_axes_choose_the_machine() -> None:
     assert machine_for(dict.fromkeys(TIP_AXES), "tip-controller") == "tip-controller"
     with pytest.raises(
         ValueError,
-        match="machine: expected one of tip, tip-controller, joints, overhead, got 'crab'",
+        match=f"machine: expected one of {KINDS}, got 'crab'",
     ):
         machine_for({}, "crab")
     with pytest.raises(
         ValueError,
-        match="machine: expected one of tip, tip-controller, joints, overhead, got 'crab'",
+        match=f"machine: expected one of {KINDS}, got 'crab'",
     ):
         build_machine("crab")
     assert [type(build_machine(name).crane.boom).__name__ for name in MACHINES] == [
@@ -68,6 +69,8 @@ def test_axes_choose_the_machine() -> None:
         "JointBoom",
         "JointBoom",
         "OverheadBoom",
+        "RopedBoom",
+        "RopedBoom",
     ]
 
 
@@ -176,7 +179,7 @@ def test_shipped_deployments_are_good(file: Path) -> None:
         (["sim", str(JOINT_FILE), "--machine", "tip"], "axes.knuckle: machine tip has slew"),
         (
             ["sim", str(TIP_FILE), "--machine", "crab"],
-            "machine: expected one of tip, tip-controller, joints, overhead, got 'crab'",
+            f"machine: expected one of {KINDS}, got 'crab'",
         ),
         (
             ["operator", str(JOINT_FILE), "--script", "pulse-near_far"],

@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 
 from canshaper.errors import DesignError
-from canshaper_sim.axes import JOINT_AXES
-from canshaper_sim.crane import AXES, Crane
+from canshaper_sim.axes import JOINT_AXES, ON_ROPE
+from canshaper_sim.crane import AXES, Crane, RopeCrane
 from canshaper_sim.operator import SCRIPTS, Script, Stroke, random_script, script_named
 from canshaper_sim.parameters import changed_parameters
 
@@ -149,10 +149,10 @@ def test_one_by_one_is_a_pulse_of_each_axis_and_a_piece_of_work() -> None:
 
 @pytest.mark.parametrize("name", [*SCRIPTS, *(f"random-{seed}" for seed in range(20))])
 def test_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
-    script = script_named(name)
-    crane = Crane()
+    script, kind = script_named(name), name.rpartition("-")[2]
+    crane, axes = (RopeCrane(kind=kind), script.axes) if kind in ON_ROPE else (Crane(), AXES)
     for i in range(round(script.duration_s / TICK_S)):
-        crane.step(TICK_S, {axis: script.command(axis, i * TICK_S) for axis in AXES})
+        crane.step(TICK_S, {axis: script.command(axis, i * TICK_S) for axis in axes})
         assert crane.axes_at_stop == ()
     assert not crane.swung_over
     # Joysticks neutral at the end; the lag of the valve has died away.

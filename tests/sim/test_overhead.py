@@ -6,19 +6,19 @@ import pytest
 
 from canshaper.errors import DesignError
 from canshaper_sim.axes import BRIDGE, HOIST, TROLLEY
-from canshaper_sim.crane import CraneParameters, OverheadCrane
+from canshaper_sim.crane import CraneParameters, RopeCrane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.overhead import OverheadBoom, OverheadParameters
 
 G = 9.81
 
 
-def crane(sway: Sway | None = None, **parameters: float) -> OverheadCrane:
+def crane(sway: Sway | None = None, **parameters: float) -> RopeCrane:
     own = OverheadParameters(**{"damping_ratio": 0.0, **parameters})  # type: ignore[arg-type]
-    return OverheadCrane(CraneParameters(overhead=own), sway)
+    return RopeCrane(CraneParameters(overhead=own), sway)
 
 
-def run(one: OverheadCrane, seconds: float, **commands: float) -> list[float]:
+def run(one: RopeCrane, seconds: float, **commands: float) -> list[float]:
     """Drive; the swing along the runway at each step, rad."""
     angles = []
     for _ in range(round(seconds / 0.01)):

@@ -67,8 +67,8 @@ def compare(
     30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
     shows what is done until then.
 
-    Of an overhead crane it is one table of the swing left by the length of the rope, still and
-    hoisted, next to ZVD for one length and ZV by length.
+    Of a crane with a rope it is one table of the swing left by the length of the rope and the
+    work, next to ZVD for one length and ZV by length.
 
     Examples:
 
@@ -86,14 +86,14 @@ def compare(
     from canshaper.design.comparison.limits import AXIS, least, limits_for
     from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
     from canshaper.design.comparison.measure import measure_all
-    from canshaper.design.comparison.ropes import is_overhead
+    from canshaper.design.comparison.ropes import on_rope
     from canshaper.design.comparison.summary import recommendations, rows
     from canshaper.design.profiles import swinging_axis
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)()
     results = Results("Comparison of filters", deployment, report, picture, quiet=as_json)
-    if is_overhead(deployment):
+    if on_rope(deployment):
         if work:
             raise UsageError("--work: its operator works with slew and near-far, not with a rope")
         _ropes(deployment, results, out, processes, as_json=as_json)
@@ -150,7 +150,7 @@ def _ropes(
     *,
     as_json: bool,
 ) -> None:
-    """Compare the filters of an overhead crane."""
+    """Compare the filters of a crane with a rope."""
     from canshaper.design.comparison.ropes import compare_ropes
     from canshaper.report.console import new_table, progress_bar
 

@@ -1,4 +1,4 @@
-"""Filters of an overhead crane on the same work, by the length of its rope.
+"""Filters of a crane with a rope on the same work, by the length of the rope.
 
 A rope without a length signal is compared as long as the file says, and a tenth wrong.
 """
@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.design.comparison.manoeuvres import tick_s
@@ -19,19 +20,41 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.shapers.fir import zv_taps
 from canshaper.shaping.sway import GRAVITY_M_S2
-from canshaper_sim.axes import BRIDGE, HOIST, OVERHEAD, TROLLEY, kind_of
+from canshaper_sim.axes import (
+    BRIDGE,
+    EXTENSION,
+    HOIST,
+    LIFT_CYLINDER,
+    LUFFING,
+    LUFFING_AXES,
+    NEAR_FAR,
+    ON_ROPE,
+    OVERHEAD,
+    SLEW,
+    TOWER,
+    TROLLEY,
+    WITHOUT_SWAY,
+    kind_of,
+)
+from canshaper_sim.machines import AXES_OF
+from canshaper_sim.operator import random_script
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
 ROPES_M = (2.0, 5.0, 10.0, 25.0)
+# Of a tower crane: rope and radius at the start, m.
+PLACES_M = ((10.0, 40.0), (30.0, 20.0), (30.0, 40.0), (30.0, 60.0), (50.0, 40.0))
+# The rope that a filter is made for which follows none.
+_FOR_M = {OVERHEAD: 8.0, TOWER: 20.0, LUFFING: 8.0}
+_LUFFING_ROPES_M, _SEEDS, _RANDOM_S = (4.0, 8.0, 16.0), 3, 30.0
 # Nobody waits longer than a swing to see what is left.
 _LONGEST_LOOK_S = 11.0
 
 
 @dataclass(frozen=True)
 class RopeFilter:
-    """A filter of bridge and trolley.
+    """A filter of the axes that swing the load.
 
     Attributes:
         name: for the table.
@@ -46,24 +69,45 @@ class RopeFilter:
     bypass: bool = False
 
 
-def is_overhead(deployment: Deployment) -> bool:
-    """Whether its axes move a bridge, a trolley or a hoist."""
-    return kind_of(deployment.coordinates.values()) == OVERHEAD
+@dataclass(frozen=True)
+class Work:
+    """Work that each filter does.
+
+    Attributes:
+        name: of its column, such as ``5 m hoisted``.
+        rope_m: the rope at the start.
+        strokes: of the joysticks, by coordinates.
+        radius_m: of a tower crane, at the start.
+    """
+
+    name: str
+    rope_m: float
+    strokes: tuple[Stroke, ...]
+    radius_m: float | None = None
+
+
+def on_rope(deployment: Deployment) -> str | None:
+    """Return the kind of crane where it is one with a rope; else None."""
+    kind = kind_of(deployment.coordinates.values())
+    return kind if kind in ON_ROPE else None
 
 
 def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     """Return what is compared.
 
     Raises:
-        DesignError: bridge or trolley is missing.
+        DesignError: an axis is missing.
     """
     by_coordinate = deployment.by_coordinate
-    if missing := [one for one in (BRIDGE, TROLLEY) if one not in by_coordinate]:
-        raise DesignError(f"expected bridge and trolley in crane, without {missing[0]}")
-    nominal_m = changed_parameters([], deployment).overhead.rope_m
-    by_length = " by length" if is_measured(deployment) else ""
+    kind = kind_of(by_coordinate)
+    axes = [one for one in AXES_OF[kind] if one not in WITHOUT_SWAY]
+    if missing := [one for one in axes if one not in by_coordinate]:
+        names = f"{', '.join(axes[:-1])} and {axes[-1]}"
+        raise DesignError(f"expected {names} in crane, without {missing[0]}")
+    measured = is_measured(deployment)
+    rope_m, by_length = (_FOR_M[kind], " by length") if measured else (_nominal_m(deployment), "")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
-    for axis in (by_coordinate[BRIDGE], by_coordinate[TROLLEY]):
+    for axis in (by_coordinate[one] for one in axes if one not in WITHOUT_SWAY):
         sway = swinging_axis(deployment, axis)[1]
         mode, period_s = sway.mode(), tick_s(deployment, axis)
         taps = [round(tap, 8) for tap in zv_taps(mode, period_s)]
@@ -73,7 +117,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
         gff[axis] = filter_of("gff", a1=2.000001 / omega, a2=1.0 / omega**2)
     return [
         RopeFilter("off", {}, bypass=True),
-        RopeFilter(f"ZVD for {nominal_m:g} m", zvd, rope_m=nominal_m),
+        RopeFilter(f"ZVD for {rope_m:g} m", zvd, rope_m=rope_m),
         RopeFilter(f"ZV{by_length}", zv),
         RopeFilter(f"G_FF{by_length}", gff),
         RopeFilter("the file's", {}),
@@ -85,12 +129,12 @@ def is_measured(deployment: Deployment) -> bool:
     return any(axis.rope for axis in deployment.axes.values())
 
 
-def ropes_m(deployment: Deployment) -> tuple[float, ...]:
-    """Return the ropes with which filters are compared."""
-    if is_measured(deployment):
-        return ROPES_M
-    nominal_m = changed_parameters([], deployment).overhead.rope_m
-    return 0.9 * nominal_m, nominal_m, 1.1 * nominal_m
+def _nominal_m(deployment: Deployment) -> float:
+    """Return the rope of the simulated crane at the start."""
+    rope_m: float = getattr(
+        changed_parameters([], deployment), kind_of(deployment.by_coordinate)
+    ).rope_m
+    return rope_m
 
 
 def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
@@ -110,34 +154,90 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
     return replace(deployment, axes=axes)
 
 
-def tasks(rope_m: float, hoist: bool = True) -> Iterator[tuple[str, list[Stroke]]]:
-    """Kind of work and strokes with this rope: still, or hoisted in travel and after it."""
+def works(deployment: Deployment) -> Iterator[Work]:
+    """What a crane does: with each rope still, or hoisted in travel and after it."""
+    kind = kind_of(deployment.by_coordinate)
+    if kind == TOWER:
+        for rope_m, radius_m in PLACES_M:
+            yield from _of_tower(rope_m, radius_m)
+        return
+    if kind == LUFFING:
+        for rope_m in _LUFFING_ROPES_M:
+            for name, strokes in _of_luffing():
+                yield Work(f"{rope_m:g} m {name}", rope_m, strokes)
+        return
+    nominal_m, hoists = _nominal_m(deployment), HOIST in deployment.by_coordinate
+    wrong = 0.9 * nominal_m, nominal_m, 1.1 * nominal_m
+    for rope_m in ROPES_M if is_measured(deployment) else wrong:
+        for name, *own in _of_bridge(rope_m, hoists):
+            yield Work(f"{rope_m:g} m {name}", rope_m, tuple(own))
+
+
+def _of_bridge(rope_m: float, hoists: bool) -> Iterator[tuple[Any, ...]]:
     up = 1.0 if rope_m >= 4.0 else -1.0
     hoist_s = min(6.0, 1.8 * rope_m - 3.0) if up > 0.0 else 5.0
     travel = Stroke(BRIDGE, 0.5, 6.0, 1.0)
-    both = [travel, Stroke(TROLLEY, 2.0, 5.0, 1.0)]
-    yield "still", [travel]
-    yield "still", [Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)]
-    yield "still", [Stroke(TROLLEY, 0.5, 0.3, 1.0)]
-    yield "still", both
-    if not hoist:
+    both = (travel, Stroke(TROLLEY, 2.0, 5.0, 1.0))
+    yield "still", travel
+    yield "still", Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)
+    yield "still", Stroke(TROLLEY, 0.5, 0.3, 1.0)
+    yield "still", *both
+    if not hoists:
         return
-    yield "hoisted", [*both, Stroke(HOIST, 2.0, hoist_s, up)]
-    yield "hoisted", [travel, Stroke(HOIST, 3.0, 8.0, -1.0)]
-    yield "hoisted", [travel, Stroke(HOIST, 6.7, hoist_s, up)]
+    yield "hoisted", *both, Stroke(HOIST, 2.0, hoist_s, up)
+    yield "hoisted", travel, Stroke(HOIST, 3.0, 8.0, -1.0)
+    yield "hoisted", travel, Stroke(HOIST, 6.7, hoist_s, up)
 
 
-Job = tuple[RopeFilter, float, str, list[Stroke]]
+def _of_tower(rope_m: float, radius_m: float) -> Iterator[Work]:
+    """Slew and trolley at once, each alone, turned round; hoisted in travel and after it."""
+    out = 1.0 if radius_m < 50.0 else -1.0
+    turn, run = Stroke(SLEW, 0.5, 10.0, 1.0), Stroke(NEAR_FAR, 2.5, 8.0, out)
+    back = Stroke(SLEW, 6.5, 6.0, -1.0)
+    still = (
+        (turn, run),
+        (Stroke(SLEW, 0.5, 6.0, 1.0), back, Stroke(NEAR_FAR, 3.0, 6.0, out)),
+        (turn,),
+        (Stroke(NEAR_FAR, 0.5, 0.6, out),),
+    )
+    hoist = 1.0 if rope_m > 20.0 else -1.0
+    hoisted = (
+        (turn, run, Stroke(HOIST, 3.0, 8.0, hoist)),
+        (turn, run, Stroke(HOIST, 10.5, 8.0, hoist)),
+    )
+    for name, each in (("still", still), ("hoisted", hoisted)):
+        for strokes in each:
+            yield Work(f"{rope_m:g} m at {radius_m:g} m {name}", rope_m, strokes, radius_m)
+
+
+def _of_luffing() -> Iterator[tuple[str, tuple[Stroke, ...]]]:
+    """Each axis pressed and turned round, all at once, and a random operator."""
+    for axis, press_s in ((SLEW, 8.0), (LIFT_CYLINDER, 5.0), (EXTENSION, 6.0)):
+        yield "pulse", (Stroke(axis, 0.5, press_s, 1.0),)
+        half_s = 0.5 * press_s + 1.0
+        yield "reversal", (Stroke(axis, 0.5, half_s, 1.0), Stroke(axis, 0.5 + half_s, half_s, -1.0))
+    for luff in (1.0, -1.0):
+        luffs, out = Stroke(LIFT_CYLINDER, 2.0, 4.0, luff), Stroke(EXTENSION, 3.0, 5.0, 1.0)
+        yield "all", (Stroke(SLEW, 0.5, 8.0, 1.0), luffs, out)
+    for seed in range(_SEEDS):
+        yield "random", random_script(seed, _RANDOM_S, LUFFING_AXES).strokes
+
+
+Job = tuple[RopeFilter, Work]
 
 
 def left_deg(deployment: Deployment, job: Job) -> float:
     """Swing that is left of a drive, degrees."""
-    one, rope_m, _, strokes = job
+    (one, work), crane = job, changed_parameters([], deployment)
+    strokes, rope_m = work.strokes, work.rope_m
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
     look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
-    script = Script("rope", tuple(strokes), end_s + look_s).moving(deployment.by_coordinate)
-    crane = changed_parameters([], deployment)
-    crane = replace(crane, overhead=replace(crane.overhead, rope_m=rope_m))
+    script = Script("rope", strokes, end_s + look_s).moving(deployment.by_coordinate)
+    kind, start = kind_of(deployment.coordinates.values()), {"rope_m": rope_m}
+    if work.radius_m is not None:
+        start["start_radius_m"] = work.radius_m
+    changes = {kind: replace(getattr(crane, kind), **start)}
+    crane = replace(crane, **changes)
     recording = drive(_with(deployment, one), script, parameters=crane, bypass=one.bypass)
     assert recording.crane is not None  # of an overhead crane
     swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
@@ -149,18 +249,15 @@ def compare_ropes(
 ) -> dict[str, dict[str, float]]:
     """Largest swing that each filter leaves, degrees, by rope and work, such as ``5 m hoisted``."""
     jobs: list[Job] = [
-        (one, rope_m, work, strokes)
-        for one in rope_filters(deployment)
-        for rope_m in ropes_m(deployment)
-        for work, strokes in tasks(rope_m, HOIST in deployment.by_coordinate)
+        (one, work) for one in rope_filters(deployment) for work in works(deployment)
     ]
-    table: dict[str, dict[str, float]] = {job[0].name: {} for job in jobs}
-    for one, rope_m, work, _ in jobs:
-        table[one.name][f"{rope_m:g} m {work}"] = 0.0
+    table: dict[str, dict[str, float]] = {one.name: {} for one, _ in jobs}
+    for one, work in jobs:
+        table[one.name][work.name] = 0.0
     done = Processes(processes).run(partial(_left, deployment.path), jobs)
-    for count, ((one, rope_m, work, _), left) in enumerate(done, 1):
-        cell, row = f"{rope_m:g} m {work}", table[one.name]
-        row[cell] = max(row[cell], left)
+    for count, ((one, work), left) in enumerate(done, 1):
+        row = table[one.name]
+        row[work.name] = max(row[work.name], left)
         on_progress(count / len(jobs))
     return table
 
