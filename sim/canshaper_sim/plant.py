@@ -48,6 +48,13 @@ HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {
 BOOM_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointVelocity": ("SlewRate", "LiftRate", "ExtensionSpeed"),
 }
+# By machine; every other one has joints.
+_FEEDBACK_OF: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    TIP: FEEDBACK,
+    OVERHEAD: OVERHEAD_FEEDBACK,
+    TOWER: {**HOOK_FEEDBACK, **FEEDBACK},
+    LUFFING: {**BOOM_FEEDBACK, **HOOK_FEEDBACK, **FEEDBACK},
+}
 
 # Frames of a valve that are kept once read.
 MOST_KNOWN = 4096
@@ -174,13 +181,7 @@ class PlantNode:
         name = machine_for(deployment.coordinates.values(), machine)
         problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
-        self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
-        if name == OVERHEAD:
-            self._feedback = OVERHEAD_FEEDBACK
-        elif name == TOWER:
-            self._feedback = {**HOOK_FEEDBACK, **FEEDBACK}
-        elif name == LUFFING:
-            self._feedback = {**BOOM_FEEDBACK, **HOOK_FEEDBACK, **FEEDBACK}
+        self._feedback = _FEEDBACK_OF.get(name, {**JOINT_FEEDBACK, **FEEDBACK})
         self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
         measured = [motion.radius for motion in deployment.motions.values()]
