@@ -1,4 +1,4 @@
-"""What a second process brings a campaign, and what its memory does over the drives.
+"""Speed-up of a campaign by a second process, and its memory over the drives.
 
 The same drives of a shipped deployment in turn by one process and by two. Efficiency by the clock
 is the time of one over twice that of two: true where nothing else runs. By the processor it is

@@ -1,4 +1,4 @@
-"""What a request on the control socket costs the loop: good ones, and nonsense of 4 kB.
+"""Cost of a request on the control socket to the loop: good ones, and nonsense of 4 kB.
 
 The time of one ``serve`` with one request that waits: to read it, answer it and send the answer.
 """

@@ -143,7 +143,7 @@ def measure(name: str) -> Measured:
 
 
 def measured_all(names: Sequence[str]) -> tuple[dict[str, Measured], dict[str, str]]:
-    """What the benchmarks printed, by name; those that failed, with the reason."""
+    """Output of the benchmarks, by name; those that failed, with the reason."""
     results, failed = {}, {}
     for number, name in enumerate(names, 1):
         progress(f"[{number}/{len(names)}] {name}")
@@ -158,7 +158,7 @@ def measured_all(names: Sequence[str]) -> tuple[dict[str, Measured], dict[str, s
 
 
 def change(then: str, now: str) -> str | None:
-    """What moved in a cell: per cent of its number beyond 10, or ``new`` for other text."""
+    """Change of a cell: per cent of its number beyond 10, or ``new`` for other text."""
     (text, old), (new_text, new) = (NUMBER.fullmatch(cell).groups() for cell in (then, now))  # type: ignore[union-attr]
     if text != new_text or (old is None) != (new is None):
         return "new"

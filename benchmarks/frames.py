@@ -63,7 +63,7 @@ FIGURES = (
 
 @dataclass
 class Result:
-    """What one gateway did, us."""
+    """Latencies of one gateway, us."""
 
     title: str
     times: list[float]

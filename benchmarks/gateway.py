@@ -1,4 +1,4 @@
-"""What a gateway in the line adds to a frame, next to other gateways, in virtual time.
+"""Time that a gateway in the line adds to a frame, next to other gateways, in virtual time.
 
 A joystick on vcan0 sends both joystick messages every 20 ms, an ECU listens on vcan1, and frames of
 somebody else pass too. The joystick's period is a little longer than the daemon's tick, so that its

@@ -46,7 +46,7 @@ FIGURES = (Figure("lateness under load, p99.9, tick of 1 ms, virtual us", PEER, 
 
 @dataclass
 class Ticks:
-    """What a loop did in one condition: ns."""
+    """Lateness of a loop in one condition, ns."""
 
     title: str
     late: list[int] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What the real-time benchmarks share: machine with virtual time, deployments, processes.
+"""Common to the real-time benchmarks: machine with virtual time, deployments, processes.
 
 Latency is counted in virtual time: the benchmark runs in the lane of the HIL tests with
 ``--bench``, where one executed instruction, of the kernel too, takes one nanosecond. The figures
@@ -75,7 +75,7 @@ def running(
 
 
 def _policy(fifo: int | None) -> list[str]:
-    """What starts a command with a FIFO priority, or with the ordinary policy, whatever ours is."""
+    """Words before a command that give it a FIFO priority, or the ordinary policy."""
     return ["chrt", "-o", "0"] if fifo is None else ["chrt", "-f", str(fifo)]
 
 
@@ -103,7 +103,7 @@ def _worked_ns(pid: int) -> int:
 
 @contextmanager
 def load(directory: Path, kinds: Sequence[str]) -> Iterator[Callable[[], bool]]:
-    """What else may run on a machine PC, at ordinary priority.
+    """Other load of a machine PC, at ordinary priority.
 
     Args:
         directory: where the writer writes.

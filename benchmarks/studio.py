@@ -1,4 +1,4 @@
-"""What the live page costs: pictures a second, and how late the daemon is with and without it.
+"""Cost of the live page: pictures a second, and how late the daemon is with and without it.
 
 Two daemons and two cranes on udp_multicast as ``canshaper studio`` starts them, with joysticks that
 move all the time, for so many seconds without a page, then with both cranes in a headless Chromium,
@@ -71,7 +71,7 @@ INTERVALS = """(ms) => new Promise((done) => {
 
 @dataclass
 class Condition:
-    """What was measured in one condition."""
+    """Figures of one condition."""
 
     late_us: list[float] = field(default_factory=list)
     missed: int = 0

@@ -5,7 +5,8 @@ python-can's ``virtual`` one, so that no kernel time is counted. The gateway onl
 decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status; it
 is timed with the gate in front of the bus, and without. What the black box adds is timed
 without a bus: in the tick, behind it, and for the state that it keeps every ten seconds. So is what
-the two-axis motion adds to forwarder-robust.yaml, with both joysticks moved all the time.
+the two-axis motion and its aim point add to forwarder-robust.yaml, with both joysticks moved all
+the time; of the aim point, which is not sent in every tick, the mean.
 Each is timed tick by tick, in turn, in one run, by processor time.
 
     python benchmarks/tick.py [--ticks 5000]
@@ -101,7 +102,7 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
 
 
 def daemon(controller: Controller, port: Port, *, gated: bool) -> Callable[[int], None]:
-    """What the daemon does in a tick."""
+    """Work of the daemon in a tick."""
     driven = Guarded(controller) if gated else controller
 
     def body(now_ns: int) -> None:
@@ -158,11 +159,24 @@ def black_box(one: Deployment, other: Deployment, ticks: int) -> tuple[float, fl
 
 
 def two_axis_motion(ticks: int) -> None:
-    """Measure and print what slew and near-far cost as one motion."""
-    deployment = load_deployment(data_directory() / "config" / "forwarder-robust.yaml")
-    apart = deployment.config.model_copy(update={"motion": {}})
-    alone = replace(deployment, config=apart, motions={})
-    with_motion, without = Controller(deployment), Controller(alone)
+    """Measure and print what slew and near-far cost as one motion, and their aim point."""
+    whole = load_deployment(data_directory() / "config" / "forwarder-robust.yaml")
+    apart = whole.config.model_copy(update={"motion": {}})
+    alone = replace(whole, config=apart, motions={})
+    motions = {name: replace(one, aim=None) for name, one in whole.motions.items()}
+    aimless = replace(whole, motions=motions)
+    with_it, without = map(statistics.median, ticks_of_both(aimless, alone, ticks))
+    print(f"two-axis motion: {with_it - without:.1f} us more in a tick of {without:.0f} us")
+    with_it, without = map(statistics.mean, ticks_of_both(whole, aimless, ticks))
+    more = with_it - without
+    print(f"aim point: {more:.1f} us more in a tick of {without:.0f} us, {more / without:.1%}")
+
+
+def ticks_of_both(
+    deployment: Deployment, other: Deployment, ticks: int
+) -> tuple[list[float], list[float]]:
+    """Times of the ticks of two deployments of one crane, us; the first one drives it."""
+    controllers = Controller(deployment), Controller(other)
     strokes = []
     for begin_s in range(0, int(ticks * 0.02), 8):
         for axis, level in (("slew", 1.0), ("near_far", 0.7)):
@@ -170,26 +184,28 @@ def two_axis_motion(ticks: int) -> None:
             strokes.append(Stroke(axis, begin_s + 4.1, 3.0, -level))
     joysticks = JoystickNode(deployment, Script("both", tuple(strokes), ticks * 0.02 + 8.0))
     plant = PlantNode(deployment)
-    spent: tuple[list[int], list[int]] = [], []
-    both = tuple(zip((with_motion, without), spent, strict=True))
+    spent: tuple[list[float], list[float]] = [], []
+    both = tuple(zip(map(Guarded, controllers), spent, strict=True))
     measured: list[Frame] = []
     gc.collect()
     for i in range(ticks):
         frames, now_ns = [*measured, *joysticks.frames(i * 20)], i * 20_000_000
-        for controller, times in both[:: 1 if i % 2 else -1]:
-            for frame in frames:
-                controller.receive(frame, now_ns)
+        sent: list[Frame] = []
+        for driven, times in both[:: 1 if i % 2 else -1]:
             start = clock()
-            sent = list(controller.tick(now_ns))
-            times.append(clock() - start)
+            for frame in frames:
+                driven.receive(frame, now_ns)
+            frames_of_tick = [*driven.tick(now_ns)]
+            times.append((clock() - start) / 1e3)
+            if times is spent[0]:
+                sent = frames_of_tick
+        for frame in sent:
+            plant.receive(frame)
+        for controller in controllers:
             controller.events.clear()
-            if controller is with_motion:
-                for frame in sent:
-                    plant.receive(frame)
         plant.advance(0.02)
         measured = plant.feedback()
-    whole, bare = (statistics.median(times) / 1e3 for times in spent)
-    print(f"two-axis motion: {whole - bare:.1f} us more in a tick of {bare:.0f} us without a bus")
+    return spent
 
 
 def print_rows(ticks: int, spent: dict[str, list[int]]) -> None:

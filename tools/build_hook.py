@@ -1,4 +1,4 @@
-"""What is built before a wheel or a source distribution, and lies in both: the site, manual pages.
+"""Builds site and manual pages before a wheel or a source distribution, which both have them.
 
 An installation from a checkout in which neither was built goes without them.
 """

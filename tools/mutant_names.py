@@ -51,7 +51,7 @@ def numbered(changes: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def operator(before: str, after: str) -> tuple[str, Place]:
-    """What was done to a function, and where."""
+    """Change of a function, and where it is."""
     old, new = tokens(before), tokens(after)
     changed = [pair for pair in zip(old, new, strict=False) if pair[0].string != pair[1].string]
     place = changed[0][0].start if changed else old[-1].start

@@ -20,7 +20,7 @@ def _git(*words: str) -> str:
 
 
 def _next(tag: str, commits: str, commit: str) -> str:
-    """What comes after a tag: development versions of the next one stand before it."""
+    """Version after a tag: development versions of the next one stand before it."""
     if commits == "0":
         return tag
     *first, last = tag.split(".")

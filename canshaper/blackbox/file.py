@@ -109,10 +109,10 @@ def _checked(header: dict[str, Any]) -> dict[str, Any]:
 
 
 def _segment(read: Any, head: bytes) -> BoxSegment:
-    """The next segment.
+    """Read the rest of the segment that begins with this head.
 
     Raises:
-        ValueError: what is wrong with it.
+        ValueError: it is cut off, or its lengths or its checksum are wrong.
     """
     if len(head) < HEAD.size:
         raise ValueError("the file is cut off")

@@ -21,6 +21,7 @@ from canshaper_sim.axes import ALL_AXES, JOINTS, LUFFING, NEAR_FAR, ON_ROPE, OVE
 from canshaper_sim.crane import FULL_SPEEDS, CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple, Sway
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import DWELL_S
 from canshaper_sim.strokes import Script
@@ -92,7 +93,9 @@ def draw_drive(
         Draw(one) for one in np.random.SeedSequence(seed).spawn(5)
     )
     crane, axes = driven_axes(deployment)
-    parameters, factors = _crane(of_crane, axes, ranges, nominal or CraneParameters())
+    parameters, factors = _crane(
+        of_crane, axes, ranges, nominal or changed_parameters([], deployment)
+    )
     parameters, of_places = _place(of_place, axes, ranges, parameters, seed)
     swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
     operator = of_operator.one_of([*OPERATORS])

@@ -13,6 +13,7 @@ from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
 from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY, kind_of
 from canshaper_sim.crane import CraneParameters, CraneState
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
@@ -30,7 +31,7 @@ def measured_drive(
     the controller makes a frame, only what was asked and what the limits are.
     """
     setting = draw_drive(deployment, seed, ranges, nominal)
-    drive = _Drive(deployment, setting, nominal or CraneParameters())
+    drive = _Drive(deployment, setting, nominal or changed_parameters([], deployment))
     raw = None if setting.fault else _Drive(deployment, setting, drive.nominal, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {

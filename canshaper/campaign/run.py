@@ -86,7 +86,7 @@ def _loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deploymen
 def drive_all(source: Source, seeds: Seeds) -> list[Row]:
     """Draw, drive and measure each of some drives."""
     deployment = source.load()
-    nominal = changed_parameters([*source.changes])
+    nominal = changed_parameters([*source.changes], deployment)
     return [measured_drive(deployment, seed, source.ranges, nominal) for seed in seeds]
 
 

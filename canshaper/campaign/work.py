@@ -117,7 +117,8 @@ def learn(source: Source, set_up: SetUp) -> tuple[Known, ...]:
         CampaignError: it has no tip that slew and near-far move, or they do not move it.
         ConfigError: the deployment does not fit the machine.
     """
-    deployment, nominal = set_up.deployment(source), changed_parameters([*source.changes])
+    deployment = set_up.deployment(source)
+    nominal = changed_parameters([*source.changes], deployment)
     crane, axes = driven_axes(deployment)
     if not {*AXES} <= {*axes} or HOIST in axes:
         text = f"expected axes {' and '.join(AXES)}, got {', '.join(axes)}"
@@ -149,7 +150,7 @@ def do_work(
 ) -> list[Move]:
     """Do one working cycle, or its first moves; ``on_frame`` gets all frames, with times in s."""
     deployment = work.set_up.deployment(source)
-    nominal = changed_parameters([*source.changes])
+    nominal = changed_parameters([*source.changes], deployment)
     at, tick_s = places(nominal, work.seed), deployment.config.tick_ms / 1000.0
     joysticks = _Joysticks("work", (), (MOVES + 1) * (_GRIP_S + LIMIT_S))
     options: DriveOptions = {

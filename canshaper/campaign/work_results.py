@@ -270,7 +270,8 @@ def figure(source: Source, works: Sequence[Work]) -> "Figure":
     drives: list[tuple[CraneTrace, Sequence[range]]] = []
     panel = fig.add_axes((0.45, 0.16, 0.53, 0.76))
     for work, colour in zip(works, (style.RAW_COLOUR, style.SHAPED_COLOUR), strict=True):
-        recorder = Recorder(source.load(), changed_parameters([*source.changes]))
+        deployment = source.load()
+        recorder = Recorder(deployment, changed_parameters([*source.changes], deployment))
         do_work(source, work, recorder.receive, 2)
         recording = recorder.recording()
         if crane := recording.crane:

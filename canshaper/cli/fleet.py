@@ -163,7 +163,7 @@ def identified(
             row[name] = value.value if value else None
             row[f"{name}_half"] = value.half if value else None
         rows.append(
-            {**row, "usable": one.usable, "why": "; ".join(one.poor), "notes": [*one.notes]}
+            {**row, "usable": one.usable, "why": "; ".join(one.problems), "notes": [*one.notes]}
         )
     return rows
 

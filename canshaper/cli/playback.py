@@ -94,7 +94,7 @@ def _log(
                     own=bool(own),
                     channels=channels_of(channels),
                     window=window,
-                    parameters=changed_parameters([*changes]),
+                    parameters=changed_parameters([*changes], deployments[0].deployment),
                     progress=on_progress,
                 )
 
@@ -117,7 +117,7 @@ def _drives_of_campaign(
     deployments = [loader(one)() for one in (file, *others)]
     for other in deployments[1:]:
         check_same_axes(deployments[0], other)
-    nominal, named = changed_parameters([*changes]), _named(deployments)
+    nominal, named = changed_parameters([*changes], deployments[0]), _named(deployments)
     titles = {seed: f"drive {seed}" for seed in seeds}
     if folder:
         titles |= _worst(folder, deployments[0], changes)

@@ -107,7 +107,7 @@ def contrary(
 
 
 def flag_fault(key: str, name: str) -> bool:
-    """Whether a flag is neutral by its name where it should have a direction, or has one."""
+    """Whether the name of a flag says neutral where ``key`` is a direction, or the contrary."""
     text = words(name)
     neutral = bool(_NEUTRAL.search(text))
     return neutral not in (bool(_SIGN.search(text)), key == "neutral")

@@ -1,18 +1,12 @@
-"""The robust shaper of an axis: designed for its swing in the file, shown, and written there."""
+"""The robust shaper of an axis: designed for its swing in the file, or for each load."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from canshaper.commissioning.filter_file import write_filters
-from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import Filter, designed, filter_of
 from canshaper.config.limits import Sway
-from canshaper.config.source import Place
 from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.evaluate import (
     LENGTHS_PCT,
@@ -23,19 +17,15 @@ from canshaper.design.tuning.evaluate import (
     shaper_of,
 )
 from canshaper.design.tuning.formulation import check_swing
-from canshaper.design.tuning.modes import SecondMode, second_mode, second_residual
+from canshaper.design.tuning.modes import SecondMode, second_mode
 from canshaper.design.tuning.robust import LEAST_TAP, RobustShaper, least_residual, shortest
 from canshaper.design.tuning.verdict import GOOD, Verdict, judge
 from canshaper.edit.edit import shortened
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
-from canshaper.report.console import new_table
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 # Least taps of a shaper for a range: with a smaller one less of the swing is left, and a tap of the
 # joystick may be several movements. Through the limits the smallest is not always the best.
@@ -46,6 +36,76 @@ _LONGER = (1.15, 1.3, 1.5, 2.0)  # times the duration of a shaper that leaves to
 _MOST_TAPS = max(one.entries[1] for one in KINDS["robust"].parameters if one.entries)
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
+# So long the responses for several loads are alike: a load that is known so late in a movement
+# changes no output. It costs the longer ones next to nothing.
+_ALIKE_S = 0.5
+
+
+@dataclass(frozen=True)
+class RobustTask:
+    """Requirements of a shaper.
+
+    Attributes:
+        bound: its axis.
+        at: number of its breakpoint in the gain schedule; None for the axis' own filter.
+        mode: the swing.
+        tick_ms: tick of the axis.
+        range_pct: lengths of the pendulum that it covers, +- %.
+        lengths_m: shortest and longest pendulum that it covers, in place of a range.
+        sway: what the file has to have as the swing then, by key.
+        second: a second mode that it covers too.
+    """
+
+    bound: BoundAxis
+    at: int | None
+    mode: SwayMode
+    tick_ms: int
+    range_pct: float
+    lengths_m: tuple[float, float] | None = None
+    sway: dict[str, float] = field(default_factory=dict)
+    second: SecondMode | None = None
+
+    @property
+    def tick_s(self) -> float:
+        """Tick of the axis."""
+        return self.tick_ms / 1000.0
+
+    @property
+    def rate_per_s(self) -> float:
+        """Rate of the valve, full speeds per second."""
+        return self.bound.config.limits.slowest_per_s
+
+    def requirements(self) -> dict[str, Any]:
+        """Arguments of ``least_residual`` and ``shortest``."""
+        names = "tick_s", "range_pct", "rate_per_s", "second"
+        return {name: getattr(self, name) for name in names}
+
+    def machine(self, tail_s: float = 0.0) -> Machine:
+        """Valve and limits of the axis, with such a tail where that of the file is shorter."""
+        own = Machine.of(self.bound)
+        return replace(own, limits=replace(own.limits, tail_s=max(own.limits.tail_s, tail_s)))
+
+    def section(self, shaper: RobustShaper) -> dict[str, Any]:
+        """The filter section of the file."""
+        designed_for: dict[str, Any] = {
+            **designed(self.mode),
+            "length_range_pct": self.range_pct,
+            "duration_s": round(shaper.duration_s, 4),
+            "valve_rate_per_s": self.rate_per_s,
+        }
+        if second := self.second:
+            covers = {"length_range_pct": second.range_pct}
+            designed_for["second"] = {**designed(second.mode), **covers}
+        return {
+            "kind": "robust",
+            "tick_ms": self.tick_ms,
+            "taps": shortened([round(tap, _DIGITS) for tap in shaper.taps]),
+            "designed_for": designed_for,
+        }
+
+    def in_file(self, shaper: RobustShaper) -> ShaperFor:
+        """The shaper as the file describes it, its taps rounded."""
+        return shaper_of(filter_of(**self.section(shaper)), self.tick_s, self.rate_per_s)
 
 
 @dataclass(frozen=True)
@@ -53,39 +113,39 @@ class RobustDesign:
     """A shaper that was designed for an axis.
 
     Attributes:
-        bound: the axis.
-        mode: its swing.
-        tick_s: its tick.
-        range_pct: lengths of the pendulum that it covers, +- %.
+        task: what it was designed for.
         shaper: it.
         measured: what it does through the limits of the machine.
-        section: the filter section of the file.
-        needed_s: tail that it needs, where that of the file is shorter.
         verdict: whether it damps over its range.
-        second: a second mode that it covers too, and the shaper without that.
-        lengths_m: shortest and longest pendulum that it was designed for, in place of a range.
-        sway: what the file has to have as the swing then, by key.
-        at: number of its breakpoint in the gain schedule; None for the axis' own filter.
+        without: what the task gives without its second mode.
     """
 
-    bound: BoundAxis
-    mode: SwayMode
-    tick_s: float
-    range_pct: float
+    task: RobustTask
     shaper: RobustShaper
     measured: Evaluation
-    section: dict[str, Any]
-    needed_s: float | None
     verdict: Verdict
-    second: tuple[SecondMode, RobustShaper] | None = None
-    lengths_m: tuple[float, float] | None = None
-    sway: dict[str, float] = field(default_factory=dict)
-    at: int | None = None
+    without: RobustShaper
+
+    @property
+    def bound(self) -> BoundAxis:
+        """Its axis."""
+        return self.task.bound
+
+    @property
+    def section(self) -> dict[str, Any]:
+        """The filter section of the file."""
+        return self.task.section(self.shaper)
 
     @property
     def chosen(self) -> Filter:
         """The filter as the file describes it."""
         return filter_of(**self.section)
+
+    @property
+    def needed_s(self) -> float | None:
+        """Tail that it needs, where that of the file is shorter."""
+        lasts_s = self.shaper.duration_s
+        return round(lasts_s + 0.1, 1) if self.bound.config.limits.tail_s < lasts_s else None
 
 
 def design_robust(
@@ -119,169 +179,77 @@ def design_robust(
     """
     bound, sway = swinging_axis(deployment, axis)
     sway = sway if at is None else bound.config.gain_schedule[at].sway
-    mode = sway.mode()
-    lengths_pct: Sequence[float] = LENGTHS_PCT
-    changes: dict[str, float] = {}
-    if lengths_m is not None:
-        mode, range_pct, changes = _between(sway, lengths_m)
-        lengths_pct = tuple(part * range_pct for part in (-1.0, -0.5, 0.0, 0.5, 1.0))
-    rate, tail_s = bound.config.limits.slowest_per_s, bound.config.limits.tail_s
     tick_ms = bound.period_ticks * deployment.config.tick_ms
-    tick_s = tick_ms / 1000.0
+    task = RobustTask(bound, at, sway.mode(), tick_ms, range_pct)
+    if lengths_m is not None:
+        task = _between(task, sway, lengths_m)
     if residual_pct is not None and duration_s is not None:
         raise UsageError("expected one of --duration and --residual, got both")
-    requirements: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
-    two = _second(second, mode, tick_s, rate)
+    task = replace(task, second=_second(second, task))
+    mode, tick_s, range_pct = task.mode, task.tick_s, task.range_pct
     swings = _SWINGS_OF_RANGE if lengths_m else _SWINGS
-    duration_s = duration_s or round(swings * mode.period_s / tick_s) * tick_s
-    machine = Machine.of(bound)
+    length_s = duration_s or round(swings * mode.period_s / tick_s) * tick_s
 
-    def design(
-        second: SecondMode | None, least_tap: float, seconds: float | None = None
-    ) -> RobustShaper:
-        if residual_pct is not None and seconds is None:
-            return shortest(mode, residual_pct=residual_pct, second=second, **requirements)
-        given = requirements | {"duration_s": seconds or duration_s, "least_tap": least_tap}
-        return least_residual(mode, second=second, first=first, **given)
+    def design(task: RobustTask, least_tap: float) -> RobustShaper:
+        given = task.requirements()
+        if residual_pct is not None:
+            return shortest(mode, residual_pct=residual_pct, **given)
+        return least_residual(mode, duration_s=length_s, least_tap=least_tap, first=first, **given)
 
-    def in_file(one: RobustShaper) -> tuple[dict[str, Any], ShaperFor]:
-        made = _section(one, mode, requirements, tick_ms, two)
-        return made, shaper_of(filter_of(**made), tick_s, rate)
-
-    def with_tail(tail_s: float) -> Machine:
-        limits = replace(machine.limits, tail_s=max(machine.limits.tail_s, tail_s))
-        return replace(machine, limits=limits)
-
-    def written(one: RobustShaper) -> Machine:
+    def machine(one: RobustShaper) -> Machine:
         """With the tail that is written with a shaper for lengths."""
-        return with_tail(one.duration_s) if lengths_m else machine
+        return task.machine(one.duration_s if lengths_m else 0.0)
 
-    def evaluated(one: RobustShaper) -> Evaluation:
-        return evaluate(mode, tick_s, in_file(one)[1], written(one), lengths_pct)
-
+    lengths_pct = [0.5 * k * range_pct for k in range(-2, 3)] if lengths_m else LENGTHS_PCT
     try:
         check_swing(mode)
-        shapers = [design(two, one) for one in _LEAST_TAPS[: 3 if lengths_m else 1]]
-        without = design(None, LEAST_TAP) if two else shapers[0]
-        measures = [(evaluated(one), one) for one in shapers]
-        measured, shaper = min(measures, key=lambda one: one[0].worst(range_pct))
-        section, shaper_for = in_file(shaper)
-        verdict = judge(mode, tick_s, shaper_for, written(shaper), range_pct)
-        for times in _LONGER if verdict.word != "good" and residual_pct is None else ():
-            seconds = round(times * shaper.duration_s / tick_s) * tick_s
-            if round(seconds / tick_s) + 1 > _MOST_TAPS:
-                break  # of a file
-            shaper_for = in_file(design(two, LEAST_TAP, seconds))[1]
-            left = judge(mode, tick_s, shaper_for, with_tail(seconds + 0.1), range_pct).left
-            if left <= GOOD:
-                verdict = verdict.with_cure(left, f"--duration {seconds:.2g}")
-                break
+        shapers = [design(task, one) for one in _LEAST_TAPS[: 3 if lengths_m else 1]]
+        without = design(replace(task, second=None), LEAST_TAP) if task.second else shapers[0]
+        setups = [(mode, tick_s, task.in_file(one), machine(one)) for one in shapers]
+        measures = [evaluate(*setup, lengths_pct) for setup in setups]
+        best = min(range(len(shapers)), key=lambda k: measures[k].worst(range_pct))
+        shaper, measured = shapers[best], measures[best]
+        verdict = judge(*setups[best], range_pct)
+        if verdict.word != "good" and residual_pct is None:
+            verdict = _with_longer(task, shaper, verdict, first)
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
-    return RobustDesign(
-        bound,
-        mode,
-        tick_s,
-        range_pct,
-        shaper,
-        measured,
-        section,
-        round(shaper.duration_s + 0.1, 1) if tail_s < shaper.duration_s else None,
-        verdict,
-        (two, without) if two else None,
-        lengths_m,
-        changes,
-        at,
-    )
+    return RobustDesign(task, shaper, measured, verdict, without)
 
 
-def _between(
-    sway: Sway, lengths_m: tuple[float, float]
-) -> tuple[SwayMode, float, dict[str, float]]:
-    """The swing in the middle of two lengths, its range in +- %, its keys in the file."""
+def _with_longer(
+    task: RobustTask, shaper: RobustShaper, verdict: Verdict, first: Sequence[float]
+) -> Verdict:
+    """The verdict; the shortest of some longer responses that is good is named in it."""
+    for times in _LONGER:
+        seconds = round(times * shaper.duration_s / task.tick_s) * task.tick_s
+        if round(seconds / task.tick_s) + 1 > _MOST_TAPS:
+            break  # of a file
+        given = task.requirements()
+        longer = least_residual(task.mode, duration_s=seconds, first=first, **given)
+        machine = task.machine(seconds + 0.1)
+        judged = judge(task.mode, task.tick_s, task.in_file(longer), machine, task.range_pct)
+        if judged.left <= GOOD:
+            return verdict.with_cure(judged.left, f"--duration {seconds:.2g}")
+    return verdict
+
+
+def _between(task: RobustTask, sway: Sway, lengths_m: tuple[float, float]) -> RobustTask:
+    """The task for the swing in the middle of two lengths, with its range and its keys."""
     low_m, high_m = lengths_m
     length_m = round(0.5 * (low_m + high_m), 4)
     if sway.length_m is not None:
         changes = {"length_m": length_m}
     else:
-        swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), sway.mode().damping_ratio)
+        swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), task.mode.damping_ratio)
         changes = {"period_s": round(swing.period_s, 4)}
     mode = sway.model_copy(update=changes).mode()
-    return mode, round(50.0 * (high_m - low_m) / length_m, 1), changes
+    range_pct = round(50.0 * (high_m - low_m) / length_m, 1)
+    return replace(task, mode=mode, range_pct=range_pct, lengths_m=lengths_m, sway=changes)
 
 
-def summary_line(one: RobustDesign) -> str:
-    """How long it takes, and what it leaves."""
-    shaper, lengths = one.shaper, f"lengths within ±{one.range_pct:g} %"
-    if one.lengths_m:
-        lengths = "pendulums of {:g} to {:g} m".format(*one.lengths_m)
-    return (
-        f"Robust shaper for {one.bound.name}: {shaper.duration_s:.2f} s, mean delay"
-        f" {shaper.mean_delay_s:.2f} s; alone it leaves at most {100.0 * shaper.residual:.1f} % of"
-        f" the swing at {lengths}."
-    )
-
-
-def print_design(deployment: Deployment, one: RobustDesign, console: Console) -> None:
-    """Print the residuals of a shaper, its cost, and the stopping distance with it."""
-    console.print(summary_line(one))
-    console.print(_table(one))
-    if one.second:
-        console.print(_second_table(one))
-    console.print(f"Verdict: {one.verdict}.", style="bold")
-    print_consequences(deployment, one, console)
-
-
-def print_consequences(deployment: Deployment, one: RobustDesign, console: Console) -> None:
-    """Print the tail that it needs, and the stopping distance with it."""
-    axis = one.bound.name
-    if one.needed_s is not None:
-        tail_s = one.bound.config.limits.tail_s
-        console.print(
-            f"tail_s is {tail_s:g} s: it ends the run-on early; give {axis} at least"
-            f" tail_s: {one.needed_s:.1f}"
-        )
-    console.print(consequences(deployment, axis, one.chosen, one.needed_s))
-
-
-def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
-    """Write designs for an axis into the file; see ``write_filters``."""
-    config, parts = designs[0].bound.config, []
-    for one in designs:
-        place: Place = () if one.at is None else ("gain_schedule", one.at)
-        present = config.filter if one.at is None else config.gain_schedule[one.at].filter
-        gone = dict.fromkeys(present.model_dump(exclude_none=True))
-        parts.append((place, gone | one.section))
-    longest = max(designs, key=lambda one: one.shaper.duration_s)
-    name, sway = longest.bound.name, designs[0].sway
-    return write_filters(deployment, name, parts, longest.needed_s, "robust", sway=sway)
-
-
-def figure(one: RobustDesign) -> "Figure":
-    """The new filter next to that of the file."""
-    from canshaper.design.tuning import robust_plot  # noqa: PLC0415  # pictures alone need it
-
-    rate = one.bound.config.limits.slowest_per_s
-    present = one.bound.config.filter
-    filters = [
-        robust_plot.Candidate("this one", shaper_of(one.chosen, one.tick_s, rate)),
-        robust_plot.Candidate(f"in the file, {present.kind}", shaper_of(present, one.tick_s, rate)),
-    ]
-    return robust_plot.figure(
-        one.bound.name,
-        one.mode,
-        one.tick_s,
-        machine=Machine.of(one.bound),
-        filters=filters,
-        range_pct=one.range_pct,
-    )
-
-
-def _second(
-    text: str | None, first: SwayMode, tick_s: float, rate_per_s: float
-) -> SecondMode | None:
+def _second(text: str | None, task: RobustTask) -> SecondMode | None:
     """Return the second mode of the option --second."""
-
     if text is None:
         return None
     try:
@@ -291,57 +259,33 @@ def _second(
         raise UsageError(f"--second: expected {form}, got {text!r}") from None
     try:
         values = (period_s, damping_ratio, range_pct)
-        return second_mode(first, *values, tick_s=tick_s, rate_per_s=rate_per_s)
+        return second_mode(task.mode, *values, tick_s=task.tick_s, rate_per_s=task.rate_per_s)
     except DesignError as error:
         raise UsageError(f"--second: {error}") from None
 
 
-def _section(
-    shaper: RobustShaper,
-    mode: SwayMode,
-    requirements: dict[str, Any],
-    tick_ms: int,
-    second: SecondMode | None,
-) -> dict[str, Any]:
-    """The filter section of the file."""
+def design_loads(
+    deployment: Deployment, axis: str, *, duration_s: float | None, **options: Any
+) -> list[RobustDesign]:
+    """Design the filter of every breakpoint of an axis, and its own where that is of another kind.
 
-    designed_for: dict[str, Any] = {
-        **designed(mode),
-        "length_range_pct": requirements["range_pct"],
-        "duration_s": round(shaper.duration_s, 4),
-        "valve_rate_per_s": requirements["rate_per_s"],
-    }
-    if second:
-        covers = {"length_range_pct": second.range_pct}
-        designed_for["second"] = {**designed(second.mode), **covers}
-    return {
-        "kind": "robust",
-        "tick_ms": tick_ms,
-        "taps": shortened([round(tap, _DIGITS) for tap in shaper.taps]),
-        "designed_for": designed_for,
-    }
+    ``duration_s`` is for the shortest swing; others get more in proportion. See ``design_robust``.
 
-
-def _table(one: RobustDesign) -> Table:
-
-    measured = one.measured
-    heads = [f"{r.length_pct:+g} %" for r in measured.residuals]
-    if one.lengths_m:
-        middle_m = 0.5 * sum(one.lengths_m)
-        heads = [f"{middle_m * (1.0 + r.length_pct / 100.0):.2f} m" for r in measured.residuals]
-    table = new_table("swing left, %", *heads)
-    table.add_row("through the machine", *(f"{100 * r.machine:.1f}" for r in measured.residuals))
-    table.add_row("shaper alone", *(f"{100 * r.linear:.1f}" for r in measured.residuals))
-    return table
-
-
-def _second_table(one: RobustDesign) -> Table:
-    """Return a table of what a second mode costs and gains."""
-    assert one.second
-    second, without = one.second
-    table = new_table("", "run-on, s", "mean delay, s", "first mode, %", "second mode, %")
-    for name, shaper in (("without --second", without), ("with it", one.shaper)):
-        left = second_residual(shaper.taps, second, one.tick_s)
-        numbers = (f"{shaper.duration_s:.2f}", f"{shaper.mean_delay_s:.2f}")
-        table.add_row(name, *numbers, f"{100.0 * shaper.residual:.1f}", f"{100.0 * left:.1f}")
-    return table
+    Raises:
+        UsageError: there is no gain schedule, or no such shaper.
+    """
+    bound, own = swinging_axis(deployment, axis)
+    config = bound.config
+    if not config.gain_schedule:
+        raise UsageError(f"--loads: expected a gain_schedule with the swing of each load at {axis}")
+    swings: dict[int | None, Sway] = {None: own} if config.filter.kind != "robust" else {}
+    swings |= {i: one.sway for i, one in enumerate(config.gain_schedule)}
+    periods_s = {at: sway.mode().period_s for at, sway in swings.items()}
+    first: Sequence[float] = ()
+    designs = []
+    for at, period_s in sorted(periods_s.items(), key=lambda one: one[1]):
+        lasts_s = duration_s and duration_s * period_s / min(periods_s.values())
+        one = design_robust(deployment, axis, at=at, duration_s=lasts_s, first=first, **options)
+        first = first or one.shaper.taps[: round(_ALIKE_S / one.task.tick_s)]
+        designs.append(one)
+    return designs

@@ -87,7 +87,7 @@ class Match(Section):
         return self
 
     def may_be(self, other: "Match") -> bool:
-        """Whether both name an adapter, and nothing in them distinguishes two of its channels."""
+        """Whether both may mean one device: the same adapter, its channels not told apart."""
         keys = ("serial", "path", "port")
         both = [(getattr(self, key), getattr(other, key)) for key in keys]
         return any(one is not None and one == two for one, two in both[:2]) and all(

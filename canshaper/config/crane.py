@@ -8,7 +8,18 @@ from pydantic import Field
 from canshaper.config.section import Section
 
 
-class CylindricalCrane(Section):
+class _Crane(Section):
+    simulated: dict[str, float] = Field(
+        {}, description="simulated crane: its parameters by the names of `sim --show`"
+    )
+
+    @property
+    def moved(self) -> dict[str, str]:
+        """Axis by the coordinate that it moves."""
+        return self.model_dump(exclude={"kind", "simulated"}, exclude_none=True)
+
+
+class CylindricalCrane(_Crane):
     """A tip that turns about a pillar, goes out and in, up and down."""
 
     kind: Literal["cylindrical"] = Field(description="the tip about a pillar")
@@ -18,7 +29,7 @@ class CylindricalCrane(Section):
     hoist: str | None = Field(None, description="axis of a rope from it, positive up")
 
 
-class CartesianCrane(Section):
+class CartesianCrane(_Crane):
     """A trolley on a bridge: the load hangs from a rope, each axis moves it along a straight."""
 
     kind: Literal["cartesian"] = Field(description="a trolley on a bridge")
@@ -27,7 +38,7 @@ class CartesianCrane(Section):
     hoist: str | None = Field(None, description="axis of the rope, positive up")
 
 
-class JointCrane(Section):
+class JointCrane(_Crane):
     """A boom whose joints have an axis each."""
 
     kind: Literal["joints"] = Field(description="an axis for each joint of the boom")
@@ -56,6 +67,5 @@ def coordinates(
     """
     if crane is None:
         return {name: name for name in axes if name in _BY_NAME}
-    moved = crane.model_dump(exclude={"kind"}, exclude_none=True)
-    by_axis = {axis: coordinate for coordinate, axis in moved.items()}
+    by_axis = {axis: coordinate for coordinate, axis in crane.moved.items()}
     return {name: by_axis[name] for name in axes if name in by_axis}

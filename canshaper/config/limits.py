@@ -1,13 +1,14 @@
 """Sections of an axis: limits, slewing, its sway, and two axes as one motion."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Callable
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from canshaper.config.inputs import InputSection, NamedCodes, Status
 from canshaper.config.section import Origin, Section, number
 from canshaper.shaping.limits import OutputLimits, ValveCurve
-from canshaper.shaping.rope import Lost
+from canshaper.shaping.states import Lost
 from canshaper.shaping.sway import SwayMode
 
 
@@ -248,6 +249,14 @@ class RopeSection(Position):
         return self
 
 
+_MODE_OF: Final[dict[frozenset[str], Callable[..., SwayMode]]] = {
+    frozenset(("length_m", "damping_nms", "mass_kg")): SwayMode.from_grapple,
+    frozenset(("period_s", "damping_ratio")): SwayMode.from_period,
+    frozenset(("period_s", "decay_per_swing")): SwayMode.from_decay,
+    frozenset(("length_m", "damping_ratio")): SwayMode.from_length,
+}
+
+
 class Sway(Section):
     """Swing of the tool on one axis.
 
@@ -283,19 +292,9 @@ class Sway(Section):
             ValueError: the data is incomplete, given twice, or makes no sense.
         """
         others = {"full_speed_m_s", "origin", "length"}
-        given = self.model_dump(exclude=others, exclude_none=True).keys()
-        if given == {"length_m", "damping_nms", "mass_kg"}:
-            assert self.length_m and self.mass_kg and self.damping_nms is not None
-            return SwayMode.from_grapple(self.length_m, self.damping_nms, self.mass_kg)
-        if given == {"period_s", "damping_ratio"}:
-            assert self.period_s and self.damping_ratio is not None
-            return SwayMode.from_period(self.period_s, self.damping_ratio)
-        if given == {"period_s", "decay_per_swing"}:
-            assert self.period_s and self.decay_per_swing is not None
-            return SwayMode.from_decay(self.period_s, self.decay_per_swing)
-        if given == {"length_m", "damping_ratio"}:
-            assert self.length_m and self.damping_ratio is not None
-            return SwayMode.from_length(self.length_m, self.damping_ratio)
+        given = self.model_dump(exclude=others, exclude_none=True)
+        if make := _MODE_OF.get(frozenset(given)):
+            return make(**given)
         raise ValueError(
             "expected length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
             " and decay_per_swing, or length_m and damping_ratio, got"

@@ -164,7 +164,7 @@ class _Place:
 
     @classmethod
     def of(cls, location: tuple[int | str, ...], schema: type[Section]) -> Self:
-        """Follow a location of pydantic, which also names branches of unions, into the schema."""
+        """The place of a location of pydantic, which also names branches of unions."""
         place = cls(schema)
         for part in location:
             place._enter(part)

@@ -21,9 +21,8 @@ from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason, State, Transition
 
 if TYPE_CHECKING:
-    from canshaper.controller.demands import AxisEnds, SharedFlow
+    from canshaper.controller.demands import AxisEnds, RopeControl, SharedFlow
     from canshaper.controller.parameter_sets import Load
-    from canshaper.controller.rope import RopeControl
 
 NOWHERE: frozenset[str] = frozenset()
 
@@ -156,7 +155,10 @@ class Controller:
             if rule.new_frame():
                 if self._stood_still:  # a frame that has waited is not passed on later either
                     return None
-                stopped = self._stop is not None and self._stop.stops(arrived_ns)
+                if (stop := self._stop) is not None:
+                    for runner in self.axes.values():
+                        runner.see(stop)
+                stopped = stop is not None and stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
                 self.moves = rule.moves
                 return passed
@@ -271,17 +273,14 @@ class Controller:
         self._ends: list[AxisEnds | RopeControl] = []
         self._flow: SharedFlow | None = None
         oil = self.deployment.config.hydraulics
-        if oil or inputs.positions:
+        if oil or inputs.positions or inputs.ropes:
             from canshaper.controller import demands
 
             self._ends = [demands.AxisEnds(self.axes[n], p) for n, p in inputs.positions.items()]
+            self._ends += [demands.RopeControl(n, self.axes[n], v) for n, v in inputs.ropes.items()]
             others = inputs.other_flow
             if oil:
                 self._flow = demands.SharedFlow(oil, self.axes, inputs.joysticks, others, tick_s)
-        if inputs.ropes:
-            from canshaper.controller import rope
-
-            self._ends += [rope.RopeControl(n, self.axes[n], v) for n, v in inputs.ropes.items()]
         self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
         for motion in self.deployment.motions.values():
             if motion.aim:
@@ -302,9 +301,6 @@ class Controller:
 
     def stalled(self) -> None:
         """Distrust every input: the loop stood still for longer than any input may age.
-
-        The next tick also discards what has waited in the sockets. A fault or trip among it still
-        counts, though it may be over by now.
 
         Axes in motion trip. The next tick also invalidates the frames that have waited in the
         sockets until then; a fault or trip in one of them counts, though it may be over by now.

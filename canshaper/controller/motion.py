@@ -80,6 +80,8 @@ class MotionRunner:
         slewing = slew.bound.config.slewing
         assert slewing is not None  # checked with the deployment
         slew.radius = radius
+        if near_far and (one := slew.bound.sway_sensor) and (two := near_far.bound.sway_sensor):
+            near_far.other = slew if one.timing.measured is two.timing.measured else None
         turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]

@@ -18,8 +18,6 @@ from canshaper.shaping.registry import (
     build_shaper,
     position,
 )
-from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.sway import SwayModel
 
 # Shortest time between two changes of one axis: a noisy weight must not keep the loop busy.
 LEAST_BETWEEN_NS = 100_000_000
@@ -27,6 +25,7 @@ LEAST_BETWEEN_NS = 100_000_000
 # axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
 STEADY = 0.02
 STEADY_NS = 200_000_000
+LATE_S = 1.0  # a load is gripped at rest: so soon in a press its signal is late
 # A load is gripped and dropped once in so long; a signal that says so again does not settle.
 SETTLES_NS = 2_000_000_000
 _MOST_JUMPS = 3
@@ -103,9 +102,13 @@ class SetChooser:
         self._not_before_ns = 0
         self._maximum = config.limits.max_pct / 100.0
         self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
+        # What drove the axis in each tick of a press that began at rest; None: in another one.
+        self._driven: list[float] | None = []
+        self._late = round(LATE_S / axis.sway.tick_s) if axis.sway else 0
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
+        self._follow_press()
         name = self.profile.name(now_ns) if self.profile else ""
         if name not in self._programs:
             name = ""
@@ -128,7 +131,21 @@ class SetChooser:
         self.number = self._first[name]
         if steps is not None:
             self.number += 1 + round(steps / STEPS_BETWEEN)
-        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway))
+        past = (self._driven or ()) if name == before else ()
+        options = {"valve_rate_per_s": self._rate, **chosen.parameters}
+        self._axis.retune(
+            chosen.mode, lambda sway: build_shaper(chosen.kind, sway.tick_s, sway, **options), past
+        )
+
+    def _follow_press(self) -> None:
+        """Remember what drove the axis in the last tick, in its first press since rest."""
+        axis, driven = self._axis, self._driven
+        if not axis.output.commanded:
+            self._driven = []
+        elif driven is not None:
+            driven.append(axis.applied)
+            if axis.command == 0.0 or len(driven) > self._late:
+                self._driven = None
 
     def _steady(self, now_ns: int) -> bool:
         """Whether another profile may be taken now."""
@@ -140,11 +157,6 @@ class SetChooser:
         if off > STEADY or self._restless_ns is None:
             self._restless_ns = now_ns
         return now_ns - self._restless_ns >= STEADY_NS
-
-    def _shaper(self, chosen: ParameterSet, sway: SwayModel) -> Shaper:
-        return build_shaper(
-            chosen.kind, sway.tick_s, sway, valve_rate_per_s=self._rate, **chosen.parameters
-        )
 
 
 def profile_by_number(bound: BoundAxis) -> list[str]:

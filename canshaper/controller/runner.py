@@ -54,6 +54,7 @@ class AxisControl:
             unit.
         added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
         radius: measured radius of the tip of an axis that slews, where that is known.
+        other: the axis that makes this one swing, where both have sway sensors of one kind.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         fault: what was wrong with the last setpoint that could not be encoded; for the log.
@@ -97,6 +98,7 @@ class AxisControl:
         self.room = -math.inf, math.inf
         self.displaced = 0.0
         self.run_on: RunOn | None = None
+        self.other: AxisControl | None = None
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
@@ -263,7 +265,9 @@ class AxisControl:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.new_value(), self._scale(now_ns)
-            axis.sensed.measure(value, scale, commanded=axis.output.commanded, damps=self.damps)
+            commanded, damps, other = axis.output.commanded, self.damps, self.other
+            shown = other.own_swing(now_ns) if other and damps else None
+            axis.sensed.measure(value, scale, commanded=commanded, damps=damps, other=shown)
         transition = axis.act(command, self.added, damps=self.damps)
         try:
             self._put(self.valve.raw, axis.output.steps)
@@ -313,6 +317,11 @@ class AxisControl:
             self._full_speed_m_s = max(radius_m, LEAST_RADIUS_M) * slewing.full_speed_rad_s
         assert self.axis.sway is not None
         return self.axis.sway.mode.angle_per_speed_rad * self._full_speed_m_s
+
+    def own_swing(self, now_ns: int) -> float | None:
+        """What its sway sensor would show by its own motion, rad or rad/s; None without one."""
+        sensed = self.axis.sensed
+        return sensed.own(self._scale(now_ns)) if sensed else None
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""

@@ -82,7 +82,7 @@ class Processes:
                         ends = yield from self._drain(pool, work, queue, interrupted)
                     except BaseException:
                         for process in multiprocessing.active_children():
-                            process.terminate()
+                            process.kill()  # what was forked may have a handler for SIGTERM
                         pool.shutdown(cancel_futures=True)
                         raise
 

@@ -147,7 +147,7 @@ def drive_on_bus(
     Raises:
         DriveError: a process ended early or does not answer.
     """
-    recorder = Recorder(deployment, changed_parameters(changes))
+    recorder = Recorder(deployment, changed_parameters(changes, deployment))
     valves = {axis.valve_message.name for axis in deployment.axes.values()}
     sets = [word for change in changes for word in ("--set", change)]
     with tempfile.TemporaryDirectory() as logs:

@@ -84,13 +84,6 @@ def of_limits(name: str, axis: AxisSection, values: Mapping[str, Any]) -> Change
     return ("axes", name), {"limits": values}, ""
 
 
-def set_values(
-    path: Path, place: Place, values: Mapping[str, FileValue], note: str = ""
-) -> list[str]:
-    """Write values into a section of a deployment file; see ``change``."""
-    return change(path, [(place, values, note)])
-
-
 def change(path: Path, changes: Iterable[Change]) -> list[str]:
     """Write values into sections of a deployment file, all of them or none.
 
@@ -144,7 +137,7 @@ def _changed(before: str, after: str) -> Iterator[str]:
 def edited(
     text: str, place: Place, values: Mapping[str, FileValue], name: str = "", note: str = ""
 ) -> str:
-    """Return the text of a YAML file with values of one section changed; see ``set_values``.
+    """Return the text of a YAML file with values of one section changed; see ``change``.
 
     Raises:
         ConfigError: the section cannot be changed; ``name`` is the file it names.

@@ -110,7 +110,8 @@ class Edit:
 
     def insert(self, pairs: list[tuple[str, str]]) -> None:
         """Put keys in: where a removed one stood, or behind the last one."""
-        between = ", " if self._flow else self._newline + self._indent()
+        indent = " " * int(self._pairs[0][0].start_mark.column)
+        between = ", " if self._flow else self._newline + indent
         text = between.join(f"{key}: {value}" for key, value in pairs)
         for i in self._removed:
             start, end = self._pairs[i][0].start_mark.index, self._span(self._pairs[i][1])[1]
@@ -135,9 +136,6 @@ class Edit:
         for start, end, new in sorted(self._spans, reverse=True):
             result = result[:start] + new + result[end:]
         return result
-
-    def _indent(self) -> str:
-        return " " * int(self._pairs[0][0].start_mark.column)
 
     def _span(self, node: yaml.Node) -> tuple[int, int]:
         """Where a value stands; the parser ends a block at what follows it."""

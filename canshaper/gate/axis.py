@@ -203,7 +203,8 @@ class AxisState(AxisInput):
             self._rests(passed, made)
             return
         size, held = abs(velocity), self.held_at(velocity)
-        asked, reach = (self.forth, self.most) if velocity > 0.0 else (self.back, -self.least)
+        asked, other = (self.forth, self.back) if velocity > 0.0 else (self.back, self.forth)
+        reach = self.most if velocity > 0.0 else -self.least
         fallen = self.fallen(velocity, min(passed, 1) if of.forwarded else passed)
         self.way += velocity * of.period_s
         self.alone += 1
@@ -214,7 +215,10 @@ class AxisState(AxisInput):
         on = self.way_back - of.fall * passed if velocity * last > 0.0 else 0.0
         self.way_back = max(on, held + of.step)
         if size > min(fallen, self.way_back) + EPSILON:
-            asked.remaining -= size * of.period_s * passed
+            way = size * of.period_s * passed
+            asked.remaining -= way
+            if of.added:  # to and fro: what ran beyond on the other side is given back
+                other.remaining = max(min(other.remaining + way, 0.0), other.remaining)
         self.top = size + of.step
         if size > reach + EPSILON:  # on its way back, by the fall with each frame
             self.top = min(self.top, max(reach, fallen))

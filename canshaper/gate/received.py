@@ -103,12 +103,7 @@ class Received:
         self.good_ns, self.intact_ns = None, NEVER
 
     def carry_over(self, before: "Received", *, missed: bool) -> None:
-        """Go on where the same message was before a reload; its values have to come again.
-
-        Args:
-            before: that message.
-            missed: its bus was closed meanwhile.
-        """
+        """Go on where it was before a reload; ``missed`` where its bus was closed meanwhile."""
         self.source, self.source_ns = before.source, before.source_ns
         self.intact_ns = NEVER if missed else before.intact_ns
         if self.of.protection == before.of.protection:

@@ -4,7 +4,7 @@ from typing import Protocol, Self
 
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.input import GOOD, Input, Raw, Switch
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.shaping.states import CommandInput, Reason
 
 _new = tuple.__new__  # CommandInput(...) in half the time
@@ -24,6 +24,7 @@ class JoystickInput(Input):
 
     Attributes:
         pressed: the switch to press, where it is in another message.
+        releases: number of frames that showed its own switch released, accepted or not.
         presses: how often its button for the next profile was pressed.
         commands: its velocities in the last frame that counted, or why there is none, by signal.
     """
@@ -41,7 +42,7 @@ class JoystickInput(Input):
         self._next = config.next_profile
         self._frozen_ns = round(config.stuck_s * 1e9)
         self._changed_ns: dict[str, int] = {}
-        self._releases = self.presses = 0
+        self.releases = self.presses = 0
         self._next_held = True  # what is held when it is first seen was not pressed
         self._released = False
         self._doubted = 0  # number of the last release in a frame that does not count
@@ -49,11 +50,6 @@ class JoystickInput(Input):
     def watch(self, signal: str) -> Switch:
         """Watch another switch in its message, which enables it or another joystick."""
         return self._switches.setdefault(signal, Switch(self, signal, 1))
-
-    @property
-    def released(self) -> bool:
-        """Whether enable is released, by the last frame that says so or says otherwise."""
-        return self._released if self.pressed is None else self.pressed.released
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """Note since when each joystick is where it is; codes that are no measurement are a fault.
@@ -64,10 +60,10 @@ class JoystickInput(Input):
             switch.on_frame(raw, accepted)
         enable = 1 if self._enable is None else raw[self._enable]
         if enable == 0:
-            self._releases += 1
+            self.releases += 1
             self._released = True
             if not accepted:
-                self._doubted = self._releases
+                self._doubted = self.releases
         elif accepted:
             self._released = False
         if not accepted:
@@ -117,7 +113,7 @@ class JoystickInput(Input):
             neutral_band: |joystick| up to which it counts as neutral and may stand still forever.
         """
         pressed = self.pressed
-        known = self._releases if pressed is None else pressed.releases
+        known = self.releases if pressed is None else pressed.releases
         now_released = self._released if pressed is None else pressed.released
         released = now_released or known > releases
         if pressed is not None and (gone := pressed.lost(now_ns)):

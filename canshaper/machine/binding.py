@@ -33,7 +33,6 @@ from canshaper.machine.deployment import Deployment, bind_motions
 from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, bind_status, filter_lines
 from canshaper.machine.inputs import (
-    BoundJoystick,
     BoundValue,
     Choosing,
     bind_emergency_stop,
@@ -41,6 +40,7 @@ from canshaper.machine.inputs import (
     bind_switch,
 )
 from canshaper.machine.joysticks import (
+    BoundJoystick,
     bind_joystick,
     bind_switches,
     check_conditions,
@@ -118,7 +118,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
 def _check_crane(lookup: Lookup) -> None:
     """Check that each coordinate of the crane has an axis of its own."""
     crane, taken = lookup.config.crane, dict[str, str]()
-    for key, name in crane.model_dump(exclude={"kind"}, exclude_none=True).items() if crane else ():
+    for key, name in crane.moved.items() if crane else ():
         place = ("crane", key)
         if lookup.diagnostics.check_axis(place, name, lookup.config.axes):
             if name in taken:

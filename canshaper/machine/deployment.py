@@ -19,8 +19,8 @@ from canshaper.config.source import Place, Source
 from canshaper.machine.buses import BusLoad, bus_load
 from canshaper.machine.database import Messages
 from canshaper.machine.identity import Identity, bind_status
-from canshaper.machine.inputs import Bound, BoundJoystick, BoundValue, Choosing, bind_radius
-from canshaper.machine.joysticks import BoundSwitches
+from canshaper.machine.inputs import Bound, BoundValue, Choosing, bind_radius
+from canshaper.machine.joysticks import BoundJoystick, BoundSwitches
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.routing import Key, Routing, build_routing
 from canshaper.machine.used_message import NamedCode, StartValue

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from cantools.database.can import Message, Signal
 
@@ -10,17 +10,14 @@ from canshaper.codec.frame import NULL, at_every_priority, has_destination, with
 from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.message import Protection
 from canshaper.codec.signals import LENGTHS, ends_fault, find_signal, radius_range
-from canshaper.codec.velocity import Velocity
-from canshaper.config.enable import Condition
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Ends, OtherFlow, Position, Radius, RopeSection
-from canshaper.config.schema import EmergencyStop, FeedbackSection, Joystick, StatusWord
+from canshaper.config.schema import EmergencyStop, FeedbackSection, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
 from canshaper.machine.used_message import ENABLE, STOP, UsedMessage, key_path
-from canshaper.shaping.states import Reason
 
 Choosing = LoadState | ProfileSwitch
 """Sections of the load state, and of the operator's choice."""
@@ -74,41 +71,6 @@ class Bound(Generic[Section_co]):
 
 BoundInput = Bound[InputSection]
 """Whatever its section is."""
-
-
-@dataclass(frozen=True)
-class BoundJoystick(Bound[Joystick]):
-    """A joystick with its message.
-
-    Attributes:
-        name: of the joystick.
-        velocities: what its axes take from it.
-        conditions: what enables it; the first one is to be pressed.
-    """
-
-    name: str
-    velocities: tuple[Velocity, ...]
-    conditions: tuple[Condition, ...]
-
-    @property
-    def enable(self) -> str | None:
-        """The signal of its own message that is the switch to press; None where it is another."""
-        pressed = self.conditions[0]
-        return pressed.name if pressed.joystick == self.name else None
-
-    def decode(self, data: bytes) -> tuple[dict[str, Any], dict[str, float | Reason]]:
-        """Raw values of a frame, and the command or fault of each velocity, for a listener.
-
-        There is no command in frames that are not meant. See ``JoystickInput`` for the controller.
-
-        Raises:
-            ValueError: the frame has another length.
-        """
-        if len(data) != self.message.length:
-            raise ValueError(f"expected {self.message.length} bytes, got {len(data)}")
-        raw, chosen = self.layout.decode(data), self.chosen
-        meant = chosen is None or raw[chosen.signal] == chosen.value
-        return raw, {one.name: one.read(raw) for one in self.velocities if meant}
 
 
 @dataclass(frozen=True)

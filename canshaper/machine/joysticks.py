@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from cantools.database.can import Signal
 
@@ -14,14 +15,50 @@ from canshaper.codec.signals import (
     neutral_fault,
     symmetrical_range,
 )
-from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, VelocitySignal
-from canshaper.config.enable import conditions, named_by
+from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, Velocity, VelocitySignal
+from canshaper.config.enable import Condition, conditions, named_by
 from canshaper.config.inputs import SwitchSection
 from canshaper.config.schema import Command, DeploymentConfig, Joystick, Scaling
 from canshaper.config.source import Diagnostics, Place
-from canshaper.machine.inputs import OF_MESSAGE, Bound, BoundJoystick, bind_input, check_source
+from canshaper.machine.inputs import OF_MESSAGE, Bound, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import SWITCH, SWITCHES, UsedMessage, flag_of
+from canshaper.shaping.states import Reason
+
+
+@dataclass(frozen=True)
+class BoundJoystick(Bound[Joystick]):
+    """A joystick with its message.
+
+    Attributes:
+        name: of the joystick.
+        velocities: what its axes take from it.
+        conditions: what enables it; the first one is to be pressed.
+    """
+
+    name: str
+    velocities: tuple[Velocity, ...]
+    conditions: tuple[Condition, ...]
+
+    @property
+    def enable(self) -> str | None:
+        """The signal of its own message that is the switch to press; None where it is another."""
+        pressed = self.conditions[0]
+        return pressed.name if pressed.joystick == self.name else None
+
+    def decode(self, data: bytes) -> tuple[dict[str, Any], dict[str, float | Reason]]:
+        """Raw values of a frame, and the command or fault of each velocity, for a listener.
+
+        There is no command in frames that are not meant. See ``JoystickInput`` for the controller.
+
+        Raises:
+            ValueError: the frame has another length.
+        """
+        if len(data) != self.message.length:
+            raise ValueError(f"expected {self.message.length} bytes, got {len(data)}")
+        raw, chosen = self.layout.decode(data), self.chosen
+        meant = chosen is None or raw[chosen.signal] == chosen.value
+        return raw, {one.name: one.read(raw) for one in self.velocities if meant}
 
 
 @dataclass(frozen=True)

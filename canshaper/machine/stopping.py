@@ -127,7 +127,7 @@ def unstated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> st
 
 
 def stop_fault(deployment: Deployment, name: str, axis: AxisSection) -> str | None:
-    """Why an axis may not move over the way in which it stops, stated or not, or None.
+    """Why the stopping distance of an axis is too long, stated in the file or not; None if not.
 
     Args:
         deployment: the machine.
@@ -146,7 +146,7 @@ def unstated(deployment: Deployment) -> Iterator[tuple[Place, str]]:
 
 
 class When(TypedDict):
-    """Times of an axis, as of ``allowed_m``."""
+    """Times on which the stopping distance of an axis depends, see ``allowed_m``."""
 
     timeout_ms: int
     period_s: float

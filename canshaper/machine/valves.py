@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from cantools.database.can import Message, Signal
@@ -261,12 +262,8 @@ def _bind_direction(
 
 def _alike(one: Signal, other: Signal) -> bool:
     """Whether two signals count the same way."""
-    return (one.scale, one.offset, one.maximum, one.length) == (
-        other.scale,
-        other.offset,
-        other.maximum,
-        other.length,
-    )
+    kind = attrgetter("scale", "offset", "maximum", "length")
+    return bool(kind(one) == kind(other))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,8 @@ from typing import Any, Protocol
 from canshaper.codec.frame import Frame
 from canshaper.codec.velocity import VelocitySignal
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.machine.inputs import BoundInput
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.protocols.interface import MessageKey
 
 # A thousandth of a tick: a frame is read a little later than it arrives.

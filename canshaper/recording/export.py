@@ -25,6 +25,7 @@ from canshaper.shaping.states import Reason, State
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.machines import AXES_OF, build_machine, machine_for
+from canshaper_sim.parameters import changed_parameters
 
 PICTURE_NS = 40_000_000  # between two poses: a film has no more
 MOST_CODE_BITS = 8  # of a signal whose values are names
@@ -46,7 +47,7 @@ def exporting(
     writer = _writer(path, [*deployment.config.buses])
     try:
         try:
-            yield Export(writer, deployment, parameters or CraneParameters())
+            yield Export(writer, deployment, parameters or changed_parameters([], deployment))
         finally:
             writer.close()
     except OSError as error:

@@ -155,7 +155,7 @@ class LogFile:
 
 
 class _UnpackedWithoutEndError(Exception):
-    """No log is packed so well."""
+    """A packed file grows by more than any log would: it is made to fill the memory."""
 
 
 class _Unpacked(RawIOBase):

@@ -180,7 +180,7 @@ class Replayed:
 
 def print_replays(replays: Sequence[Replayed], console: Console) -> None:
     """A table an axis: the joystick straight to the valve, then each deployment."""
-    for axis in _axes(replays):
+    for axis in dict.fromkeys(axis for one in replays for axis in one.measures):
         table = WholeTable(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, title_justify="left")
         table.add_column(axis_title(axis), no_wrap=True)
         having = [one for one in replays if axis in one.measures]
@@ -237,10 +237,6 @@ def _difference_text(deployment: Deployment, difference: Difference) -> str:
         return " ".join(f"{k}={v:g}" for k, v in values.items() if isinstance(v, int | float))
 
     return f"{bus} {name}: black box {shown(difference.recorded)}; replay {shown(difference.ours)}"
-
-
-def _axes(replays: Sequence[Replayed]) -> list[str]:
-    return list(dict.fromkeys(axis for one in replays for axis in one.measures))
 
 
 def _number(value: float | None, scale: float, digits: int) -> str:

@@ -287,7 +287,7 @@ class _Readers:
             crane.counter.end()
 
     def notes(self) -> Iterator[str]:
-        """Yield what the log has not."""
+        """Yield a line for each kind of frames that the log lacks, and what takes their place."""
         if computed := [name for name, one in self.axes.items() if one.valve_ns < 0]:
             yield f"no valve frames of {', '.join(computed)}: taken is what the file would send"
         if foreign := [name for name, one in self.axes.items() if one.foreign]:

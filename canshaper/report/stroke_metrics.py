@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from canshaper.report.strokes import RESIDUAL_WINDOW_MIN_S, Stroke, residual_window, rests
-from canshaper_sim.recording import AxisTrace, CraneTrace, Point, Recording
+from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 REACHED = 0.95  # of the asked speed: the usual 5 % band of a settling time
 LOST_AGAIN = 0.90  # below this the speed was not reached but only passed through
@@ -153,7 +153,7 @@ def crane_metrics(
     Raises:
         ValueError: the recording is malformed (see ``find_strokes``).
     """
-    t_s, sway = recording.t_s, crane.sway_deg
+    t_s, sway, tip_m = recording.t_s, crane.sway_deg, crane.tip_m
     still = [rest for rest in rests(recording) if len(rest) > 1]
     windows = [
         window for rest in still if (window := residual_window(t_s, rest, recording.dwell_s))
@@ -169,10 +169,7 @@ def crane_metrics(
         residual_deg=max((sway[k] for window in windows for k in window), default=None),
         run_on_s=max((run_on_s(t_s, speed, rest) for rest in still), default=None),
         run_on_m=max(
-            (_farthest_m(crane.tip_m, rest) for rest in still if crane.tip_m), default=None
+            (math.dist(tip_m[rest.start], tip_m[k]) for rest in still if tip_m for k in rest),
+            default=None,
         ),
     )
-
-
-def _farthest_m(tip_m: list[Point], rest: range) -> float:
-    return max(math.dist(tip_m[rest.start], tip_m[k]) for k in rest)

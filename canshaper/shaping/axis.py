@@ -15,7 +15,7 @@ gets neutral in the same tick, and the transition keeps the error.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from canshaper.errors import raised
@@ -232,11 +232,14 @@ class ShapedAxis:
             return self.invalidate(self._states.state, error)
         return None
 
-    def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
+    def retune(
+        self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper], past: Sequence[float] = ()
+    ) -> None:
         """Change sway data and filter, in motion too, without a jump of the output.
 
         The model keeps the physical swing. The difference between both filters at this moment fades
-        with ``transfer.BLEND_S``.
+        with ``transfer.BLEND_S``. With the ``past``, ``applied`` in each tick since the axis was at
+        rest, it has swung by the new mode since then, and the filter damps what that has left.
 
         Raises:
             ValueError: mode or filter does not suit the tick; model and filter stay as they were.
@@ -245,8 +248,14 @@ class ShapedAxis:
             sway = SwayModel(mode, self._tick_s)
         else:
             sway = self.sway.retuned(mode, self.applied)
+        if past:
+            sway.angle = sway.rate = 0.0
+            for applied in past:
+                sway.step(applied)
         shaper = shaper_for(sway)
         self._transfer.replace(shaper, self._clamped_demand())
+        if past and hasattr(shaper, "swing_anew"):
+            shaper.swing_anew()
         self._stage.change_filter(spreads=spreads(shaper))
         self.sway = sway
         if self.sensed is not None:

@@ -157,7 +157,6 @@ class OutputStage:
             ValueError: the reference is no number, or the added velocity is no velocity.
         """
         limits, recent, output = self.limits, self._recent, self.output
-        rise, fall = self._rates
 
         # 1. Range
         no_run_on = self._no_run_on > 0
@@ -181,29 +180,11 @@ class OutputStage:
         if self.largest_added:
             self._demanded.add(demand)
         if not added and self._own_ramp == self.ramp and not self._dropped_at:
-            self.ramp = self._own_ramp = rate_limited(own, self.ramp, rise, fall)
+            self.ramp = self._own_ramp = rate_limited(own, self.ramp, *self._rates)
+        elif abs(path) <= 1.0:
+            total, low, high = self._ramp_with_added(held, own, added, no_run_on=no_run_on)
         else:
-            if not abs(path) <= 1.0:
-                raise ValueError(f"added velocity is {path}")
-            largest = self.largest_added if added else 0.0
-            low, high = range_with_added(
-                held,
-                self._demanded.low,
-                self._demanded.high,
-                own,
-                largest,
-                maximum=limits.maximum,
-                no_run_on=no_run_on,
-            )
-            target = own
-            if added:
-                total = within(own + added, low, high, 0.0)
-                target = self._with_carry(total, low, high)
-            self._own_ramp = rate_limited(own, self._own_ramp, rise, fall)
-            self.ramp = rate_limited(target, self.ramp, rise, fall)
-            if self._dropped_at * self.ramp < 0.0:  # the way to the other side begins at rest
-                self.ramp = 0.0
-            self._dropped_at = 0.0
+            raise ValueError(f"added velocity is {path}")
 
         # 5. Grid
         ramp = self.ramp
@@ -221,6 +202,39 @@ class OutputStage:
             self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
         beyond = self._beyond(held)
         self._ran = self._ran + beyond * self._tick_s if beyond or not held else 0.0
+
+    def _ramp_with_added(
+        self, held: float, own: float, added: float, *, no_run_on: bool
+    ) -> tuple[float, float, float]:
+        """Advance both ramps; return own and added velocity together, and the range of that.
+
+        An added velocity is slow: a few steps of the grid, or less than one. What rounding leaves
+        out of it is carried, and corrected in the next ticks by at most one step in each. The carry
+        starts no movement: the operator would see a twitch.
+        """
+        limits = self.limits
+        low, high = range_with_added(
+            held,
+            self._demanded.low,
+            self._demanded.high,
+            own,
+            self.largest_added if added else 0.0,
+            maximum=limits.maximum,
+            no_run_on=no_run_on,
+        )
+        target = total = own
+        if added:
+            total = within(own + added, low, high, 0.0)
+            step = 1.0 / self._grid_steps
+            target = within(total, low, high, max(limits.minimum, 0.5 * step))
+            if target:
+                target = within(target + within(self._carry, -step, step, 0.0), low, high, 0.0)
+        self._own_ramp = rate_limited(own, self._own_ramp, *self._rates)
+        self.ramp = rate_limited(target, self.ramp, *self._rates)
+        if self._dropped_at * self.ramp < 0.0:  # the way to the other side begins at rest
+            self.ramp = 0.0
+        self._dropped_at = 0.0
+        return total, low, high
 
     def _end_run_on(self, held: float) -> bool:
         """End what runs on beyond the joystick, by the fall, where it reaches a limit.
@@ -248,24 +262,6 @@ class OutputStage:
         own_beyond = abs(own) - max(own_asked, 0.0)
         beyond = max(own_beyond, abs(sent) - max(asked, 0.0) - self.largest_added)
         return beyond if beyond > NOTHING else 0.0
-
-    def _with_carry(self, total: float, low: float, high: float) -> float:
-        """Correct a velocity for what rounding has left out in the ticks before.
-
-        An added velocity is slow: a few steps of the grid, or less than one. What rounding leaves
-        out of it is carried, and corrected in the next ticks by at most one step in each. The carry
-        starts no movement: the operator would see a twitch.
-
-        Args:
-            total: the axis' own velocity and the added one together, within the range.
-            low: lower end of the range.
-            high: upper end of the range.
-        """
-        step = 1.0 / self._grid_steps
-        target = within(total, low, high, max(self.limits.minimum, 0.5 * step))
-        if target:
-            target = within(target + within(self._carry, -step, step, 0.0), low, high, 0.0)
-        return target
 
     def drop_added(self) -> None:
         """Go back to the axis' own ramp at once, but never faster and not to the other side."""

@@ -1,9 +1,8 @@
 """Length of a rope by its signal: a signal that is lost or jumps makes no jump of the length."""
 
-from typing import Final, Literal
+from typing import Final
 
-Lost = Literal["longest", "hold", "neutral"]
-"""Reaction while no length is known: follow the longest rope, hold the last length, or stop."""
+from canshaper.shaping.states import Lost
 
 # No hoist is faster. A message may come once in half a second, and round what it says.
 MOST_M_S: Final = 3.0

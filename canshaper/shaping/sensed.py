@@ -10,6 +10,7 @@ from canshaper.shaping.trust import (
     PROVED,
     PROVED_AGAIN,
     SURPRISE_PER_S,
+    CrossedSway,
     Evidence,
     Restlessness,
     Standstill,
@@ -63,12 +64,13 @@ class SensedSway:
         self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
         self._observer = SwayObserver(sway, timing, limits, gains)
         self._evidence = Evidence(measured, limits.noise, timing.period_s)
+        self._timing, self._gains = timing, gains.one
+        self._crossed: CrossedSway | None = None
         self._standstill = Standstill(measured, limits.noise, timing.period_s, sway.mode.period_s)
         self._restlessness = Restlessness(tick_s)
         self.length = SwingLengthEstimate(sway.mode, measured, limits, timing.period_s)
         self._jump = largest_jump(measured, limits.noise, timing.period_s)
         self._tick_s = tick_s
-        self._lost_s = timing.lost_s
         self._age_s = 0.0  # since the last measurement
         self._begun = self._command_active = self._commanded = False
         self._needed = PROVED
@@ -77,7 +79,13 @@ class SensedSway:
         self._left = 0.0  # what the last measurement left unexplained
 
     def measure(
-        self, value: float | None, scale: float, *, commanded: bool, damps: bool = False
+        self,
+        value: float | None,
+        scale: float,
+        *,
+        commanded: bool,
+        damps: bool = False,
+        other: float | None = None,
     ) -> None:
         """Take what has come for this tick, before the filter runs.
 
@@ -87,6 +95,8 @@ class SensedSway:
             commanded: the operator asked for motion within the tail. Else nothing is fed back to
                 the valve, and swing that another axis makes says nothing about the sensor.
             damps: it damps a swing that another axis makes.
+            other: what a sensor of that axis would show by its own motion: with it that swing does
+                prove a sensor that nothing has spoken against, see ``CrossedSway``.
         """
         self._commanded = commanded
         if not commanded and self.state is not Trust.CONTACT:
@@ -94,13 +104,20 @@ class SensedSway:
         if value is not None:
             self._age_s = 0.0
             if self._begun:
-                self._compare(value, scale, commanded or (damps and self.weight > 0.0))
+                crossed = damps and not commanded and self.state is Trust.UNPROVED
+                by_other = other if crossed else None
+                proves = commanded or by_other is not None or (damps and self.weight > 0.0)
+                self._compare(value, scale, proves, by_other)
                 self._estimate(value, scale, commanded)
             elif not commanded or self.state not in LATCHED:
                 self._begin(value, scale)
-        elif self._age_s > self._lost_s and self.state not in (Trust.NO_DATA, Trust.LOST):
+        elif self._age_s > self._timing.lost_s and self.state not in (Trust.NO_DATA, Trust.LOST):
             self._doubt(Trust.LOST, again=True)
         self._feed_back(scale)
+
+    def own(self, scale: float) -> float:
+        """Return what the sensor would show by own motion alone, see ``measure``."""
+        return self._observer.own(scale)
 
     def step(self, velocity: float, command: float, added: float = 0.0) -> None:
         """Advance a tick.
@@ -117,6 +134,8 @@ class SensedSway:
         if self._restlessness.add(own, command) and self.state is Trust.TRUSTED:
             self._doubt(Trust.RESTLESS, again=True)
         self._observer.step(velocity, added)
+        if self._crossed:
+            self._crossed.step(self._observer)
         if self.weight:
             self._observer.swing(self._fading)
 
@@ -137,13 +156,14 @@ class SensedSway:
         observer = self._observer
         observer.begin(value, scale)
         self._evidence.clear()
+        self._crossed = None
         self._standstill.clear()
         self._left = 0.0
         self._begun = True
         if self.state in (Trust.NO_DATA, Trust.LOST):
             self.state = Trust.UNPROVED
 
-    def _compare(self, value: float, scale: float, commanded: bool) -> None:
+    def _compare(self, value: float, scale: float, proves: bool, other: float | None) -> None:
         observer, evidence, trusted = self._observer, self._evidence, self.state is Trust.TRUSTED
         errors = observer.errors(value, scale)
         if not abs(errors[0] - self._left) <= self._jump:
@@ -152,7 +172,8 @@ class SensedSway:
         before = observer.free.rate
         self._left = observer.correct(errors)
         bent = observer.free.rate - before
-        if not commanded:
+        refuted = self._refuted(value, other, errors[0])
+        if not proves:
             self._standstill.clear()
             return
         evidence.add(errors)
@@ -162,11 +183,23 @@ class SensedSway:
             self._doubt(fault)
         elif observer.acceleration(evidence.surprise) > SURPRISE_PER_S * scale:
             self._doubt(Trust.CONTACT)
-        elif evidence.proved(self._needed):
+        elif evidence.proved(self._needed) and refuted:
             if abs(observer.free.offset) > self._limits.offset:
                 self._doubt(Trust.OFFSET)
             elif not trusted and not self.weight:
                 self.state = Trust.TRUSTED
+
+    def _refuted(self, value: float, other: float | None, error: float) -> bool:
+        """Whether it does not show the other axis, which makes it swing; see ``CrossedSway``."""
+        if other is None:
+            if self._crossed and self.state is not Trust.TRUSTED:
+                self._evidence.clear()  # that is no proof without the other axis
+            self._crossed = None
+            return True
+        if self._crossed:
+            return self._crossed.refuted(value, other, error)
+        self._crossed = CrossedSway(self._timing, self._limits.noise, self._gains, value, other)
+        return False
 
     def _estimate(self, value: float, scale: float, commanded: bool) -> None:
         observer = self._observer

@@ -10,7 +10,7 @@ into the DBC files and into docs/states.md. To add a reason, add a member here a
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 
 class State(IntEnum):
@@ -87,6 +87,10 @@ class Reaction(Enum):
     """An axis at rest stays at rest; a moving one stops through its filter, in bounded time."""
     NEUTRAL = "neutral at once"
     """The output is neutral in the same tick, and latched."""
+
+
+Lost = Literal["longest", "hold", "neutral"]
+"""Reaction while the length of a rope is not known: follow the longest, hold the last, or stop."""
 
 
 def _reaction(reason: Reason) -> Reaction:

@@ -7,9 +7,10 @@ and no longer when it contradicts motion, stands still, jumps, or the load does 
 import math
 from collections import deque
 
-from canshaper.shaping.observer import Errors
+from canshaper.shaping.free_swing import FreeSwing, Gains
+from canshaper.shaping.observer import Errors, SwayObserver
 from canshaper.shaping.states import Trust
-from canshaper.shaping.sway import TICK_OF_NOISE_S, Measured
+from canshaper.shaping.sway import TICK_OF_NOISE_S, Measured, SensorTiming
 
 LATCHED = (Trust.JUMP, Trust.RESTLESS)
 """States that stay until the axis is at rest."""
@@ -110,6 +111,45 @@ class Evidence:
         self.sign, self.own = min(self.sign, 0.0), min(self.own, 0.0)
         self.free = min(self.free, 0.0)
         self._energies = 0.0, 0.0, 0.0, 0.0
+
+
+class CrossedSway:
+    """Two more hypotheses of what a sensor shows: the other axis' swing, with either sign.
+
+    While slew moves and no one commands near-far, near-far's sensor shows what slewing makes along
+    the boom. That proves it too, if it is not what slew's sensor would show: signals of two axes
+    are easily swapped, and a swing that was there before fits either of them.
+
+    Args:
+        timing: of the sensor.
+        noise: its standard deviation, rad or rad/s.
+        gains: for the free swing beside it, of angle, rate and offset.
+        value: the first measurement, rad or rad/s.
+        other: what the other axis' sensor would show by that axis' own motion.
+    """
+
+    __slots__ = ("_evidence", "_negated", "_same")
+
+    def __init__(
+        self, timing: SensorTiming, noise: float, gains: Gains, value: float, other: float
+    ) -> None:
+        self._same, self._negated = (FreeSwing(timing.measured, gains) for _ in range(2))
+        self._same.begin(value - other)
+        self._negated.begin(value + other)
+        self._evidence = Evidence(timing.measured, noise, timing.period_s)
+
+    def refuted(self, value: float, other: float, error: float) -> bool:
+        """Take a measurement with its own ``error``; return whether both are refuted."""
+        errors = self._same.error(value - other), self._negated.error(value + other)
+        self._same.correct(errors[0])
+        self._negated.correct(errors[1])
+        self._evidence.add((error, *errors, errors[1]))
+        return self._evidence.proved(PROVED)
+
+    def step(self, observer: SwayObserver) -> None:
+        """Advance a tick."""
+        observer.swing(self._same)
+        observer.swing(self._negated)
 
 
 def largest_jump(measured: Measured, noise: float, period_s: float) -> float:

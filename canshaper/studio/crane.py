@@ -8,10 +8,13 @@ import re
 import signal
 import socket
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from canshaper.bus.port import Port
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, LOOP_PRIORITY
 from canshaper.config.load import load_config
 from canshaper.design.processes import Transport, canshaper_command, end
@@ -21,8 +24,12 @@ from canshaper.studio.sliders import adjustable, sliders
 from canshaper.studio.view import CraneView, Report
 from canshaper_sim.axes import ON_ROPE, ROTATOR
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.hand import Hand, Held
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.machines import AXES_OF, build_machine, machine_for
+
+if TYPE_CHECKING:
+    from canshaper.studio.in_process import InProcessCrane
 
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0
@@ -221,3 +228,22 @@ class SimulatedPose:
             joints = (math.degrees(lift), math.degrees(knuckle), extension)
         sway = (math.degrees(state.theta5_rad), math.degrees(state.theta6_rad))
         view.simulate((heading, state.radius_m, state.height_m), joints, sway, now_s)
+
+
+@dataclass
+class CraneSession:
+    """A crane that is listened to; ``hand`` where the page drives it, ``here`` in this process."""
+
+    view: CraneView
+    ports: Mapping[str, Port]
+    hand: Hand | None = None
+    crane: Crane | None = None
+    shaped: bool = True
+    here: "InProcessCrane | None" = None
+
+    def move_joysticks(self, time_ms: int, held: Held) -> list[Frame]:
+        """Send the frames of the joysticks that are due, where the page drives it; those frames."""
+        frames = list(self.hand.frames(time_ms, held)) if self.hand else []
+        for frame in frames:
+            self.ports[frame.bus].send(frame)
+        return frames

@@ -61,7 +61,7 @@ class InProcessCrane:
         self._report = report
         self._frames: list[Frame] = []
         try:
-            plant = PlantNode(driven, changed_parameters([*changes]))
+            plant = PlantNode(driven, changed_parameters([*changes], deployment))
         except ValueError as error:
             raise DriveError(str(error)) from None
         self._lock_step = LockStep(

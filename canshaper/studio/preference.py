@@ -161,7 +161,7 @@ class Preference:
         self._found: dict[str, Any] | None = None
 
     def found(self) -> dict[str, Any]:
-        """Settings of each axis, see ``settings``; the first who asks waits for the process."""
+        """Settings of each axis, see ``settings``; the first call waits for their computation."""
         with self._lock:
             if self._found is None:
                 command = [sys.executable, "-m", "canshaper.studio.preference", str(self._path)]

@@ -130,11 +130,11 @@ def _shown(path: Path, changes: list[str], *, machine: bool) -> dict[str, Any]:
                 "at": record.at,
                 "why": record.why,
                 "parts": record.parts,
-                "poor": record.poor,
+                "problems": record.problems,
                 "pictures": [name for name in record.pictures if name.endswith(".png")],
                 "choice": {key: record.numbers.get(key) for key in _CHOICE},
                 "diff": proposed.diff if proposed else record.diff,
-                "proposed": bool(proposed) and not record.poor,
+                "proposed": bool(proposed) and not record.problems,
             }
         )
     report = f"{REPORT}.html"

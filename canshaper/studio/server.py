@@ -222,8 +222,8 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
         **links_of(parameters),
         "preference": stage.preference is not None,
         "sliders": {
-            name: {"range": RANGES[name], "numbers": [list(n) for n in _numbers(stage, name)]}
-            for name in stage.sliders
+            name: {"range": RANGES[name], "numbers": [[n.key, n.value, n.power] for n in numbers]}
+            for name, numbers in stage.sliders.items()
         },
     }
 
@@ -235,10 +235,6 @@ def links_of(parameters: CraneParameters) -> dict[str, Any]:
         "boom": parameters.joints.boom._asdict(),
         "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
     }
-
-
-def _numbers(stage: Stage, name: str) -> list[tuple[str, float, float]]:
-    return [(n.key, n.value, n.power) for n in stage.sliders[name]]
 
 
 def listening(host: str, port: int) -> socket.socket:

@@ -16,11 +16,10 @@ from canshaper.errors import ControlError
 from canshaper.gate.loop import run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
-from canshaper.studio.crane import CANSHAPER, Crane
+from canshaper.studio.crane import CANSHAPER, Crane, CraneSession
 from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.numbers import LiveNumbers
 from canshaper.studio.preference import AS_IN_FILE, PREFERENCE, Preference, offered
-from canshaper.studio.session import CraneSession
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.sources import before_the_rest
 from canshaper.studio.view import CraneView

@@ -1,6 +1,6 @@
 """Figures of a study, from its placements: of each person, and of all persons in pairs.
 
-Seconds are compared as logarithms: a setting makes a placement quicker by a part of it.
+Seconds are compared as logarithms: a setting shortens a placement by a percentage.
 """
 
 import math

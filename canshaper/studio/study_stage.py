@@ -22,9 +22,9 @@ from canshaper.machine.inputs import BoundInput
 from canshaper.recording.channels import InputFinder
 from canshaper.studio.access import Access
 from canshaper.studio.cab import Cab
+from canshaper.studio.crane import CraneSession
 from canshaper.studio.in_process import HeldHand, InProcessCrane
 from canshaper.studio.server import hello_of, page_app, pages_of
-from canshaper.studio.session import CraneSession
 from canshaper.studio.stage import Stage
 from canshaper.studio.study import Placement, Session
 from canshaper.studio.study_files import Table

@@ -7,12 +7,9 @@ from typing import Any
 
 from canshaper.config.adjust import Key, adjusted
 from canshaper.config.limits import Sway
-from canshaper.design.tuning.evaluate import Machine, evaluate
+from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
-from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.sway import SwayModel
 
 LEAST_SWING_S = 1.0
 """Shortest time over which the largest sway counts as the swing."""
@@ -106,16 +103,7 @@ def _curve(bound: BoundAxis, values: Mapping[Key, float], period_s: float) -> di
     config = adjusted(bound.config, values, bound.config) if values else bound.config
     assert config.sway is not None and bound.config.sway is not None
     mode = config.sway.mode()
-
-    def shaper_for(model: SwayModel) -> Shaper:
-        return build_shaper(
-            config.filter.kind,
-            period_s,
-            model,
-            valve_rate_per_s=config.limits.slowest_per_s,
-            **config.filter.parameters(),
-        )
-
+    shaper_for = shaper_of(config.filter, period_s, config.limits.slowest_per_s)
     believes_m = STANDARD_GRAVITY_M_S2 / mode.omega_rad_s**2
     file_m = STANDARD_GRAVITY_M_S2 / bound.config.sway.mode().omega_rad_s ** 2
     lengths_m = [file_m * (1.0 + percent / 100.0) for percent in LENGTHS_PCT]

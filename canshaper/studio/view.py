@@ -11,7 +11,7 @@ from canshaper.codec.status import StatusCodec
 from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
 from canshaper.studio.axis_view import AxisView, rounded

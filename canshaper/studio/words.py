@@ -79,7 +79,6 @@ class Event(NamedTuple):
         source: a crane, or "page".
         text: what happened.
         level: "info", "warn" or "bad".
-        clock_s: the studio's clock then, that of its pictures.
     """
 
     number: int
@@ -87,7 +86,6 @@ class Event(NamedTuple):
     source: str
     text: str
     level: str
-    clock_s: float
 
 
 class Events:
@@ -102,9 +100,7 @@ class Events:
         """Add one."""
         with self._lock:
             self._count += 1
-            self._events.append(
-                Event(self._count, time.time(), source, text, level, time.monotonic())
-            )
+            self._events.append(Event(self._count, time.time(), source, text, level))
 
     def since(self, number: int) -> list[Event]:
         """Return the events after this one, in order."""

@@ -119,7 +119,7 @@ class CanopenSide:
                     node.state = NodeState.OPERATIONAL
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
-        """What is due after so much more time."""
+        """Frames that are due after so much more time."""
         parts: list[_Node | _ValveStates] = [*self._nodes.values(), *self._valves.values()]
         for part in parts:
             yield from part.frames(passed_s)

@@ -9,8 +9,8 @@ from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import full_scale
 from canshaper.config.schema import EmergencyStop
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import Bound, BoundInput, BoundJoystick
-from canshaper.machine.joysticks import BoundSwitches
+from canshaper.machine.inputs import Bound, BoundInput
+from canshaper.machine.joysticks import BoundJoystick, BoundSwitches
 
 # Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
 JOYSTICK_ADDRESS = 0x33
@@ -18,7 +18,7 @@ JOYSTICK_ADDRESS = 0x33
 
 @dataclass(frozen=True)
 class Held:
-    """What a hand does with the joysticks; it does not change, another one takes its place.
+    """State of a hand on the joysticks; it does not change, another one takes its place.
 
     Attributes:
         joysticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.

@@ -28,8 +28,8 @@ Vector = tuple[float, float, float]
 
 # name -> (lowest, highest) value that still describes an overhead crane.
 _ALLOWED = {
-    "bridge_full_speed_m_s": (0.05, 5.0),
-    "trolley_full_speed_m_s": (0.05, 5.0),
+    "bridge_full_speed_m_s": (0.05, 20.0),
+    "trolley_full_speed_m_s": (0.05, 20.0),
     "runway_m": (1.0, 1000.0),
     "span_m": (1.0, 200.0),
 }

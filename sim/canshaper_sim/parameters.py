@@ -1,10 +1,14 @@
 """Parameters of the simulated crane by name, for the command line."""
 
 import dataclasses
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from canshaper.errors import DesignError, did_you_mean
 from canshaper_sim.crane import CraneParameters
+
+if TYPE_CHECKING:
+    from canshaper.machine.deployment import Deployment
 
 P = TypeVar("P")
 
@@ -22,9 +26,15 @@ def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float
     return values
 
 
-def changed_parameters(changes: list[str]) -> CraneParameters:
-    """The nominal crane with NAME=VALUE changes put in; see `changed`."""
-    return changed(CraneParameters(), changes, "--set")
+def changed_parameters(
+    changes: list[str], deployment: "Deployment | None" = None
+) -> CraneParameters:
+    """The nominal crane, as its file says, with NAME=VALUE changes put in; see `changed`."""
+    crane = CraneParameters()
+    if deployment and (section := deployment.config.crane):
+        own = [f"{name}={value}" for name, value in section.simulated.items()]
+        crane = changed(crane, own, f"{deployment.path}: crane.simulated:")
+    return changed(crane, changes, "--set")
 
 
 def changed(parameters: P, changes: list[str], option: str) -> P:
@@ -33,22 +43,23 @@ def changed(parameters: P, changes: list[str], option: str) -> P:
     Raises:
         DesignError: no such parameter, no number, or a value that cannot be.
     """
-    known = parameter_names(parameters)
+    known, values = parameter_names(parameters), dict[str, float]()
     for change in changes:
         name, _, text = change.partition("=")
         if name not in known:
             names = did_you_mean(name, known) or f"; there are {', '.join(known)}"
             raise DesignError(f"{option} {change}: expected a parameter, got {name!r}{names}")
         try:
-            value = float(text)
+            values[name] = float(text)
         except ValueError:
             raise DesignError(f"{option} {change}: expected a number, got {text!r}") from None
-        parameters = _replaced(parameters, name, value)
-    return parameters
+    return _replaced(parameters, values)
 
 
-def _replaced(owner: Any, name: str, value: float) -> Any:
-    """A copy of a parameter object with the parameter of that dotted name changed."""
-    group, _, rest = name.partition(".")
-    new = _replaced(getattr(owner, group), rest, value) if rest else value
-    return dataclasses.replace(owner, **{group: new})
+def _replaced(owner: P, values: Mapping[str, float]) -> P:
+    """A copy of a parameter object with these parameters changed at once, by dotted names."""
+    changes: dict[str, Any] = {name: one for name, one in values.items() if "." not in name}
+    for group in {name.partition(".")[0] for name in values if "." in name}:
+        inner = {n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{group}.")}
+        changes[group] = _replaced(getattr(owner, group), inner)
+    return dataclasses.replace(owner, **changes)  # type: ignore[type-var]

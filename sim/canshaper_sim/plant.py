@@ -17,6 +17,7 @@ from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.machines import AXES_OF, build_machine, machine_for
 from canshaper_sim.overhead import OverheadBoom
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.sensor_messages import sensor_messages
 from canshaper_sim.valve_frames import CommandReader
 
@@ -169,6 +170,7 @@ class PlantNode:
         *,
         listeners: bool = True,
     ) -> None:
+        parameters = parameters or changed_parameters([], deployment)
         name = machine_for(deployment.coordinates.values(), machine)
         problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
@@ -208,7 +210,7 @@ class PlantNode:
             for axis, bound in deployment.axes.items()
             if bound.feedback
         ]
-        sensors = (parameters or CraneParameters()).sway_sensor
+        sensors = parameters.sway_sensor
         self._sway_sensors = sensor_messages(deployment, sensors)
         load = deployment.load_state
         its_own = load is not None and load.message.name not in self._senders

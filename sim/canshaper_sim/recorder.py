@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.message import FieldSet
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import (
@@ -29,6 +29,7 @@ from canshaper_sim.axes import (
 )
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import offset_m
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recording import DWELL_S, AxisTrace, CraneTrace, Point, Recording
 
 _Handler = Callable[[bytes, float], None]  # data of the right length, time in s
@@ -58,7 +59,7 @@ class Recorder:
     """Takes every frame; one row for each sway feedback, from the first joystick frame on."""
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
-        crane = parameters or CraneParameters()
+        crane = parameters or changed_parameters([], deployment)
         self._moves = deployment.coordinates
         self._full = crane.full_speeds(kind_of(self._moves.values()))
         self._hangs = crane.grapple.l1_m, crane.grapple.l2_m

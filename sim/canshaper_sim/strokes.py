@@ -68,7 +68,7 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """What the operator does in duration_s seconds; neutral before, between and after."""
+    """Strokes of the operator in duration_s seconds; neutral before, between and after."""
 
     name: str
     strokes: tuple[Stroke, ...]

@@ -31,7 +31,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class SwaySensorParameters:
-    """What every sway sensor makes of the swing; of a rate in degrees per second.
+    """Errors of a sway sensor; of one of the rate, in degrees per second.
 
     A fault begins at its time, seconds from the start; by default never.
     """
@@ -103,7 +103,7 @@ class SwaySensor:
         return angle - self._hidden
 
     def value(self, time_s: float) -> float:
-        """What it shows, degrees or degrees per second."""
+        """Its measurement, degrees or degrees per second."""
         p = self._parameters
         gain = -p.gain if time_s >= p.reversed_s else p.gain
         value = gain * self._past[0][1] + p.offset_deg + self._noise.gauss(0.0, p.noise_deg)

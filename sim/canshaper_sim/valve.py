@@ -38,7 +38,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class ValveParameters:
-    """What one valve does to its command; the defaults are a common mobile proportional valve."""
+    """Behaviour of one valve; the defaults are a common mobile proportional valve."""
 
     dead_time_s: float = 0.0  # delay of the whole command
     deadband: float = 0.05  # fraction of full stroke in which no oil flows

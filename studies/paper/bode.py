@@ -47,7 +47,7 @@ class BodeCurve:
 
 @dataclass(frozen=True)
 class Slewing:
-    """What the linearisation at rest leaves out: the crane slews at full speed."""
+    """Effects that the linearisation at rest leaves out: the crane slews at full speed."""
 
     slew_rate_rad_s: float
     omegas_rad_s: tuple[float, float]

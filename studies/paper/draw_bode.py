@@ -26,7 +26,7 @@ _WORDS: Final = {
 
 
 class Curve(Protocol):
-    """What is drawn of one transfer function; see ``BodeCurve`` of the reproduction."""
+    """Curves of one transfer function; see ``BodeCurve`` of the reproduction."""
 
     @property
     def name(self) -> str: ...  # noqa: D102

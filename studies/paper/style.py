@@ -39,7 +39,7 @@ def key(fig: Figure, words: Words, y: float = 0.935) -> None:
 
 
 def footnote(fig: Figure, text: str) -> None:
-    """What the reader must know of the conditions, small, at the bottom."""
+    """Conditions that the reader must know, small, at the bottom."""
     fig.text(LEFT, 0.012, text, fontsize=10, color="#666666", ha="left", va="bottom")
 
 

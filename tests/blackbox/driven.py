@@ -1,7 +1,12 @@
 """A drive of a daemon with trips, after which it leaves black boxes."""
 
+import zipfile
 from pathlib import Path
 
+from typer.testing import CliRunner
+
+from canshaper.blackbox import write
+from canshaper.cli.app import app
 from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench
@@ -25,3 +30,16 @@ def drive(bench: Bench, folder: Path | None, ticks: int, trips: tuple[int, ...] 
 
     bench.script = script
     Daemon(lambda: load_deployment(bench.file), folder).run()
+
+
+def replayed(*arguments: object, code: int = 0) -> str:
+    result = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def inside(box: Path, folder: Path) -> Path:
+    """The black box in a bundle, by itself."""
+    path = folder / write.BOX
+    path.write_bytes(zipfile.ZipFile(box).read(write.BOX))
+    return path

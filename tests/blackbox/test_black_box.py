@@ -4,57 +4,29 @@ import errno
 import json
 import logging
 import os
-import pickle
-import re
 import stat
 import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from canshaper.blackbox import keeper, write
-from canshaper.blackbox.file import HEAD, MAGIC, read_box
-from canshaper.blackbox.ring import RECORD, Kind, records
-from canshaper.blackbox.state import States
-from canshaper.cli.app import app
+from canshaper.blackbox.file import read_box
 from canshaper.codec.frame import BusState
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
-from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.reporter import Reporter
-from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
 from canshaper.recording.log import read_log
 from canshaper.shaping.shapers.gff import Gff
-from tests.blackbox.driven import SECOND, TRIP, drive
+from tests.blackbox.driven import SECOND, TRIP, drive, inside, replayed
 from tests.daemon.bench import Bench, FakePort
-from tests.rigs.forwarder import ROOT
 
 
 @pytest.fixture
 def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
     caplog.set_level(logging.INFO, "canshaper")
     return lambda: [r.getMessage() for r in caplog.records if "black-box" in r.getMessage()]
-
-
-def replayed(*arguments: object, code: int = 0) -> str:
-    result = CliRunner().invoke(app, ["replay", *map(str, arguments)])
-    assert result.exit_code == code, result.output
-    return result.output
-
-
-@pytest.fixture
-def box(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A black box, written after a trip."""
-    monkeypatch.setattr(keeper, "STATE_NS", 10**9)
-    folder = tmp_path / "boxes"
-    folder.mkdir()
-    drive(bench, folder, TRIP + 8 * SECOND)
-    (path,) = folder.iterdir()
-    return path
 
 
 def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path) -> None:
@@ -311,13 +283,6 @@ def test_a_reload_of_the_same_files_is_played_through(bench: Bench, tmp_path: Pa
     replayed(folder / "machine-0001.zip", "--verify", "--out", tmp_path / "out")
 
 
-def inside(box: Path, folder: Path) -> Path:
-    """The black box in a bundle, by itself."""
-    path = folder / write.BOX
-    path.write_bytes(zipfile.ZipFile(box).read(write.BOX))
-    return path
-
-
 @pytest.mark.slow
 def test_frames_that_were_not_sent_are_not_sent_again(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -349,109 +314,3 @@ def test_frames_that_were_not_sent_are_not_sent_again(
     text = replayed(folder / "machine-0001.zip", "--verify", "--out", tmp_path / "out")
     assert "state=TRIPPED from=ACTIVE reason=SEND_FAILED" in text
     assert len(off) == 20
-
-
-@pytest.mark.slow
-def test_one_bit_that_is_not_the_same_is_reported_with_its_time(box: Path, tmp_path: Path) -> None:
-    path = inside(box, tmp_path)
-    data = bytearray(path.read_bytes())
-    at = data.index(b"\n", len(MAGIC)) + 1
-    _, _, state, size, _ = HEAD.unpack_from(data, at)
-    begin = at + HEAD.size + state
-    valves = [
-        begin + i * RECORD.size
-        for i, record in enumerate(records(bytes(data[begin : begin + size])))
-        if record.kind == Kind.TX and record.number == 0x200
-    ]
-    data[valves[30] + RECORD.size - 8] ^= 1
-    checked(data, at, begin, size)
-    path.write_bytes(data)
-    text = replayed(path, *options(tmp_path), "--verify", code=1)
-    assert "1 not the same" in text
-    assert "0.600 s: crane SlewCommand: black box" in text
-
-
-def options(folder: Path) -> list[str]:
-    return ["--config", str(folder / "machine.yaml"), "--out", str(folder / "out")]
-
-
-def checked(data: bytearray, at: int, begin: int, size: int) -> None:
-    """Give a segment the check sum of what it has now."""
-    data[at + HEAD.size - 4 : at + HEAD.size] = zlib.crc32(
-        bytes(data[at + HEAD.size : begin + size])
-    ).to_bytes(4, "little")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("part", [0.0, 0.001, 0.02, 0.5, 0.9, 0.999])
-def test_one_that_is_cut_off_is_played_up_to_there_or_reported(
-    box: Path, tmp_path: Path, part: float
-) -> None:
-    path = inside(box, tmp_path)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: round(part * len(whole))])
-    result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
-    assert result.exit_code == (0 if part > 0.1 else 2), result.output
-    assert "Traceback" not in result.output
-    text = result.output.replace("\n", "")
-    assert "the file is cut off" in text if part > 0.01 else "expected " in text
-
-
-@pytest.mark.slow
-def test_a_byte_that_is_another_is_reported(box: Path, tmp_path: Path) -> None:
-    path = inside(box, tmp_path)
-    whole = path.read_bytes()
-    for at in range(3, len(whole), len(whole) // 40):
-        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
-        result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
-        assert result.exit_code in (0, 2), result.output
-        assert result.exception is None or isinstance(result.exception, SystemExit)
-
-
-@pytest.mark.parametrize(
-    ("name", "lacking"),
-    [(b"canshaper.codec.message", b"canshaper.codec.gone"), (b"_releases", b"_gone")],
-)
-def test_one_of_another_program_that_lacks_something_says_of_which(
-    box: Path, tmp_path: Path, name: bytes, lacking: bytes
-) -> None:
-    path = inside(box, tmp_path)
-    data = bytearray(path.read_bytes().replace(b"program=sha256:", b"program=sha256:0"))
-    at = data.index(b"\n", len(MAGIC)) + 1
-    _, _, state, size, _ = HEAD.unpack_from(data, at)
-    begin = at + HEAD.size
-    held = bytes(data[begin : begin + state])
-    assert name in held
-    data[begin : begin + state] = held.replace(name, lacking.ljust(len(name), b"_"))
-    checked(data, at, begin + state, size)
-    path.write_bytes(data)
-    result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
-    assert result.exit_code == 2, result.output
-    assert "Traceback" not in result.output
-    text = result.output.replace("\n", "")
-    assert re.search(
-        r"segment 1: .*; it was recorded by program=.*: play it with that version", text
-    )
-
-
-class Hostile:
-    def __reduce__(self) -> tuple[object, ...]:
-        return (open, ("/tmp/canshaper-hostile", "w"))
-
-
-def test_a_state_can_call_nothing_of_its_own(tmp_path: Path) -> None:
-    deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
-    controller = Controller(deployment)
-    states = States(Guarded(controller), controller)
-    good = states.save()
-    assert type(states.load(good)[1]) is Controller
-    for bad in (
-        pickle.dumps(Hostile(), 5),
-        b"cos\nsystem\n(S'true'\ntR.",
-        pickle.dumps(Daemon, 5),
-        pickle.dumps(7, 5),
-        good[:-20],
-        b"",
-    ):
-        with pytest.raises(StateError):
-            states.load(bad)

@@ -29,3 +29,10 @@ def always_dies(number: int) -> int:
     if number == 7:
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
+
+
+def fails_or_stays(number: int) -> int:
+    """Fail with 0; stay, whatever signal comes, with others."""
+    while number:
+        signal.pause()
+    return fails(number)

@@ -24,9 +24,9 @@ def crane(load: str, says_kg: Callable[[float], float | None] | None = None) -> 
     return TwinCrane(log=(LOG_KG, 0.0, 0.0), lower_m=0.4, says_kg=says_kg)
 
 
-def late(time_s: float) -> float:
-    """Half a second after the first joystick has moved."""
-    return LOG_KG if time_s >= 1.0 else 0.0
+def late(seconds: float) -> Callable[[float], float]:
+    """So long after the first joystick has moved."""
+    return lambda time_s: LOG_KG if time_s >= 0.5 + seconds else 0.0
 
 
 def silent(_time_s: float) -> None:
@@ -51,13 +51,23 @@ def to_and_fro(time_s: float) -> float:
     [
         ("empty", None, (0.2, 0.5), (0.4, 0.9)),
         ("log", None, (0.2, 0.6), (0.6, 1.5)),
-        ("log", late, (1.2, 2.3), (1.0, 2.3)),
+        ("log", late(0.5), (0.2, 0.6), (0.6, 1.5)),
+        ("log", late(1.0), (0.2, 0.7), (0.8, 2.0)),
         ("empty", silent, (0.6, 1.1), (1.2, 3.0)),
         ("log", silent, (1.1, 1.7), (2.9, 5.0)),
         ("log", lost, (0.7, 2.0), (2.9, 6.2)),
         ("log", to_and_fro, (1.1, 1.7), (2.9, 5.0)),
     ],
-    ids=["empty", "log", "late", "empty unknown", "log unknown", "lost", "to and fro"],
+    ids=[
+        "empty",
+        "log",
+        "late",
+        "a second late",
+        "empty unknown",
+        "log unknown",
+        "lost",
+        "to and fro",
+    ],
 )
 def test_the_swing_that_is_left(
     load: str,

@@ -45,7 +45,7 @@ def test_luffing_leaves_a_tenth() -> None:
 def test_what_is_left_of_every_work() -> None:
     """Of each kind of work with each rope at most a tenth of the largest raw swing."""
     worst: dict[str, list[float]] = {}
-    for work in works("luffing"):
+    for work in works(read(FILE)):
         row = worst.setdefault(work.name, [0.0, 0.0])
         for k, one in enumerate((OWN, OFF)):
             row[k] = max(row[k], left_deg(read(FILE), (one, work)))

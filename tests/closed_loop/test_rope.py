@@ -6,14 +6,22 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.design.comparison.ropes import RopeFilter, left_deg, rope_filters, works
+from canshaper.design.comparison.ropes import (
+    RopeFilter,
+    compare_ropes,
+    left_deg,
+    rope_filters,
+    works,
+)
 from canshaper.design.lockstep import drive
 from canshaper.errors import DesignError
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import script_for
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
-from tests.rigs.files import read
+from tests.rigs.files import CONFIG, read
 from tests.rigs.overhead import FILE, changed
 
 OWN = RopeFilter("the file's", {})
@@ -38,7 +46,7 @@ def test_both_axes_while_the_load_is_hoisted() -> None:
 
 @pytest.mark.slow
 def test_what_the_file_leaves_with_every_rope_still_and_hoisted() -> None:
-    left = [left_deg(read(FILE), (OWN, work)) for work in works("overhead")]
+    left = [left_deg(read(FILE), (OWN, work)) for work in works(read(FILE))]
     assert sum(left) / len(left) < 0.15
     assert max(left) < 0.4
 
@@ -46,7 +54,7 @@ def test_what_the_file_leaves_with_every_rope_still_and_hoisted() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("error_pct", [-5.0, 5.0])
 def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
-    for work in works("overhead"):
+    for work in works(read(FILE)):
         assert residual_deg(FILE, error_pct, work.strokes, work.rope_m) < 2.0
 
 
@@ -54,28 +62,62 @@ def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
 def test_every_filter_that_is_compared_is_driven() -> None:
     """With ropes of another length the filter for one leaves more, those that follow do not."""
     deployment = read(FILE)
-    work = {one.name: one for one in works("overhead")}["5 m still"]
+    work = {one.name: one for one in works(read(FILE))}["5 m still"]
     left = {one.name: left_deg(deployment, (one, work)) for one in rope_filters(deployment)}
     assert left["off"] > 10.0
     assert left["ZVD for 8 m"] > 1.0
     assert max(left[name] for name in ("ZV by length", "G_FF by length", "the file's")) < 0.3
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        (", hoist: hoist }", " }", "expected bridge, trolley and hoist in crane, without hoist"),
-        (
-            "length: { bus: crane, message: CranePosition, signal: RopeLength, timeout_ms: 200,"
-            " lowest_m: 1.5, highest_m: 30 }",
-            "origin: { date: 2026-01-01, by: hand }",
-            "axes.bridge.sway: expected length, by which filters are compared",
-        ),
-    ],
-)
-def test_what_cannot_be_compared_is_said(tmp_path: Path, old: str, new: str, says: str) -> None:
+def test_what_cannot_be_compared_is_said(tmp_path: Path) -> None:
+    file = changed(tmp_path, (" trolley: trolley,", ""))
+    says = "expected bridge and trolley in crane, without trolley"
     with pytest.raises(DesignError, match=says):
-        rope_filters(load_deployment(changed(tmp_path, (old, new))))
+        rope_filters(load_deployment(file))
+
+
+MULTICOPTER = CONFIG / "multicopter.yaml"
+
+
+@pytest.mark.parametrize(
+    "script", ["pulse-ahead", "reversal", pytest.param("random-3", marks=pytest.mark.slow)]
+)
+def test_a_load_under_a_multicopter(script: str) -> None:
+    """The plant is the one that the file describes: 5 m of rope, 5 m/s, a tilt of 0.3 s."""
+    deployment = read(MULTICOPTER)
+    if script == "reversal":
+        strokes = (Stroke("ahead", 0.5, 4.0, 1.0), Stroke("ahead", 4.5, 4.0, -1.0))
+        played = Script(script, strokes, 18.5)
+    else:
+        played = script_for(deployment, script)
+        played = replace(played, duration_s=max(s.end_s for s in played.strokes) + 10.0)
+    left = []
+    for bypass in (True, False):
+        recording = drive(deployment, played, bypass=bypass)
+        assert recording.crane is not None
+        left.append(max(recording.crane.sway_deg[-round(4.0 / 0.02) :]))
+    assert left[0] > 4.0
+    assert left[1] < 0.1 * left[0]
+
+
+def test_what_a_file_says_of_its_crane_is_simulated(tmp_path: Path) -> None:
+    parameters = changed_parameters([], read(MULTICOPTER))
+    assert parameters.overhead.rope_m == 5.0
+    assert parameters.overhead.bridge.lag_s == 0.3
+    assert changed_parameters(["overhead.rope_m=6"], read(MULTICOPTER)).overhead.rope_m == 6.0
+    plant = PlantNode(read(MULTICOPTER))
+    assert plant.crane.parameters.overhead == parameters.overhead
+    file = changed(tmp_path, ("kind: cartesian,", "kind: cartesian, simulated: { rope: 1 },"))
+    with pytest.raises(DesignError, match=r"bridge-crane.yaml: crane.simulated: rope=1.*parameter"):
+        changed_parameters([], load_deployment(file))
+
+
+@pytest.mark.slow
+def test_a_rope_that_is_not_measured_is_compared_a_tenth_wrong() -> None:
+    table = compare_ropes(read(MULTICOPTER), lambda _part: None, 1)
+    assert [*table["the file's"]] == ["4.5 m still", "5 m still", "5.5 m still"]
+    assert table["off"]["5 m still"] > 40.0
+    assert max(table["the file's"].values()) < 0.1 * min(table["off"].values())
 
 
 AXES = [

@@ -75,7 +75,7 @@ def test_without_the_motion_more_is_left() -> None:
 @pytest.mark.slow
 def test_what_is_left_of_every_work() -> None:
     """Still ropes at most 5 % of the raw swing, and a part of a degree however it is hoisted."""
-    for work in works("tower"):
+    for work in works(read(FILE)):
         own = left_deg(read(FILE), (OWN, work))
         assert own < (0.5 if "hoisted" in work.name else 0.25)
         assert own <= 0.05 * left_deg(read(FILE), (OFF, work)), work
@@ -84,7 +84,7 @@ def test_what_is_left_of_every_work() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("error_pct", [-5.0, 5.0])
 def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
-    for work in works("tower"):
+    for work in works(read(FILE)):
         tower = replace(
             CraneParameters().tower,
             rope_m=work.rope_m,

@@ -16,7 +16,7 @@ from canshaper.commissioning.assumed import write_numbers
 from canshaper.commissioning.calibration.write import write_curve
 from canshaper.commissioning.filter_file import write_filters
 from canshaper.commissioning.identification.report import write_sway
-from canshaper.edit.edit import replace_text, set_values, written_by
+from canshaper.edit.edit import change, replace_text, written_by
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -173,6 +173,6 @@ def test_killed_at_fifty_random_moments(writer: Writer, before: Deployment) -> N
 def test_what_is_no_deployment_with_its_dbc_files_never_stands_there(before: Deployment) -> None:
     old = before.path.read_bytes()
     with pytest.raises(ConfigError, match=r"machine.yaml:.*NoSuchSignal"):
-        set_values(before.path, ("axes", "slew", "command"), {"signal": "NoSuchSignal"})
+        change(before.path, [(("axes", "slew", "command"), {"signal": "NoSuchSignal"}, "")])
     assert before.path.read_bytes() == old
     assert [*before.path.parent.iterdir()] == [before.path]

@@ -12,8 +12,7 @@ Make = Callable[..., Rig]
 
 def reload(rig: Any, *changes: tuple[str, str]) -> None:
     """The controller after a reload of the rig's file, with pieces of it replaced."""
-    text = rig.deployment.path.read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
+    text = rig.deployment.path.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     for old, new in changes:
         assert old in text, old
         text = text.replace(old, new)

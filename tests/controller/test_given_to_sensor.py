@@ -1,5 +1,6 @@
 """What an axis gives its sway sensor with a measurement: swing of full speed, and whose it is."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -29,6 +30,7 @@ class Given(NamedTuple):
 
     scale: float
     damps: object
+    other: float | None
 
 
 def given(runner: AxisControl) -> list[Given]:
@@ -37,9 +39,11 @@ def given(runner: AxisControl) -> list[Given]:
     assert sensed is not None
     measure, seen = sensed.measure, []
 
-    def spied(value: float | None, scale: float, *, commanded: bool, damps: bool = False) -> None:
-        seen.append(Given(scale, damps))
-        measure(value, scale, commanded=commanded, damps=damps)
+    def spied(
+        value: float | None, scale: float, *, commanded: bool, damps: bool, other: float | None
+    ) -> None:
+        seen.append(Given(scale, damps, other))
+        measure(value, scale, commanded=commanded, damps=damps, other=other)
 
     sensed.measure = spied  # type: ignore[method-assign]
     return seen
@@ -100,6 +104,25 @@ def test_an_axis_that_nothing_moves_damps_no_swing_of_another() -> None:
     seen = given(runner)
     list(controller.tick(0))
     assert [one.damps for one in seen] == [False]
+
+
+def test_near_far_is_given_what_slewing_alone_would_show_across() -> None:
+    drive = Slewing().until_it_damps()
+    before = drive.seen[-2]
+    assert (before.damps, before.other) == (False, None)
+    for _ in range(50):
+        drive.step()
+    slew = drive.controller.axes["slew"]
+    assert drive.step().other == pytest.approx(slew.own_swing(0), rel=0.01) != 0.0
+
+
+def test_a_sensor_of_another_kind_shows_nothing_of_that(tmp_path: Path) -> None:
+    text = (shipped.CONFIG / "forwarder-sensor.yaml").read_text(encoding="utf-8")
+    text = text.replace("../dbc", str(shipped.CONFIG.parent / "dbc"))
+    angle, rate = "SwayAngle, signal: Across, kind: angle", "SwayRate, signal: Across, kind: rate"
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace(angle, rate), encoding="utf-8")
+    assert Controller(load_deployment(file)).axes["near_far"].other is None
 
 
 def test_and_its_filter_is_carried_out_for_that(monkeypatch: pytest.MonkeyPatch) -> None:

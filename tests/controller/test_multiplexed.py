@@ -50,7 +50,7 @@ def test_frames_with_another_value_are_nobodys(multiplexed: Machine) -> None:
         gate.receive(key, data, now_ns)
         assert joystick.commands == {"Slew": 0.5, "NearFar": 0.0}
         assert gate.axes["slew"].demand == 0.5
-        assert (joystick.released, gate.joysticks["left"].pressed.released) == (False, False)
+        assert (joystick.releases, gate.joysticks["left"].pressed.released) == (0, False)
     # They count in the sequence, whose counter they have: none of these was a jump.
     assert controller.counters.last_fault is FrameFault.NONE
     # What is meant has not come: it is lost, however often the others come.

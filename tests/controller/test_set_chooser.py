@@ -1,6 +1,6 @@
 """The chooser of sway data and filter by itself: what it takes, when, and with which number."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
@@ -30,17 +30,25 @@ class Watched(ShapedAxis):
         super().__init__(TICK_S, bound.config.limits.output_limits(), sway=sway, shaper=shaper)
         self.at_rest = True
         self.retuned: list[Shaper] = []
+        self.past: Sequence[float] = ()
 
     @property
     def neutral(self) -> bool:
         return self.at_rest
 
-    def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
+    def retune(
+        self,
+        mode: SwayMode,
+        shaper_for: Callable[[SwayModel], Shaper],
+        past: Sequence[float] = (),
+    ) -> None:
+        self.past = past
+
         def kept(sway: SwayModel) -> Shaper:
             self.retuned.append(shaper_for(sway))
             return self.retuned[-1]
 
-        super().retune(mode, kept)
+        super().retune(mode, kept, past)
 
     def move(self, command: float, applied: float) -> None:
         """In motion, with this command and output."""
@@ -152,6 +160,15 @@ def test_in_steady_motion_a_choice_waits_200_ms(slew: Callable[..., BoundAxis]) 
     for n in range(50):
         assert not bench.changes(n * 20 * MS, "")
     assert waits(bench, "fast", 1000 * MS)
+
+
+def test_a_profile_in_a_press_changes_no_swing(slew: Callable[..., BoundAxis]) -> None:
+    """The pendulum is the same."""
+    bench = Bench(slew())
+    bench.axis.move(0.5, 0.5)
+    bench.axis.output.commanded = True
+    assert bench.changes(0, "fast") or bench.changes(200 * MS, "fast")
+    assert bench.axis.past == ()
 
 
 def test_a_fiftieth_off_the_speed_is_steady(slew: Callable[..., BoundAxis]) -> None:

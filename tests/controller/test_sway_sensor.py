@@ -29,7 +29,6 @@ from canshaper_sim.sway_sensor import SwaySensorParameters
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "config" / "forwarder-sensor.yaml"
-NS = 1_000_000_000
 PULSE = SCRIPTS["pulse-near_far"]
 
 

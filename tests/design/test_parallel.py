@@ -12,7 +12,7 @@ import pytest
 
 from canshaper.design.parallel import Processes
 from canshaper.errors import CampaignError
-from tests.campaign.jobs import always_dies, dies_once, fails, square
+from tests.campaign.jobs import always_dies, dies_once, fails, fails_or_stays, square
 
 pytestmark = pytest.mark.processes
 
@@ -48,6 +48,17 @@ def test_a_job_that_kills_every_process_ends_the_work() -> None:
 def test_what_a_job_raises_is_raised(count: int) -> None:
     with pytest.raises(ValueError, match="no square of"):
         list(Processes(count).run(fails, range(3)))
+
+
+def test_processes_end_that_take_no_sigterm() -> None:
+    """As those that are forked by a program with a handler of its own, such as a page's server."""
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        with pytest.raises(ValueError, match="no square of"):
+            list(Processes(2).run(fails_or_stays, range(2)))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert not multiprocessing.active_children()
 
 
 def test_ctrl_c_in_the_midst_of_handing_out_ends_the_processes() -> None:

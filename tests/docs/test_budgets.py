@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 790,
     "docs/comparison.md": 610,
     "docs/decisions.md": 895,
-    "docs/deployment.md": 2210,
+    "docs/deployment.md": 2245,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
     "docs/export.md": 300,
@@ -42,7 +42,7 @@ BUDGET = {
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
-    "docs/machines.md": 590,
+    "docs/machines.md": 740,
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
@@ -62,16 +62,16 @@ BUDGET = {
 
 # Lines of Python, and why so many.
 LINES = {
-    "canshaper/gate": (2_101, "read in a day by someone who has never seen it"),
+    "canshaper/gate": (2_100, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (
-        4_926,
+        5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (64_919, "a new ability takes the room of an old one"),
-    "tests": (99_069, "one level for each behaviour"),
+    "canshaper": (65_105, "a new ability takes the room of an old one"),
+    "tests": (99_961, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (355, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (353, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from canshaper.config.load import load_config
-from canshaper.edit.edit import FileValue, edited, set_values
+from canshaper.edit.edit import FileValue, change, edited
 from canshaper.errors import ConfigError
 from tests.edit.edited import NEW, SLEW, gff_line
 from tests.rigs.files import ROOT
@@ -16,7 +16,7 @@ from tests.rigs.files import ROOT
 
 def test_flow_style(file: Path) -> None:
     before = file.read_bytes()
-    set_values(file, SLEW, NEW)
+    change(file, [(SLEW, NEW, "")])
     assert file.read_bytes() == before.replace(
         b"{ kind: gff, a1: 0.708, a2: 0.12 }\n", b"{ kind: gff, a1: 0.7, a2: 0.12233 }\n"
     )
@@ -24,7 +24,7 @@ def test_flow_style(file: Path) -> None:
 
 
 def test_a_comment_behind_the_section_stays(file: Path) -> None:
-    set_values(file, ("axes", "near_far", "filter"), NEW)
+    change(file, [(("axes", "near_far", "filter"), NEW, "")])
     text = file.read_text()
     assert "{ kind: gff, a1: 0.7, a2: 0.12233 } # near-far tuning of the paper\n" in text
 
@@ -52,7 +52,7 @@ BLOCK_AFTER = """\
 def test_block_style_poles_become_coefficients(file: Path, newline: str) -> None:
     text = gff_line(file.read_text(), BLOCK).replace("\n", newline)
     file.write_bytes(text.encode())
-    set_values(file, SLEW, NEW)
+    change(file, [(SLEW, NEW, "")])
     after = text.replace(BLOCK.replace("\n", newline), BLOCK_AFTER.replace("\n", newline))
     assert file.read_bytes() == after.encode()
     assert load_config(file)[0].axes["slew"].filter.parameters() == {"a1": 0.7, "a2": 0.12233}
@@ -169,7 +169,7 @@ def test_a_result_that_is_no_deployment_is_not_written(file: Path) -> None:
     with pytest.raises(
         ConfigError, match=r"machine.yaml:\d+: axes.slew.filter: a1: expected .*, got 0.1"
     ):
-        set_values(file, SLEW, {"a1": 0.1, "a2": 0.12})
+        change(file, [(SLEW, {"a1": 0.1, "a2": 0.12}, "")])
     assert file.read_bytes() == before
     assert list(file.parent.iterdir()) == [file]
 
@@ -178,7 +178,7 @@ def test_mode_and_link_stay(file: Path) -> None:
     file.chmod(0o640)
     link = file.with_name("link.yaml")
     link.symlink_to(file.name)
-    set_values(link, SLEW, NEW)
+    change(link, [(SLEW, NEW, "")])
     assert link.is_symlink()
     assert stat.S_IMODE(file.stat().st_mode) == 0o640
     assert "a1: 0.7" in file.read_text()

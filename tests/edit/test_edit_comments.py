@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from canshaper.config.load import load_config
-from canshaper.edit.edit import FileValue, edited, set_values
+from canshaper.edit.edit import FileValue, change, edited
 from canshaper.errors import ConfigError
 from tests.edit.edited import SLEW, gff_line
 
@@ -82,7 +82,7 @@ def test_a_block_list_of_any_indentation_is_replaced(file: Path, indent: int, ne
     block = f"    filter:\n      kind: robust\n      taps: # these\n{items}      tick_ms: 20\n"
     text = gff_line(file.read_text(), block)
     file.write_bytes(text.replace("\n", newline).encode())
-    set_values(file, SLEW, {"taps": ["2 x 0.5", "3 x 0"]})
+    change(file, [(SLEW, {"taps": ["2 x 0.5", "3 x 0"]}, "")])
     expected = text.replace(f"taps: # these\n{items}", "taps: [2 x 0.5, 3 x 0] # these\n")
     assert file.read_bytes() == expected.replace("\n", newline).encode()
     assert load_config(file)[0].axes["slew"].filter.parameters()["taps"][:2] == [0.5, 0.5]
@@ -95,7 +95,7 @@ def test_a_block_section_is_replaced_by_numbers_with_their_keys(file: Path) -> N
     ).replace("kind: zv", "kind: robust\n      tick_ms: 20\n      taps:\n      - 1")
     before = gff_line(file.read_text(), block)
     file.write_text(before)
-    set_values(file, SLEW, {"designed_for": {"period_s": 2.5, "damping_ratio": 0.05}})
+    change(file, [(SLEW, {"designed_for": {"period_s": 2.5, "damping_ratio": 0.05}}, "")])
     old = "designed_for:\n        period_s: 2.3\n        damping_ratio: 0.04\n"
     new = "designed_for: { period_s: 2.5, damping_ratio: 0.05 }\n"
     assert file.read_text() == before.replace(old, new)
@@ -106,7 +106,7 @@ def test_a_comment_between_the_entries_is_not_lost(file: Path) -> None:
     before = gff_line(file.read_text(), block)
     file.write_text(before)
     with pytest.raises(ConfigError, match="comment stands inside poles_rad_s; change it by hand"):
-        set_values(file, SLEW, {"poles_rad_s": [-3.0, -5.0]})
+        change(file, [(SLEW, {"poles_rad_s": [-3.0, -5.0]}, "")])
     assert file.read_text() == before
 
 
@@ -114,7 +114,7 @@ def test_what_another_tool_has_written_can_be_written_to(file: Path) -> None:
     """PyYAML's own form of the whole file: off is false, lists begin below their keys."""
     file.write_text(yaml.safe_dump(yaml.safe_load(file.read_text())))
     assert "kind: false" in file.read_text()
-    set_values(file, SLEW, {"kind": "gff", "a1": None, "a2": None, "poles_rad_s": [-3.0, -4.0]})
+    change(file, [(SLEW, {"kind": "gff", "a1": None, "a2": None, "poles_rad_s": [-3.0, -4.0]}, "")])
     axes = load_config(file)[0].axes
     assert axes["lift"].filter.kind == "off"
     assert axes["slew"].filter.parameters() == {"poles_rad_s": [-3.0, -4.0]}

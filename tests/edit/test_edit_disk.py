@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.edit.edit import set_values
+from canshaper.edit.edit import change
 from canshaper.errors import ConfigError
 from tests.edit.edited import NEW, SLEW
 
@@ -22,7 +22,7 @@ def test_a_directory_that_cannot_be_written(file: Path, monkeypatch: pytest.Monk
         monkeypatch.setattr("canshaper.edit.edit.tempfile.mkstemp", refuse)
     try:
         with pytest.raises(ConfigError, match="not written, the file is as it was: Permission"):
-            set_values(file, SLEW, NEW)
+            change(file, [(SLEW, NEW, "")])
     finally:
         file.parent.chmod(0o755)
     assert file.read_bytes() == before
@@ -39,7 +39,7 @@ def test_a_disk_that_fails_on_the_way(
 
     monkeypatch.setattr(f"canshaper.edit.edit.{step}", fail)
     with pytest.raises(ConfigError, match="No space left on device"):
-        set_values(file, SLEW, NEW)
+        change(file, [(SLEW, NEW, "")])
     assert file.read_bytes() == before
     assert list(file.parent.iterdir()) == [file]
 
@@ -55,10 +55,10 @@ def test_a_file_changed_meanwhile_is_left_alone(
 
     monkeypatch.setattr("canshaper.edit.edit.os.fsync", someone_else)
     with pytest.raises(ConfigError, match="changed by someone else"):
-        set_values(file, SLEW, NEW)
+        change(file, [(SLEW, NEW, "")])
     assert file.read_text() == "tick_ms: 10\n"
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="No such file"):
-        set_values(tmp_path / "none.yaml", SLEW, NEW)
+        change(tmp_path / "none.yaml", [(SLEW, NEW, "")])

@@ -33,6 +33,17 @@ def _direction(section: dict[str, Any] | None) -> tuple[str, dict[int, int]] | N
     return section["signal"], signs
 
 
+def _choices(data: dict[str, Any], messages: dict[str, Message]) -> list[tuple[Key, int, Field]]:
+    """Messages that choose a set of filters: length, and the signal."""
+    return [
+        (key_of(one["bus"], message, None), message.length, Field(signal))
+        for one in (data.get("load_state"), data.get("profile"))
+        for message in ([messages[one["message"]]] if one else [])
+        for signal in message.signals
+        if signal.name == one["signal"]
+    ]
+
+
 class Machine:
     """A deployment file with its DBC files."""
 
@@ -45,16 +56,15 @@ class Machine:
         self.ids = {(m.frame_id, m.is_extended_frame) for m in messages.values()}
         self.tick_ms: int = data["tick_ms"]
         self.tick_ns = self.tick_ms * 1_000_000
-        self.buses = list(data["buses"])
+        buses = data["buses"].items()
+        self.buses = [bus for bus, _section in buses]
         self.gateway = "gateway" in data
         self.nodes = {
             (bus, name): Node(bus, node["id"], node["heartbeat_ms"] * 1_000_000)
-            for bus, section in data["buses"].items()
+            for bus, section in buses
             for name, node in section.get("canopen", {}).get("nodes", {}).items()
         }
-        self.addresses: dict[str, int] = {
-            b: s["j1939"]["address"] for b, s in data["buses"].items() if "j1939" in s
-        }
+        self.addresses = {b: s["j1939"]["address"] for b, s in buses if "j1939" in s}
         self.joysticks = {
             n: Joystick(n, section, messages[section["message"]])
             for n, section in data["joysticks"].items()
@@ -62,8 +72,8 @@ class Machine:
         self.joystick_nodes = self._nodes(data["joysticks"])
         self.switches = self._switches(data, messages)
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
-        valves = {name: section["valve"] for name, section in data["axes"].items()}
-        self.drives = self._nodes(valves)  # without CiA 408
+        # without CiA 408
+        self.drives = self._nodes({name: one["valve"] for name, one in data["axes"].items()})
         self.sensors = self._sensors(data, messages)
         self.radius: tuple[Key, int, Field] | None = None
         self.aims: set[Key] = set()
@@ -71,26 +81,20 @@ class Machine:
             self._motion(motion, messages)
             if aim := motion.get("aim"):
                 self.aims.add(self._sent(aim["bus"], messages[aim["message"]]))
-        self.choices = [  # messages that choose a set of filters: length, and the signal
-            (key_of(one["bus"], message, None), message.length, Field(signal))
-            for one in (data.get("load_state"), data.get("profile"))
-            for message in ([messages[one["message"]]] if one else [])
-            for signal in message.signals
-            if signal.name == one["signal"]
-        ]
+        self.choices = _choices(data, messages)
         self.hydraulics: dict[str, Any] | None = data.get("hydraulics")
-        limits = {name: section.get("limits", {}) for name, section in data["axes"].items()}
         self.ends = {
-            name: Ends.read(one["ends"], messages[one["ends"]["message"]])
-            for name, one in limits.items()
-            if "ends" in one
+            name: Ends.read(ends, messages[ends["message"]])
+            for name, section in data["axes"].items()
+            if (ends := section.get("limits", {}).get("ends"))
         }
         self.stop: Input | None = None
         if stop := data.get("emergency_stop"):
             self.stop = Input("stop", stop, messages[stop["message"]])
             self.stop_field = self.stop.fields[stop["signal"]]
-        inputs = [*self.joysticks.values(), *self.switches, *([self.stop] if self.stop else [])]
-        self.inputs: dict[Key, Input] = {i.key: i for i in inputs}
+        inputs = [*self.joysticks.values(), *self.switches]
+        self.shortest_timeout_ns = min(v.timeout_ns for v in inputs)
+        self.inputs: dict[Key, Input] = {i.key: i for i in (*inputs, self.stop) if i}
         self.valves = {a.valve_key: a for a in self.axes.values()}
         self.statuses = {a.status_key: a for a in self.axes.values() if a.status_key}
         self.service: Key | None = None
@@ -99,19 +103,18 @@ class Machine:
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
         self.identity = self._identity(data, messages)
-        inputs = [*self.joysticks.values(), *self.switches]
-        self.shortest_timeout_ns = min(v.timeout_ns for v in inputs)
-        # longest time between two ticks after which an axis in motion may go on
-        waits_ms = [
-            section["valve"]["timeout_ms"] - (self.axes[n].period_ticks - 1) * self.tick_ms
-            for n, section in data["axes"].items()
-        ]
-        self.longest_gap_ns = min(
-            *(v.timeout_ns for v in self.inputs.values()), *(ms * 1_000_000 for ms in waits_ms)
-        )
+        self.longest_gap_ns = self._longest_gap_ns()
         # longest time, in ticks, in which everything that runs on has come to rest
         longest = max((a.stop + a.tail + 4) * a.period_ticks for a in self.axes.values())
         self.rest_ticks = longest + self.shortest_timeout_ns // self.tick_ns
+
+    def _longest_gap_ns(self) -> int:
+        """Longest time between two ticks after which an axis in motion may go on."""
+        waits_ns = [
+            axis.valve_timeout_ns - (axis.period_ticks - 1) * self.tick_ns
+            for axis in self.axes.values()
+        ]
+        return min(*waits_ns, *(one.timeout_ns for one in self.inputs.values()))
 
     def _identity(self, data: dict[str, Any], messages: dict[str, Message]) -> Key | None:
         """Key of the message that says what runs, where there is one."""

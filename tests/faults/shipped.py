@@ -38,6 +38,8 @@ NAMES = (
     "bridge-crane",
     "tower-crane",
     "telehandler",
+    "excavator",
+    "multicopter",
 )
 CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
 MADE = {
@@ -88,8 +90,9 @@ def shipped(name: str) -> Shipped:
     numbers = "".join(f"    {key}: [{low}, {high}]\n" for key, (low, high) in ranges.items())
     control = f"\ncontrol:\n  adjustable:\n{numbers}"
     text = file.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    assert "rise_per_s: 5," in text
     changed = text.replace("rise_per_s: 5,", "max_pct: 70, rise_per_s: 4,")
+    changed = changed.replace("rise_per_s: 1,", "max_pct: 70, rise_per_s: 0.8,")
+    assert "max_pct: 70" in changed
     refiltered = re.sub(r"kind: gff, a1: [\d.]+, a2: [\d.]+", "kind: zv", text)
     refiltered = re.sub(r"kind: off\b", "kind: first_order, time_constant_s: 0.1", refiltered)
     copies = {"adjustable": text + control, "changed": changed, "refiltered": refiltered}
@@ -112,7 +115,8 @@ def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
         config = load_config(machine.path)[0].axes[name]
         if config.profiles or config.gain_schedule or (config.sway and config.sway.length):
             continue
-        ranges[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
+        rise_per_s = config.limits.rise_per_s
+        ranges[f"axes.{name}.limits.rise_per_s"] = (0.4 * rise_per_s, rise_per_s)
         if axis.filter == "gff":
             numbers = config.filter.parameters()
             ranges[f"axes.{name}.filter.a1"] = (0.85 * numbers["a1"], 1.13 * numbers["a1"])

@@ -37,20 +37,22 @@ def test_no_sequence_makes_a_wrong_move(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"),
+    ("name", "seed", "newer"),
     [
         # a joystick misses a cycle at the end of its tail: the fall was counted from the last frame
-        ("gateway-forwarder", 2000807),
+        ("gateway-forwarder", 2000807, False),
         # a sensor that shows anything: more was added than a motion may, and no way counted it
-        ("canopen-sensor", 2700602),
+        ("canopen-sensor", 2700602, False),
         # a tap of 2 %, a trip and a reload: the rules asked of the axis to know of the tap
-        ("j1939-sensor", 2700324),
+        ("j1939-sensor", 2700324, False),
         # a stop with a rest in it: the rules took what moved then for the joystick's
-        ("forwarder-robust", 3101022),
+        ("forwarder-robust", 3101022, False),
+        # enable released for one frame between two ticks: the next one left with the old velocity
+        ("gateway-forwarder", 6500508, True),
     ],
 )
-def test_what_was_wrong_once_is_right(name: str, seed: int) -> None:
-    Sequence(name, seed, newer=False).run()
+def test_what_was_wrong_once_is_right(name: str, seed: int, newer: bool) -> None:
+    Sequence(name, seed, newer=newer).run()
 
 
 @pytest.mark.slow

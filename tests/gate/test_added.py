@@ -86,6 +86,20 @@ class TestAdded:
             assert "limit=asked" in one.sends(sign * 10)
             one.sends(0, enable=False)
 
+    @signs
+    def test_to_and_fro_it_goes_on_and_one_way_no_farther(self, sign: int) -> None:
+        one = self.robust(stop_distance_m=None, tail_s=4.0)
+        one.axis.of.slack = 0.4
+        one.rests()
+        for side in [sign] * 5 + [-sign] * 5:
+            assert not one.sends(side * FULL, near_far=float(side))
+        for side in ([sign] * 10 + [-sign] * 10) * 5:  # 1 s of each
+            assert not one.sends(side * FULL)
+        left = [one.sends(sign * FULL) for _ in range(60)]
+        first = [bool(why) for why in left].index(True)
+        assert first * 0.02 == pytest.approx(0.4 + 0.3, abs=0.021)
+        assert "limit=distance" in left[first]
+
     def test_as_far_as_the_file_says(self) -> None:
         one = self.robust()
         one.rests()

@@ -12,7 +12,7 @@ from canshaper.config.limits import Limits
 from canshaper.config.schema import Command as Stick
 from canshaper.config.schema import Valve
 from canshaper.gate.fields import openings_of, word_of
-from canshaper.gate.signals import command_of, field_of, part_of, stick_of
+from canshaper.gate.signals import Scale, command_of, field_of, part_of, stick_of
 from canshaper.shaping.limits import without_deadband
 
 HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: JOYSTICK SHAPER\nBO_ 2 Message: 8 JOYSTICK\n'
@@ -115,6 +115,29 @@ def test_the_file_corrects_what_the_dbc_says(
 
 
 @pytest.mark.parametrize(
+    ("signal", "keys", "low", "high"),
+    [
+        ("8@1- (1,0) [-100|100]", {"zero": 10}, -110, 90),
+        ("8@1- (1,0) [-100|90]", {"invert": True}, -90, 100),
+        # Two's complement reaches a step farther on one side, and not two.
+        ("8@1- (1,0) [-100|100]", {"full": 127}, -128, 127),
+        ("8@1- (1,0) [-100|100]", {"full": 126}, -126, 127),
+        ("8@1- (0.5,0) [-60|60]", {"full": 63.5}, -64, 63.5),
+        ("8@1- (-1,0) [-100|100]", {"full": 127}, -127, 128),
+        ("8@1+ (1,-128) [-100|100]", {"full": 127}, -128, 127),
+        ("8@1+ (1,0) [0|255]", {"full": 127, "zero": 128}, -128, 127),
+        ("8@1+ (1,0) [0|255]", {"full": 254, "negative": "Back"}, -254, 254),
+    ],
+)
+def test_ends_of_a_velocity(signal: str, keys: dict[str, Any], low: float, high: float) -> None:
+    one = message(f"Signal : 0|{signal}")
+    magnitude = "negative" in keys
+    scale = Scale(one.signals[0], Stick(joystick="a", signal="b", **keys), magnitude=magnitude)
+    assert (scale.low, scale.high) == (low, high)
+    assert scale.full == min(-low, high)
+
+
+@pytest.mark.parametrize(
     "name", ["Open circuit", "Fehler", "Short circuit", "Sensor break", "Bad", "Virhe", "Error"]
 )
 def test_a_code_with_a_name_is_no_measurement_whatever_the_name(name: str) -> None:
@@ -130,6 +153,9 @@ def test_neutral_may_have_its_name() -> None:
     assert value(one, bytes(8)) is None
     one = message("Signal : 0|8@1- (1,0) [-100|100]", tables='VAL_ 2 Signal 1 "Neutral" ;\n')
     assert value(one, b"\1" + bytes(7)) is None
+    table = 'VAL_ 2 Signal 100 "Neutral position" ;\n'
+    one = message("Signal : 0|8@1+ (0.5,-50) [-50|50]", tables=table)
+    assert value(one, b"\x64" + bytes(7)) == 0.0
 
 
 def test_what_the_file_lists_as_a_value_is_one() -> None:
@@ -138,6 +164,7 @@ def test_what_the_file_lists_as_a_value_is_one() -> None:
     assert value(one, b"\x80" + bytes(7), codes={"Full": "fault"}) is None
 
 
+SIDES = ("neutral", "negative", "positive")
 FLAGS = ("Neutral", "Negative", "Positive")
 
 
@@ -170,6 +197,18 @@ def test_a_rocker(forth: int, back: int, demand: float | None) -> None:
     section = Stick(joystick="left", signal="Forth", negative="Back")
     data = bytes([0, forth, 0, back, *bytes(4)])
     assert stick_of(one, section, one).demand(word_of(data)) == pytest.approx(demand)
+
+
+@pytest.mark.parametrize("keys", [{"negative": "Back"}, {"flags": dict.fromkeys(SIDES, "Back")}])
+def test_a_magnitude_is_not_beyond_full(keys: dict[str, Any]) -> None:
+    one = message("Forth : 8|8@1+ (1,0) [0|255]", "Back : 24|8@1+ (1,0) [0|255]")
+    section = Stick(joystick="left", signal="Forth", full=254, neutral_pct=5, **keys)
+    stick = stick_of(one, section, one)
+    assert stick.band == 0.05
+    assert [stick.part.value(word_of(bytes([0, raw, *bytes(6)]))) for raw in (254, 255)] == [
+        1.0,
+        None,
+    ]
 
 
 @pytest.mark.parametrize(("forth", "back"), [(50, -20), (-20, 50)])

@@ -70,7 +70,7 @@ def test_a_joystick_of_j1939_keeps_its_address_in_a_gateway(
 
 def test_the_header_of_e2e_is_no_start_value(machine: Machine) -> None:
     machine.in_dbc("BO_ 512 SlewCommand: 2", "BO_ 512 SlewCommand: 4")
-    machine.in_dbc("Velocity : 0|8@1-", "Velocity : 16|8@1-")
+    machine.in_dbc("Velocity : 0|8@1-", "Velocity : 24|8@1-")
     machine.in_dbc(
         'AliveCounter : 8|8@1+ (1,0) [0|255] "" VALVES', 'Crc : 0|8@1+ (1,0) [0|255] "" V'
     )
@@ -81,5 +81,5 @@ def test_the_header_of_e2e_is_no_start_value(machine: Machine) -> None:
     )
     valve = record_of(machine.load()).valves["crane", 512, False]
     assert valve.protection.counts == 16
-    assert valve.ours == 0x00FFFFFF
-    assert valve.fixed == 0xFF000000
+    assert valve.ours == 0xFF00FFFF
+    assert valve.fixed == 0x00FF0000

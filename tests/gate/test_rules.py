@@ -6,7 +6,7 @@ Full command is 125 steps without a dead band here, a step 0.008 of full speed.
 import pytest
 
 from tests.faults import variants
-from tests.gate.bench import Bench, bench, limited, signs
+from tests.gate.bench import Bench, bench, limited, load, signs
 
 
 class TestDirectionAndSize:
@@ -273,3 +273,21 @@ class TestRates:
         why = one.sends(sign * 100, near_far=float(sign))
         # 1.6 / 125 of full speed in a step: one and a half of them, and the rise
         assert f"limit=rise allowed=0.119 speed={sign * 0.68:.3f}" in why
+
+
+def test_what_a_gateway_missed_has_fallen_already() -> None:
+    """A frame after two periods, on its way back: the next one may be a fall below it."""
+    axis = Bench(load("gateway-forwarder"), "slew").axis
+    axis.last, axis.top, axis.ticks = 0.5, 0.5, 2
+    axis.left(0.4, 10, 10)
+    assert axis.top == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("last", [0.0, -0.3])
+def test_what_fell_on_the_other_side_is_no_fall_on_this_one(last: float) -> None:
+    axis = Bench(load("forwarder"), "slew").axis
+    axis.last, axis.way_back, axis.most = last, 0.9, 1.0
+    for number, velocity in enumerate((0.3, 0.2)):
+        axis.ticks = 1
+        axis.left(velocity, number, number)
+    assert axis.forth.remaining == pytest.approx(-0.5 * 0.02)

@@ -15,7 +15,7 @@ SENDERS = {
     "bus/python_can.py": (1, "to the adapter"),
     "bus/apart.py": (2, "to the adapter; wakes its thread"),
     "commissioning/doctor/loop.py": (1, "a port of sockets in place of a bus"),
-    "studio/session.py": (1, "joysticks, where the page drives a simulated machine"),
+    "studio/crane.py": (1, "joysticks, where the page drives a simulated machine"),
     "bus/netlink.py": (1, "asks the kernel"),
     "daemon/control_server.py": (1, "answers on the control socket"),
     "commissioning/control_client.py": (1, "asks on the control socket"),

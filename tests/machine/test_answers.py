@@ -16,7 +16,6 @@ from tests.rigs.forwarder import ROOT
 BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
 STATUS = "status: { bus: crane, message: ShaperStatus }"
 LIFT_FILTER = "    filter: { kind: off } # lifting excites no sway\n"
-NO_MESSAGE = "expected a message of the DBC files, got Nothing"
 FEEDBACK = "    status: { bus: crane, message: LiftStatus }\n"
 
 

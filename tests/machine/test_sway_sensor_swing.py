@@ -2,21 +2,8 @@
 
 import pytest
 
+from tests.machine.test_sway_sensor_binding import ALONG, INCLINED, changed, sensing
 from tests.rigs.files import Machine
-
-ALONG = "bus: crane, message: GrappleSway, signal: SwayParallel, kind: angle, timeout_ms: 80"
-INCLINED = ALONG.replace("kind: angle", "kind: inclination")
-NEAR_FAR = "    sway: { length_m: 1.2"
-
-
-def sensing(machine: Machine, text: str, before: str = NEAR_FAR) -> int:
-    """Give an axis a sensor; return its line."""
-    return machine.in_yaml(before, f"    sway_sensor: {{ {text} }}\n{before}")
-
-
-def changed(old: str, new: str) -> str:
-    assert old in ALONG
-    return ALONG.replace(old, new)
 
 
 def test_an_axis_without_sway(machine: Machine) -> None:

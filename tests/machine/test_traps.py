@@ -9,7 +9,6 @@ from tests.machine.trap import Trap, made, said
 from tests.rigs.files import Machine
 
 TRAPS = [*traps_of_signals.TRAPS, *traps_of_machines.TRAPS]
-MEANT = [trap for trap in TRAPS if trap.warns]
 
 
 def test_there_are_many_and_each_is_another() -> None:

@@ -13,7 +13,6 @@ OWN = {
     "request": 0x18EAFF00 | FREE,
 }
 EXTENDED = 1 << 31
-CM = 'BA_DEF_ BO_ "GenMsgCycleTime"'
 DIGEST = ' SG_ Digest : 0|16@1+ (1,0) [0|65535] "" PLANT\n\n'
 IDENTITY = "identity: { bus: crane, message: ShaperIdentity }"
 SECOND = 'VERSION ""\nNS_ :\nBS_:\nBU_: A\n'

@@ -4,7 +4,6 @@ from tests.machine.trap import J1939, Trap
 
 ENABLE = 'VAL_ 272 Enable 0 "Off" 1 "On" 2 "Error" 3 "NotAvailable" ;'
 SWITCHES = {"enable": "Enable", "reset": "Reset", "anti_sway_off": "AntiSwayOff"}
-KEYS = {key: f"    {key}: {signal}\n" for key, signal in SWITCHES.items()}
 BIT = {"Enable": " 32|2@1+ (1,0) [0|1]", "AntiSwayOff": " 34|2@1+ (1,0) [0|1]"}
 BIT["Reset"] = " 36|2@1+ (1,0) [0|1]"
 STOP = "emergency_stop: { bus: crane, message: Safety, signal: Stop, timeout_ms: 200 }\n"

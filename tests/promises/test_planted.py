@@ -18,9 +18,11 @@ from tests.promises.world import ALIKE, HOUR_NS, World
 from tests.promises.worst import Worst
 
 SOME = ("forwarder", "forwarder-robust", "gateway-forwarder", "canfd-forwarder")
-# What is planted as right rises by 5 of full speed a second; the cranes' with a rope by less.
-ROPES = "bridge-crane", "tower-crane", "telehandler"
-MACHINES = ("forwarder", *(name for name in NAMES if name not in (*ALIKE, *ROPES)))
+# What is planted as right rises by 5 of full speed a second; that of cranes with a rope by less.
+# The joints of the excavator are those of forwarder-joints.
+ROPES = "bridge-crane", "tower-crane", "telehandler", "multicopter"
+OTHERS = (*ALIKE, *ROPES, "excavator")
+MACHINES = ("forwarder", *(name for name in NAMES if name not in OTHERS))
 DIRECT = tuple(name for name in MACHINES if not name.startswith("gateway"))
 MOTION = ("forwarder-robust", "forwarder-pump")
 EMERGENCY, SWITCHES = ("remote-forwarder",), ("j1939-rollers", "ecu-forwarder")

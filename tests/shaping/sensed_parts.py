@@ -163,11 +163,16 @@ class Parts:
         return self
 
     def measure(
-        self, value: float | None = 0.01, *, commanded: bool = True, damps: bool = False
+        self,
+        value: float | None = 0.01,
+        *,
+        commanded: bool = True,
+        damps: bool = False,
+        other: float | None = None,
     ) -> list[Call]:
         """Measure once; what the parts were called with for it."""
         self.calls.clear()
-        self.sensed.measure(value, SCALE, commanded=commanded, damps=damps)
+        self.sensed.measure(value, SCALE, commanded=commanded, damps=damps, other=other)
         return list(self.calls)
 
     def step(self, velocity: float = 0.0, command: float = 0.0) -> list[Call]:

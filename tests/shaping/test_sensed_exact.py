@@ -158,6 +158,24 @@ def test_only_motion_of_the_axis_or_damping_says_something_about_the_sensor(
     assert len(named(calls, "correct")) == 1
 
 
+def test_what_another_axis_has_shown_is_no_proof_without_it(parts: Parts) -> None:
+    parts.begun()
+    assert named(parts.measure(commanded=False, damps=True, other=0.1), "evidence.add")
+    calls = parts.measure()
+    assert calls.index(("evidence.clear",)) < calls.index(("evidence.add", (0.0, 0.0, 0.0, 0.0)))
+    assert not named(parts.measure(), "evidence.clear")
+    parts.measure(commanded=False, damps=True, other=0.1)
+    parts.sensed.state = Trust.TRUSTED  # and what has proved it counts on
+    assert not named(parts.measure(), "evidence.clear")
+
+
+def test_one_that_is_doubted_is_not_proved_by_another_axis(parts: Parts) -> None:
+    parts.begun()
+    parts.evidence.shows = Trust.CONTACT
+    parts.measure()
+    assert not named(parts.measure(commanded=False, damps=True, other=0.1), "evidence.add")
+
+
 def test_by_default_an_axis_that_is_not_commanded_does_not_damp(parts: Parts) -> None:
     parts.begun()
     parts.sensed.weight = 0.5

@@ -11,7 +11,8 @@ from canshaper.report.stroke_metrics import crane_metrics
 from canshaper_sim.axes import JOINT_AXES
 from canshaper_sim.grapple import Sway
 from canshaper_sim.machines import build_machine
-from canshaper_sim.operator import SCRIPTS, random_script, script_named
+from canshaper_sim.operator import SCRIPTS, random_script, script_for, script_named
+from canshaper_sim.strokes import Script, Stroke
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 TICK_S = 0.02
@@ -53,6 +54,42 @@ def test_slew_pulse_is_the_same_with_and_without_joints() -> None:
 )
 def test_pulse_of_each_joint(axis: str, least_pct: float) -> None:
     assert residual_reduction_pct("forwarder-joints.yaml", f"pulse-{axis}", axis) >= least_pct
+
+
+def left_deg(file: str, strokes: tuple[Stroke, ...]) -> tuple[float, float]:
+    """Swing in the last 3 of 8 s after the strokes: raw, shaped."""
+    deployment = load_deployment(CONFIG / file)
+    script = Script("one", strokes, max(one.end_s for one in strokes) + 8.0)
+    left = []
+    for bypass in (True, False):
+        recording = drive(deployment, script, bypass=bypass)
+        assert recording.crane is not None
+        left.append(max(recording.crane.sway_deg[-150:]))
+    return left[0], left[1]
+
+
+def reversal(axis: str, level: float) -> tuple[Stroke, ...]:
+    return Stroke(axis, 0.5, 1.2, level, 0.1), Stroke(axis, 1.7, 1.2, -level, 0.1)
+
+
+def test_an_excavator_slews_with_a_tool_that_hangs_free() -> None:
+    raw, shaped = left_deg("excavator.yaml", (Stroke("slew", 0.5, 1.2, 1.0, 0.1),))
+    assert raw > 20.0
+    assert shaped < 0.1 * raw
+
+
+@pytest.mark.slow
+def test_what_the_excavator_leaves_of_pulses_reversals_and_random_drives() -> None:
+    """The boom going down swings it so little that a sixth of it is left of that."""
+    deployment = load_deployment(CONFIG / "excavator.yaml")
+    ways = [(axis, level) for axis in ("slew", "boom", "arm") for level in (1.0, -1.0)]
+    drives = [(Stroke(axis, 0.5, 1.2, level, 0.1),) for axis, level in ways]
+    drives += [reversal(axis, level) for axis, level in ways]
+    drives += [script_for(deployment, f"random-{seed}").strokes for seed in range(4)]
+    left = [left_deg("excavator.yaml", one) for one in drives]
+    print([f"{raw:.1f} {shaped:.2f}" for raw, shaped in left])
+    assert sum(shaped for _, shaped in left) < 0.07 * sum(raw for raw, _ in left)
+    assert all(shaped < 0.1 * raw or shaped < 1.2 for raw, shaped in left)
 
 
 @pytest.mark.slow

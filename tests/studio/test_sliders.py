@@ -48,8 +48,7 @@ def test_the_copy_of_every_shipped_file_is_a_deployment(file: str, tmp_path: Pat
 
 
 def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
-    text = (CONFIG / "forwarder.yaml").read_text()
-    text = text.replace("../dbc", str(CONFIG.parent / "dbc"))
+    text = (CONFIG / "forwarder.yaml").read_text().replace("../dbc", str(CONFIG.parent / "dbc"))
     text += "\ncontrol: { adjustable: { axes.slew.limits.max_pct: [50, 100] } }\n"
     file = tmp_path / "own.yaml"
     file.write_text(text)

@@ -23,7 +23,7 @@ def add_axes(
     others: "list[Message]",
     nodes: Nodes,
 ) -> None:
-    """Add the axes of a joystick; ``others`` are messages that are left."""
+    """Ask for the axes of a joystick and add them; ``others`` are the messages of no joystick."""
     from canshaper.cli.interview.first import FirstAxis
     from canshaper.commissioning import suggest
 
@@ -111,7 +111,7 @@ def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
     """Ask for the timeout of a valve; ``set_ms`` is what it has by its EDS, 0 for none.
 
     Returns:
-        It, and whether it is no mere proposal.
+        The timeout in ms, and whether EDS or operator say it: else it is our proposal.
     """
     from canshaper.cli.interview.first import VALVE_TIMEOUT_MS
 

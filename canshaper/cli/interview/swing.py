@@ -50,7 +50,7 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
 def sensor_of(
     axis: str, swing_s: float, others: "list[Message]", bound: "list[FirstAxis]"
 ) -> "FirstSensor | None":
-    """Ask for the sway sensor of an axis; ``others``: messages left; ``bound``: axes with one."""
+    """Ask for the sway sensor of an axis, in ``others``; ``bound`` are the axes before it."""
     from canshaper.cli.interview.first import FirstSensor
     from canshaper.commissioning import suggest
     from canshaper.config.inputs import SwaySensorSection

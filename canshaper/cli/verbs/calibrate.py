@@ -127,7 +127,7 @@ def calibrate(
         if live:
             run_live(drive, deployment, show)
         else:
-            run_simulated(drive, deployment, changed_parameters(changes or []), show)
+            run_simulated(drive, deployment, changed_parameters(changes or [], deployment), show)
     drive.check_ended()
     bus = deployment.config.buses[deployment.axes[axes[0]].config.valve.bus]
     simulated = not live or bus.is_virtual

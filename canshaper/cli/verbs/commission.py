@@ -171,9 +171,9 @@ def _one(procedure: "Procedure", step: "Step") -> None:
         while procedure.news:
             echo(f"NOTE: {procedure.news.pop(0)}")
         _show(procedure, proposal)
-        choices = (AGAIN, SKIP, STOP) if proposal.poor else (YES, AGAIN, SKIP, STOP)
-        what = "accept" if not proposal.poor else "not enough data"
-        default = STOP if proposal.poor else YES
+        choices = (AGAIN, SKIP, STOP) if proposal.problems else (YES, AGAIN, SKIP, STOP)
+        what = "accept" if not proposal.problems else "not enough data"
+        default = STOP if proposal.problems else YES
         answer = ask(f"{step.name}: {what} ({', '.join(choices)})", one(choices), default)
         if answer == YES:
             procedure.accept(proposal)
@@ -198,11 +198,11 @@ def _show(procedure: "Procedure", proposal: "Proposal") -> None:
     for picture in proposal.pictures:
         if picture.suffix == ".png":
             echo(f"Picture: {picture}")
-    for fault in proposal.poor:
+    for fault in proposal.problems:
         echo(f"NOT ENOUGH DATA: {fault}")
     if proposal.diff:
         echo(f"It would write into {procedure.files.deployment}:\n{proposal.diff}")
-    elif not proposal.poor:
+    elif not proposal.problems:
         echo(f"{procedure.files.deployment} stays as it is.")
 
 

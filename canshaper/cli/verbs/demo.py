@@ -114,10 +114,10 @@ def demo(
     from canshaper_sim.operator import script_for
     from canshaper_sim.parameters import changed_parameters
 
-    nominal = changed_parameters(changes or [])  # wrong ones are named before anything begins
     if (ranges is not None and seed is None) or (seed is not None and (crane or rest) is not None):
         raise UsageError("--seed: expected with --ranges, and without --crane or --rest")
     deployment = loader(sensed(file, DEFAULT, sensor))()
+    nominal = changed_parameters(changes or [], deployment)
     results = Results("Drive without and with filters", deployment, report, picture)
     lockstep = lockstep or seed is not None
     # A drive on a bus needs Linux' scheduler and sockets.

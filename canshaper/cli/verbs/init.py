@@ -97,7 +97,8 @@ def init(
             messages += nodes.messages
             of = ", ".join(map(str, (*files, *(eds or []))))
             echo(f"{len(messages)} messages in {of}.")
-            names = [_relative(path, folder) for path in (*files, *([own] if eds else []))]
+            used = (*files, *([own] if eds else []))
+            names = [os.path.relpath(path.resolve(), folder) for path in used]
             ask = partial(machine_of, messages, names, interface, nodes)
             machine = (None if answers else accepted(ask)) or ask()
             uses = uses_of(machine, messages)
@@ -164,8 +165,8 @@ def _designed(file: Path, axis: "FirstAxis", load: "FirstLoad | None") -> bool:
         low_m, high_m = (round(GRAVITY_M_S2 * (0.1 * t / math.tau) ** 2, 2) for t in times_s)
         lengths_m = low_m, high_m
     try:
-        from canshaper.commissioning.loads import design_loads
-        from canshaper.commissioning.robust import design_robust, summary_line, write_design
+        from canshaper.commissioning.robust import design_loads, design_robust
+        from canshaper.commissioning.robust_report import summary_line, write_design
 
         deployment = loader(str(file))()
         if load and load.message:
@@ -213,7 +214,3 @@ def _write(file: Path, draft: Path, text: str) -> None:
         kept = f"{draft}: kept with all answers; fix it there and rename it to {file}"
         raise UsageError(f"{error}\n{kept}") from None
     draft.replace(file)
-
-
-def _relative(path: Path, folder: Path) -> str:
-    return os.path.relpath(path.resolve(), folder)

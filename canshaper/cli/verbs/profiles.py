@@ -56,8 +56,8 @@ def profiles(
     from canshaper.report.console import SafeConsole, new_table
     from canshaper_sim.parameters import changed_parameters
 
-    crane = changed_parameters(changes or [])  # wrong ones are named before anything is driven
     deployment = loader(file)()
+    crane = changed_parameters(changes or [], deployment)
     try:
         results = list(figures(deployment, crane))
     except DesignError as error:

@@ -82,15 +82,20 @@ def robust(
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.filter_file import refuse_scheduled, written_line
-    from canshaper.commissioning.loads import design_loads, lengths_of, print_loads
-    from canshaper.commissioning.robust import design_robust, figure, print_design, write_design
+    from canshaper.commissioning.robust import design_loads, design_robust
+    from canshaper.commissioning.robust_report import (
+        figure,
+        print_design,
+        print_loads,
+        write_design,
+    )
     from canshaper.edit.edit import flow
 
     deployment = loader(file)()
     results = Results(f"Robust shaper for {axis}", deployment, report, picture, quiet=as_json)
     if write:
         refuse_shipped(file)
-    lengths_m = lengths_of(lengths)
+    lengths_m = _lengths(lengths)
     if loads and lengths_m:
         raise UsageError("expected one of --lengths and --loads, got both")
     if write and not loads and not lengths_m:
@@ -117,13 +122,29 @@ def robust(
         data = {"loads": [*map(_result, designs)]} if loads else _result(designs[0])
         files = {"picture": path, "written": deployment.path if write else None}
         echo(json.dumps(data | files, indent=2, default=str))
-    lines = [f"sway: {flow(one.sway)}" for one in designs if one.sway]
+    lines = [f"sway: {flow(one.task.sway)}" for one in designs if one.task.sway]
     lines += [f"filter: {flow(one.section)}" for one in designs]
     lines = [*changed, written_line(deployment.path)] if write else lines
     results.print("\n".join(lines), soft_wrap=True)
     results.write()
     if useless:
         raise typer.Exit(EXIT_USELESS)
+
+
+def _lengths(text: str | None) -> tuple[float, float] | None:
+    """Return the shortest and the longest pendulum of the option --lengths, m."""
+    if text is None:
+        return None
+    try:
+        low_m, high_m = (float(word) for word in text.split(":"))
+    except ValueError:
+        raise UsageError(
+            f"--lengths: expected LOW:HIGH in m, such as 1.2:1.6, got {text}"
+        ) from None
+    if not 0.05 <= low_m <= high_m <= 150.0:
+        most = min(high_m, 150.0)
+        raise UsageError(f"--lengths: expected LOW of 0.05 to {most:g} m, up to HIGH, got {text}")
+    return low_m, high_m
 
 
 def _result(one: "RobustDesign") -> dict[str, Any]:

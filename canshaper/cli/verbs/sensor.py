@@ -113,7 +113,7 @@ def sensor(
 
         results.picture_line(results.picture(out / "sensor.png", figure))
     results.write()
-    if any(finding.poor for finding in findings):
+    if any(finding.problems for finding in findings):
         raise typer.Exit(EXIT_TOO_POOR)
 
 
@@ -155,7 +155,7 @@ def _simulate(deployment: "Deployment", axes: Sequence[str], log: Path, changes:
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters
 
-    parameters = changed_parameters(changes)
+    parameters = changed_parameters(changes, deployment)
     with progress_bar("driving") as on_progress:
         log_simulated(log, deployment, parameters, hand_driven(axes), on_progress)
 
@@ -175,7 +175,7 @@ def _print(
             results.print(table(deployment.axes[finding.axis], finding))
         for note in finding.notes:
             results.print(f"  note: {note}")
-        for fault in finding.poor:
+        for fault in finding.problems:
             results.print(f"  not enough data: {fault}")
     for line in written:
         results.print(line)

@@ -54,12 +54,12 @@ def sim(
     from canshaper_sim.parameters import changed_parameters, parameter_names
     from canshaper_sim.realtime import run_plant
 
-    parameters = changed_parameters(changes or [])
+    deployment = loader(file, interface, channel, network=network)()
+    parameters = changed_parameters(changes or [], deployment)
     if show:
         for name, value in parameter_names(parameters).items():
             echo(f"{name}={value:g}")
         return
-    deployment = loader(file, interface, channel, network=network)()
     driven = one_crane(deployment, crane) if crane else deployment
     echo(f"the crane of {', '.join(driven.axes)} is on {buses_line(deployment)}; Ctrl-C ends it")
     run_plant(driven, parameters, machine)

@@ -121,7 +121,7 @@ def studio(
     # As a service manager ends it; uvicorn raises the signal again when it is done.
     signal.signal(signal.SIGTERM, interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
-        parameters = changed_parameters(changes or [])
+        changed_parameters(changes or [])  # wrong ones are named before anything begins
         file = sensed(file, DEFAULT, sensor)
         drawn = [] if seeds is None else seeds
         if is_drive(file) or drawn or folder:
@@ -156,6 +156,7 @@ def studio(
         stack.callback(commission.close)
 
         def page(access: "Access") -> "ASGIApp":
+            parameters = changed_parameters(changes or [], stage.deployment)
             return build_app(stage, access, parameters, commission)
 
         serve(stack, host, port, page, stage)

@@ -13,7 +13,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
 from canshaper.commissioning.identification.series import Array, Command, Span, common, runs
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.valves import BoundAxis
 from canshaper.recording.channels import InputFinder
 

@@ -231,9 +231,8 @@ def logged(
         report = partial(on_progress, what=path.name)
         if is_table(path):
             table = read_table(path, report)
-            columns: dict[str, str | None] = {**signals}
-            columns = columns or {axis_named(axis, deployment): None}
-            shown = {a: series_of(table, label, c, about_s) for a, c in columns.items()}
+            axes = [*signals] or [axis_named(axis, deployment)]
+            shown = {a: series_of(table, label, signals.get(a), about_s) for a in axes}
         else:
             names = signals or _simulated(deployment, messages, axis)
             known: dict[str, Any] = {"deployment": deployment, "channel": channel}

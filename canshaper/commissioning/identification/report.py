@@ -54,7 +54,7 @@ def _advise(axis: str, findings: Sequence[Finding], deployment: Deployment | Non
     has_grapple = bool(deployment and deployment.load_state)
     states = [(f, _values(f, speed_m_s)) for f in findings if f.usable]
     if not states:
-        reasons = " ".join(dict.fromkeys(text for f in findings for text in f.poor[:1]))
+        reasons = " ".join(dict.fromkeys(text for f in findings for text in f.problems[:1]))
         return Advice(axis, f"{axis}: nothing that can be used. {reasons}".strip())
     values = [v for _, v in states]
     if len(values) == 1:
@@ -143,7 +143,7 @@ def lines(finding: Finding) -> list[str]:
     if finding.at is not None:
         texts.append(f"  load state: {finding.at:g}")
     texts += [f"  note: {text}" for text in finding.notes]
-    return texts + [f"  not enough data: {fault}" for fault in finding.poor]
+    return texts + [f"  not enough data: {fault}" for fault in finding.problems]
 
 
 def heading(finding: Finding) -> str:
@@ -186,7 +186,7 @@ def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, 
                 "full_speed_m_s": _interval(f.full_speed_m_s),
                 "free_decays": len(f.free.segments) if f.free else 0,
                 "swings": round(f.free.swings, 2) if f.free else None,
-                "too_poor": f.poor,
+                "too_poor": f.problems,
                 "notes": f.notes,
             }
             for f in findings

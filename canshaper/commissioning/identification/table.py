@@ -207,7 +207,7 @@ def _named(header: str) -> tuple[str, str]:
 
 
 def _time(path: Path, columns: dict[str, Array]) -> tuple[str, float]:
-    """The column of times, and what makes seconds of it."""
+    """The column of times, and its unit in seconds."""
     named = [n for n in columns if _TIME.search(n)]
     # One that counts seconds from the start rather than one that counts from 1970.
     named.sort(key=lambda n: (_unit_of_time(n) is None, not re.search("elapsed", n, re.IGNORECASE)))

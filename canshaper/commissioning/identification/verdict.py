@@ -45,13 +45,13 @@ class Finding:
     period_s: Value | None = None  # of small damped swings; None where nothing was found
     damping_ratio: Value | None = None
     full_speed_m_s: Value | None = None  # of the tip; None where that was not seen
-    poor: list[str] = field(default_factory=list)  # why it cannot be used, with what to do
+    problems: list[str] = field(default_factory=list)  # why it cannot be used, with what to do
     notes: list[str] = field(default_factory=list)  # what else a person should know
 
     @property
     def usable(self) -> bool:
         """Whether period and damping are known well enough."""
-        return not self.poor and self.period_s is not None
+        return not self.problems and self.period_s is not None
 
 
 def identify(
@@ -73,10 +73,10 @@ def identify(
     _free(finding, good, about_s)
     _driven(finding, good, about_s)
     if finding.period_s is None:
-        finding.poor = useless or [_no_swing(good)]
+        finding.problems = useless or [_no_swing(good)]
     else:
         finding.notes += useless
-        finding.poor = _faults(finding)
+        finding.problems = _faults(finding)
         if finding.free:
             finding.notes += _doubts(finding.free, usable=finding.usable)
     return finding

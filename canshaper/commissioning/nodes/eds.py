@@ -93,7 +93,7 @@ class Eds:
         return objects
 
     def elements(self, index: int) -> int:
-        """Elements of an array that has one section for all of them; 0 of another one."""
+        """Number of elements of an array with one section for all (CompactSubObj), else 0."""
         section, key = f"{index:04X}", "CompactSubObj"
         return self._whole(section, key, self._file.get(section, key, fallback="0"))
 

@@ -208,7 +208,11 @@ class Simulated:
     def __init__(self, person: Person, changes: list[str]) -> None:
         self.person = person
         self.changes = changes
-        self.parameters: CraneParameters = changed_parameters(changes)
+        changed_parameters(changes)  # wrong ones are named before anything begins
+
+    def parameters(self, deployment: Deployment) -> CraneParameters:
+        """Return the crane of this file."""
+        return changed_parameters(self.changes, deployment)
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
         """See ``Bench``."""
@@ -216,7 +220,7 @@ class Simulated:
             log_simulated(
                 log,
                 deployment if task.mode in (Mode.RAW, Mode.SHAPED) else deployment.listening(),
-                self.parameters,
+                self.parameters(deployment),
                 task.script,
                 on_progress,
                 bypass=task.mode is Mode.RAW,
@@ -230,4 +234,5 @@ class Simulated:
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, _words: str) -> None:
         """See ``Bench``."""
         with self.person.progress("driving") as on_progress:
-            run_simulated(drive, deployment, self.parameters, lambda one: on_progress(one.progress))
+            parameters = self.parameters(deployment)
+            run_simulated(drive, deployment, parameters, lambda one: on_progress(one.progress))

@@ -35,7 +35,7 @@ class Proposal:
         step: name of the step.
         parts: lines and tables.
         numbers: what was measured.
-        poor: what is missing, with what to do; then nothing can be accepted.
+        problems: what is missing, with what to do; then nothing can be accepted.
         pictures: files of its picture.
         files: its logs.
         note: what is said of the step once it is done.
@@ -48,7 +48,7 @@ class Proposal:
     before: str
     parts: list[Part] = field(default_factory=list)
     numbers: dict[str, object] = field(default_factory=dict)
-    poor: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
     pictures: list[Path] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     note: str = ""
@@ -145,18 +145,20 @@ class Procedure:
         try:
             outcome = step.run(context)
             proposal.parts, proposal.numbers = outcome.sheet.parts, outcome.numbers
-            proposal.poor, proposal.files = outcome.poor, outcome.files
+            proposal.problems, proposal.files = outcome.problems, outcome.files
             proposal.note = outcome.note
             for part, figure in outcome.figures.items():
                 name = f"{step.name}-{part}" if part else step.name
                 proposal.pictures += draw(figure, self.files.folder / name, deployment)
-            if outcome.edit and not outcome.poor:
+            if outcome.edit and not outcome.problems:
                 self._propose(proposal, outcome)
         except BusError:
             raise
         except CanshaperError as error:
-            proposal.poor.append(str(error).replace(str(self.files.proposal), str(deployment.path)))
-        self._keep(proposal, Status.OPEN, why="; ".join(proposal.poor) or "not accepted yet")
+            proposal.problems.append(
+                str(error).replace(str(self.files.proposal), str(deployment.path))
+            )
+        self._keep(proposal, Status.OPEN, why="; ".join(proposal.problems) or "not accepted yet")
         return proposal
 
     def accept(self, proposal: Proposal) -> None:
@@ -166,8 +168,8 @@ class Procedure:
             UsageError: it lacks something, or the file was changed meanwhile: the step stays open.
             OSError: a file cannot be written.
         """
-        if proposal.poor:
-            raise UsageError(f"{proposal.step}: {'; '.join(proposal.poor)}")
+        if proposal.problems:
+            raise UsageError(f"{proposal.step}: {'; '.join(proposal.problems)}")
         path = self.files.deployment
         if hash_of(path) != proposal.before:
             self._notice_changes()
@@ -217,7 +219,7 @@ class Procedure:
             why=why,
             parts=proposal.parts,
             numbers=proposal.numbers,
-            poor=proposal.poor,
+            problems=proposal.problems,
             pictures=[path.name for path in proposal.pictures],
             files=[path.name for path in proposal.files],
             diff=proposal.diff if done else "",

@@ -40,7 +40,7 @@ class Record:
         why: what is said of it: why it is open again, how it was judged.
         parts: what it has shown.
         numbers: what it measured.
-        poor: what was missing.
+        problems: what was missing.
         pictures: files of its picture, in the folder.
         files: its logs, there too.
         diff: what it has written into the deployment file, as a unified diff.
@@ -53,7 +53,7 @@ class Record:
     why: str = ""
     parts: list[Part] = field(default_factory=list)
     numbers: dict[str, Any] = field(default_factory=dict)
-    poor: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
     pictures: list[str] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
     diff: str = ""
@@ -114,7 +114,10 @@ def read_state(path: Path) -> State | None:
         if data.pop("version") != VERSION:
             raise ValueError("another version")
         steps = {
-            name: Record(**{**one, "status": Status(one["status"])})
+            # An older program has written its problems as poor.
+            name: Record(
+                **{"problems": one.pop("poor", []), **one, "status": Status(one["status"])}
+            )
             for name, one in data.pop("steps").items()
         }
         return State(**data, steps=steps)
@@ -166,7 +169,7 @@ class Outcome:
     Attributes:
         sheet: its lines and tables.
         numbers: what it measured, of JSON types, by names with units.
-        poor: what is missing, each with what to do; a step with one stays open.
+        problems: what is missing, each with what to do; a step with one stays open.
         figures: draw its pictures, by the end of their names; empty for a single one.
         files: logs it has written.
         note: what is said of the step once it is done; empty for nothing.
@@ -176,7 +179,7 @@ class Outcome:
 
     sheet: Sheet = field(default_factory=Sheet)
     numbers: dict[str, Any] = field(default_factory=dict)
-    poor: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
     figures: "dict[str, Callable[[], Figure]]" = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     note: str = ""

@@ -18,7 +18,8 @@ from canshaper.commissioning.identification.commands import Samples, joystick_co
 from canshaper.commissioning.identification.series import Array, Kind, Series
 from canshaper.errors import IdentificationError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.machine.inputs import BoundInput
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.valves import BoundAxis
 from canshaper.recording.channels import InputFinder, Key
 from canshaper.recording.history import History

@@ -46,7 +46,7 @@ class Finding:
         data: the stretches in which the axis was driven.
         fit: the model that explains it best; None where there was nothing to explain.
         noise: standard deviation of its noise, degrees or degrees per second.
-        poor: why nothing may be used, each with what to do.
+        problems: why nothing may be used, each with what to do.
         notes: what else a person should know.
     """
 
@@ -55,7 +55,7 @@ class Finding:
     data: Sequence[Driven] = ()
     fit: SensorFit | None = None
     noise: float = 0.0
-    poor: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -104,19 +104,19 @@ def examine(axis: BoundAxis, series: Series) -> Finding:
     finding = Finding(axis.name, series, notes=list(series.notes))
     mode = axis.config.sway.mode()
     if fault := _useless(axis.name, series, mode.period_s):
-        finding.poor.append(fault)
+        finding.problems.append(fault)
         return finding
     finding.data = [
         one for part in _alone(series, mode.period_s) for one in stretches(part, mode.period_s)
     ]
     if not finding.data:
         text = "no stretch of driving with measurements all the time"
-        finding.poor.append(f"{series.source}: {text}: {DRIVE_IT}")
+        finding.problems.append(f"{series.source}: {text}: {DRIVE_IT}")
         return finding
     config = axis.sway_sensor.config
     finding.fit = fit_sensor(finding.data, mode, config.valve_lag_ms / 1000.0)
     finding.noise = math.degrees(_noise(finding.data, finding.fit.fitted))
-    finding.poor += _faults(axis, finding)
+    finding.problems += _faults(axis, finding)
     finding.notes += _notes(axis, finding)
     return finding
 

@@ -36,7 +36,7 @@ def figure(findings: Sequence[Finding]) -> Figure:
         panel = fig.add_subplot(grid[i, 0])
         style.plain(panel, size=style.TEXT_PT)
         style.titled(panel, heading(finding), style.TITLE_PT)
-        panel.title.set_color(style.RAW_COLOUR if finding.poor else style.TEXT_COLOUR)
+        panel.title.set_color(style.RAW_COLOUR if finding.problems else style.TEXT_COLOUR)
         reach = 0.0
         for one, model in zip(finding.data, finding.fit.fitted, strict=True):
             time = one.start_s + one.time_s

@@ -23,7 +23,7 @@ def heading(finding: Finding) -> str:
     driven = len(finding.data)
     explained = 100.0 * max(0.0, finding.fit.explained(math.radians(finding.noise)))
     text += f": {driven} driven stretch{'es' * (driven != 1)}, {explained:.0f} % explained"
-    return f"{text} (not enough data)" if finding.poor else text
+    return f"{text} (not enough data)" if finding.problems else text
 
 
 def table(axis: BoundAxis, finding: Finding) -> Table:
@@ -60,7 +60,7 @@ def write_sensors(
 
     Args:
         deployment: the machine.
-        findings: of its sensors; poor ones are left out.
+        findings: of its sensors; those with problems are left out.
         log: the log that they are from, where a person recorded it.
         live: whether the buses were listened to.
 
@@ -74,7 +74,7 @@ def write_sensors(
     origin = written_by("sensor", simulated=simulated, log=log.name if log else None)
     written: list[Change] = []
     for finding in findings:
-        if not finding.poor:
+        if not finding.problems:
             place = ("axes", finding.axis, "sway_sensor")
             values: dict[str, FileValue] = {**changes(deployment.axes[finding.axis], finding)}
             values["origin"] = origin

@@ -67,7 +67,7 @@ class Editor:
         self._keys, self._length = frozenset(bound.keys), bound.message.length
 
     def has(self, frame: Frame) -> bool:
-        """Whether it is a frame of this message, of its length and page."""
+        """Whether it is a frame of this message, of its length and its value of the multiplexor."""
         bus, can_id, extended = self.bound.key
         its = frame[:3] in self._keys
         if self.bound.any_source:

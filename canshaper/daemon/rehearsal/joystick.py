@@ -10,7 +10,7 @@ from canshaper.codec.velocity import FlaggedVelocity, RockerVelocity, Velocity, 
 from canshaper.daemon.rehearsal import fault as make
 from canshaper.daemon.rehearsal.fault import MS, Alter, Demands, Editor, Fault, S
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.shaping.states import Reason
 
 OTHER_SOURCE = 0xFC

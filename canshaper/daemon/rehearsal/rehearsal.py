@@ -36,7 +36,7 @@ NOTHING = Fault("", "", (), 0)
 
 
 class Rehearsal(Recorder):
-    """A recorder, with at most one fault in front of it; for its arguments see there."""
+    """A recorder whose frames pass at most one rehearsed fault first; arguments as ``Recorder``."""
 
     def __init__(self, guarded: Guarded, controller: Controller, ring: Ring) -> None:
         super().__init__(guarded, controller, ring)

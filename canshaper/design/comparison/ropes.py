@@ -1,4 +1,7 @@
-"""Filters of a crane with a rope on the same work, by the length of the rope."""
+"""Filters of a crane with a rope on the same work, by the length of the rope.
+
+A rope without a length signal is compared as long as the file says, and a tenth wrong.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -26,24 +29,21 @@ from canshaper_sim.axes import (
     LUFFING_AXES,
     NEAR_FAR,
     ON_ROPE,
-    OVERHEAD,
     SLEW,
     TOWER,
     TROLLEY,
     WITHOUT_SWAY,
     kind_of,
 )
-from canshaper_sim.crane import CraneParameters
 from canshaper_sim.machines import AXES_OF
 from canshaper_sim.operator import random_script
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
 ROPES_M = (2.0, 5.0, 10.0, 25.0)
 # Of a tower crane: rope and radius at the start, m.
 PLACES_M = ((10.0, 40.0), (30.0, 20.0), (30.0, 40.0), (30.0, 60.0), (50.0, 40.0))
-# The rope that a filter is made for which follows none.
-_FOR_M = {OVERHEAD: 8.0, TOWER: 20.0, LUFFING: 8.0}
 _LUFFING_ROPES_M, _SEEDS, _RANDOM_S = (4.0, 8.0, 16.0), 3, 30.0
 # Nobody waits longer than a swing to see what is left.
 _LONGEST_LOOK_S = 11.0
@@ -93,19 +93,19 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     """Return what is compared.
 
     Raises:
-        DesignError: an axis is missing, or has no measured rope.
+        DesignError: an axis is missing.
     """
-    by_coordinate = deployment.by_coordinate
+    by_coordinate, crane = deployment.by_coordinate, changed_parameters([], deployment)
     kind = kind_of(by_coordinate)
-    axes = AXES_OF[kind]
+    axes = [one for one in AXES_OF[kind] if one not in WITHOUT_SWAY]
     if missing := [one for one in axes if one not in by_coordinate]:
         names = f"{', '.join(axes[:-1])} and {axes[-1]}"
         raise DesignError(f"expected {names} in crane, without {missing[0]}")
+    nominal_m = getattr(crane, kind).rope_m
+    by_length = " by length" if is_measured(deployment) else ""
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
-    for axis in (by_coordinate[one] for one in axes if one not in WITHOUT_SWAY):
+    for axis in (by_coordinate[one] for one in axes):
         sway = swinging_axis(deployment, axis)[1]
-        if sway.length is None:
-            raise DesignError(f"axes.{axis}.sway: expected length, by which filters are compared")
         mode, period_s = sway.mode(), tick_s(deployment, axis)
         taps = [round(tap, 8) for tap in zv_taps(mode, period_s)]
         zvd[axis] = filter_of("zvd")
@@ -114,11 +114,24 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
         gff[axis] = filter_of("gff", a1=2.000001 / omega, a2=1.0 / omega**2)
     return [
         RopeFilter("off", {}, bypass=True),
-        RopeFilter(f"ZVD for {_FOR_M[kind]:g} m", zvd, rope_m=_FOR_M[kind]),
-        RopeFilter("ZV by length", zv),
-        RopeFilter("G_FF by length", gff),
+        RopeFilter(f"ZVD for {nominal_m:g} m", zvd, rope_m=nominal_m),
+        RopeFilter(f"ZV{by_length}", zv),
+        RopeFilter(f"G_FF{by_length}", gff),
         RopeFilter("the file's", {}),
     ]
+
+
+def is_measured(deployment: Deployment) -> bool:
+    """Whether an axis follows the length of the rope."""
+    return any(axis.rope for axis in deployment.axes.values())
+
+
+def ropes_m(deployment: Deployment) -> tuple[float, ...]:
+    """Return the ropes with which filters are compared."""
+    if is_measured(deployment):
+        return ROPES_M
+    nominal_m = changed_parameters([], deployment).overhead.rope_m
+    return 0.9 * nominal_m, nominal_m, 1.1 * nominal_m
 
 
 def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
@@ -138,8 +151,9 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
     return replace(deployment, axes=axes)
 
 
-def works(kind: str) -> Iterator[Work]:
+def works(deployment: Deployment) -> Iterator[Work]:
     """What a crane of this kind does: with each rope still, or hoisted in travel and after it."""
+    kind = kind_of(deployment.by_coordinate)
     if kind == TOWER:
         for rope_m, radius_m in PLACES_M:
             yield from _of_tower(rope_m, radius_m)
@@ -149,12 +163,12 @@ def works(kind: str) -> Iterator[Work]:
             for name, strokes in _of_luffing():
                 yield Work(f"{rope_m:g} m {name}", rope_m, strokes)
         return
-    for rope_m in ROPES_M:
-        for name, *own in _of_bridge(rope_m):
+    for rope_m in ropes_m(deployment):
+        for name, *own in _of_bridge(rope_m, HOIST in deployment.by_coordinate):
             yield Work(f"{rope_m:g} m {name}", rope_m, tuple(own))
 
 
-def _of_bridge(rope_m: float) -> Iterator[tuple[Any, ...]]:
+def _of_bridge(rope_m: float, hoist: bool) -> Iterator[tuple[Any, ...]]:
     up = 1.0 if rope_m >= 4.0 else -1.0
     hoist_s = min(6.0, 1.8 * rope_m - 3.0) if up > 0.0 else 5.0
     travel = Stroke(BRIDGE, 0.5, 6.0, 1.0)
@@ -163,6 +177,8 @@ def _of_bridge(rope_m: float) -> Iterator[tuple[Any, ...]]:
     yield "still", Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)
     yield "still", Stroke(TROLLEY, 0.5, 0.3, 1.0)
     yield "still", *both
+    if not hoist:
+        return
     yield "hoisted", *both, Stroke(HOIST, 2.0, hoist_s, up)
     yield "hoisted", travel, Stroke(HOIST, 3.0, 8.0, -1.0)
     yield "hoisted", travel, Stroke(HOIST, 6.7, hoist_s, up)
@@ -207,12 +223,12 @@ Job = tuple[RopeFilter, Work]
 
 def left_deg(deployment: Deployment, job: Job) -> float:
     """Swing that is left of a drive, degrees."""
-    (one, work), crane = job, CraneParameters()
+    (one, work), crane = job, changed_parameters([], deployment)
     strokes, rope_m = work.strokes, work.rope_m
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
     look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
     script = Script("rope", strokes, end_s + look_s).moving(deployment.by_coordinate)
-    kind, start = kind_of(deployment.coordinates.values()), {"rope_m": rope_m}
+    kind, start = kind_of(deployment.by_coordinate), {"rope_m": rope_m}
     if work.radius_m is not None:
         start["start_radius_m"] = work.radius_m
     changes = {kind: replace(getattr(crane, kind), **start)}
@@ -227,8 +243,9 @@ def compare_ropes(
     deployment: Deployment, on_progress: Callable[[float], None], processes: int | None = None
 ) -> dict[str, dict[str, float]]:
     """Largest swing that each filter leaves, degrees, by rope and work, such as ``5 m hoisted``."""
-    kind = kind_of(deployment.coordinates.values())
-    jobs: list[Job] = [(one, work) for one in rope_filters(deployment) for work in works(kind)]
+    jobs: list[Job] = [
+        (one, work) for one in rope_filters(deployment) for work in works(deployment)
+    ]
     table: dict[str, dict[str, float]] = {one.name: {} for one, _ in jobs}
     for one, work in jobs:
         table[one.name][work.name] = 0.0

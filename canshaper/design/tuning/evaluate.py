@@ -24,6 +24,7 @@ from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import Off
 
+# Of the press and of the release: speed before it, what is sent in each tick.
 Moves = Sequence[tuple[float, list[float]]]
 ShaperFor = Callable[[SwayModel], Shaper]
 
@@ -171,8 +172,7 @@ def evaluate(
     run_on_s = (outside[-1] + 1) * tick_s if outside else 0.0
     machine = machine or Machine()
     hold_s = min(_LONGEST_S, max(_HELD_S, 2.0 * run_on_s + 1.0, machine.limits.tail_s + 1.0))
-    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
-    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
+    shaped, raw = _moves(mode, tick_s, shaper_for, machine, hold_s)
     residuals, sent = [], shaped[0][1]
     for percent in lengths_pct:
         true = at_length(mode, 1.0 + percent / 100.0)
@@ -205,27 +205,29 @@ def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[
 
 
 def press(
-    mode: SwayMode,
-    tick_s: float,
-    shaper_for: ShaperFor,
-    machine: Machine,
-    duration_s: float,
+    mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, duration_s: float
 ) -> Traces:
     """Full press from rest and what it does, for a picture."""
-    sent = _press_and_release(mode, tick_s, shaper_for, machine, duration_s)[0][1]
-    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, duration_s)[0][1]
-    return Traces(
-        tuple(k * tick_s for k in range(len(sent))),
-        tuple(sent),
-        tuple(_swing(mode, tick_s, machine.lag_s, 0.0, sent)),
-        tuple(_swing(mode, tick_s, machine.lag_s, 0.0, raw)),
-    )
+    presses = [moves[0] for moves in _moves(mode, tick_s, shaper_for, machine, duration_s)]
+    sent = presses[0][1]
+    angles = [
+        tuple(c.imag / mode.pole.imag for c in _modal(mode, tick_s, machine.lag_s, *press))
+        for press in presses
+    ]
+    return Traces(tuple(k * tick_s for k in range(len(sent))), tuple(sent), *angles)
+
+
+def _moves(
+    mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, hold_s: float
+) -> tuple[Moves, Moves]:
+    """Press and release through the axis, with the filter and without."""
+    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
+    return shaped, _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
 
 
 def _press_and_release(
     mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, hold_s: float
-) -> list[tuple[float, list[float]]]:
-    """Return the output of the axis for the press and for the release: (speed before, sent)."""
+) -> Moves:
     sway = SwayModel(mode, tick_s)
     axis = ShapedAxis(
         tick_s,
@@ -248,14 +250,6 @@ def _press_and_release(
     return moves
 
 
-def _swing(
-    mode: SwayMode, tick_s: float, lag_s: float, speed: float, sent: Sequence[float]
-) -> list[float]:
-    """Angle of the true pendulum at each tick; see ``_modal``."""
-    damped = mode.pole.imag
-    return [c.imag / damped for c in _modal(mode, tick_s, lag_s, speed, sent)]
-
-
 def swing_left(
     mode: SwayMode,
     tick_s: float,
@@ -264,18 +258,11 @@ def swing_left(
     trues: Sequence[SwayMode],
 ) -> list[float]:
     """See ``Residual.machine``, of each true pendulum."""
-    shaped = _press_and_release(mode, tick_s, shaper_for, machine, _HELD_S)
-    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, _HELD_S)
+    shaped, raw = _moves(mode, tick_s, shaper_for, machine, _HELD_S)
     return [_worst(true, tick_s, machine, shaped, raw) for true in trues]
 
 
-def _worst(
-    true: SwayMode,
-    tick_s: float,
-    machine: Machine,
-    shaped: Moves,
-    raw: Moves,
-) -> float:
+def _worst(true: SwayMode, tick_s: float, machine: Machine, shaped: Moves, raw: Moves) -> float:
     """See ``Residual.machine``."""
     worst = 0.0
     for (speed, sent), (raw_speed, raw_sent) in zip(shaped, raw, strict=True):

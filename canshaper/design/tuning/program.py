@@ -60,14 +60,12 @@ class Solution:
         cost: value of the cost.
         active: names of the requirements that hold it there.
         success: whether IPOPT says so.
-        iterations: number of them.
     """
 
     z: Vector
     cost: float
     active: tuple[str, ...]
     success: bool
-    iterations: int
 
 
 class Program:
@@ -141,7 +139,7 @@ class Program:
         stats = self._solver.stats()
         z = answer["x"].full().ravel()[:n]
         active = self._active(answer, z)
-        return Solution(z, self.cost(z), active, stats["success"], int(stats["iter_count"]))
+        return Solution(z, self.cost(z), active, stats["success"])
 
     def cost(self, z: Vector) -> float:
         """Cost of a setting, whatever its requirements."""

@@ -42,6 +42,7 @@ class ForwardedJoystick:
         self._joystick = joystick
         self._runners = runners
         self._seen = joystick.raw
+        self._releases = 0  # as the axes know them
         self.moves = False
         self._passed_ns = 0
         self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
@@ -60,7 +61,7 @@ class ForwardedJoystick:
             stopped: the emergency stop is pressed, or missing.
         """
         self._passed_ns = arrived_ns
-        stopped = stopped or self._joystick.released  # the axes trip with the next tick only
+        stopped = stopped or self._joystick.releases != self._releases  # they trip with the tick
         for runner in self._runners:
             if stopped or runner.tripping:  # the loop stood still, or the like: this is old
                 runner.put(0)
@@ -69,6 +70,7 @@ class ForwardedJoystick:
 
     def own(self, now_ns: int) -> Frame | None:
         """Return a frame of our own, where the axes have just moved and the joystick has none."""
+        self._releases = self._joystick.releases
         stopping = any(runner.axis.state in MOVING for runner in self._runners)
         tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
         lost = self._joystick.lost(now_ns) is not None

@@ -6,7 +6,7 @@ from canshaper.codec.frame import EFF_FLAG, NULL, WITHOUT_PRIORITY, group_mask, 
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.rewrite import RewrittenMessage, kernel_check
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundJoystick
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.protocols.gateway.cangw import Rule, changed_bytes
 from canshaper.protocols.gateway.forwarding import Pattern, all_but, exactly
 

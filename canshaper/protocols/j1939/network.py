@@ -8,7 +8,8 @@ from canshaper.config.bus import J1939
 from canshaper.inputs.input import Key, MessageInput, Part
 from canshaper.inputs.value import Following
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.machine.inputs import BoundInput
+from canshaper.machine.joysticks import BoundJoystick
 from canshaper.protocols.interface import BusProtocol, DrivenAxis, FrameHandler
 from canshaper.protocols.j1939.claim import ClaimState, Node
 from canshaper.protocols.j1939.dm1 import FMI_OF, FMI_OF_FOLLOWING

@@ -123,6 +123,17 @@ class LimitAware:
         self._unlimited = old._unlimited
         self._shaper.copy_state(old._shaper)
 
+    def swing_anew(self) -> None:
+        """Give the twin the swing that it would have had all the time with these taps."""
+        shaper, twin = self._shaper, SwayModel(self._sway.mode, self._sway.tick_s)
+        angles, rates = [], []
+        for tap in shaper.taps:
+            angles.append(twin.angle)
+            rates.append(twin.rate)
+            twin.step(tap)
+        self._twin.angle, self._twin.rate = shaper.response(angles), shaper.response(rates)
+        self._unlimited = shaper.response(shaper.taps)
+
     def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there, and no swing that limits have made."""
         self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate

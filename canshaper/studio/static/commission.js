@@ -80,7 +80,7 @@ function drawStep(step) {
   byId("choice").replaceChildren(...(offered ?? []).map((kind) => element("option",
     kind === recommended ? text("commission.recommended", { kind }) : kind, { value: kind, selected: kind === taken })));
   byId("run").textContent = text(step.at ? "commission.again" : "commission.run");
-  byId("poor").replaceChildren(...step.poor.map((fault) => element("li", fault)));
+  byId("problems").replaceChildren(...step.problems.map((fault) => element("li", fault)));
   byId("parts").replaceChildren(...step.parts.map(part));
   byId("wrote").textContent = text(step.proposed ? "commission.would" : "commission.written", { file: shown.file });
   byId("wrote").hidden = byId("diff").hidden = !step.diff;

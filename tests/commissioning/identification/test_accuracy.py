@@ -52,7 +52,7 @@ def check(
     finding: Finding, expected: tuple[float, float], *, period: float, ratio: float = math.inf
 ) -> None:
     """Good enough to use, and the period and the damping ratio within such parts of the truth."""
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert finding.period_s and finding.damping_ratio
     assert finding.period_s.value == pytest.approx(expected[0], rel=period)
     assert finding.damping_ratio.value == pytest.approx(expected[1], rel=ratio)

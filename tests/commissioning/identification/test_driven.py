@@ -63,4 +63,4 @@ def test_driven_motion_of_two_directions_reports_no_damping_that_it_cannot_know(
     ratio = case.finding.damping_ratio
     assert ratio
     assert abs(ratio.value - case.mode.zeta) < ratio.half
-    assert any("no decay is seen" in why for why in case.finding.poor)
+    assert any("no decay is seen" in why for why in case.finding.problems)

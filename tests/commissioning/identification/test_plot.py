@@ -18,7 +18,7 @@ def by_hand(axis: str) -> Finding:
 
 
 def test_a_picture_says_only_what_its_headings_do_not() -> None:
-    good, poor = by_hand("slew"), replace(by_hand("lift"), poor=["Too short."])
+    good, poor = by_hand("slew"), replace(by_hand("lift"), problems=["Too short."])
     states = [by_hand("near_far"), replace(by_hand("near_far"), label="loaded")]
     findings = [good, poor, *states]
     advice = advice_on(findings, None)

@@ -105,12 +105,12 @@ def test_what_is_refused(name: str) -> None:
     one, text = REFUSED[name]
     finding = identify("slew", "", [one])
     assert not finding.usable
-    assert any(text in fault for fault in finding.poor), finding.poor
+    assert any(text in fault for fault in finding.problems), finding.problems
 
 
 def test_the_same_data_is_good_enough() -> None:
     finding = identify("slew", "", [GOOD])
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert not finding.notes
 
 
@@ -120,12 +120,12 @@ def test_only_noise() -> None:
     for seed in range(10):
         finding = identify("slew", "", [series(time, noise(len(time), 1.0, seed))])
         assert not finding.usable
-        assert any("touch nothing for ten swings" in fault for fault in finding.poor)
+        assert any("touch nothing for ten swings" in fault for fault in finding.problems)
 
 
 def test_one_step_of_a_coarse_signal_is_no_clipping() -> None:
     finding = identify("slew", "", [rounded(10.0, 0.2)])
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
 
 
 def test_dry_friction_is_reported() -> None:
@@ -134,7 +134,7 @@ def test_dry_friction_is_reported() -> None:
     envelope = np.maximum(math.radians(10.0) - math.radians(0.45) * T25, 0.0)
     value = envelope * np.cos(omega * T25) + noise(len(T25), 0.05)
     finding = identify("slew", "", [series(T25, value)])
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert any("dry friction" in note for note in finding.notes), finding.notes
 
 
@@ -148,7 +148,7 @@ def test_viscous_damping_is_not_taken_for_friction() -> None:
 def test_a_pressure_serves_too() -> None:
     bars = 120.0 + 0.05 * T25 + 300.0 * decay(T25) + 100.0 * noise(len(T25), 0.3)
     finding = identify("slew", "", [series(T25, bars, BAR)])
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert finding.period_s and finding.damping_ratio
     assert finding.period_s.value == pytest.approx(PERIOD, rel=0.005)
     assert finding.damping_ratio.value == pytest.approx(RATIO, rel=0.1)
@@ -159,7 +159,7 @@ def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
     """A stronger oscillation, of the pump or the boom, is passed over."""
     value = decay(T25, 2.0) + decay(T25, 6.0, period=0.7, ratio=0.02) + noise(len(T25), 0.05)
     finding = identify("slew", "", [series(T25, value)], about_s=2.2)
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert finding.period_s
     assert finding.period_s.value == pytest.approx(PERIOD, rel=0.01)
     alone = identify("slew", "", [series(T25, value)])
@@ -169,7 +169,7 @@ def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
 
 def test_a_useless_log_does_not_spoil_a_good_one() -> None:
     finding = identify("slew", "", [series(T25, np.zeros(len(T25))), GOOD])
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert any("it stands at 0" in note for note in finding.notes)
 
 

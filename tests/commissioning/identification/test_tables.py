@@ -59,7 +59,7 @@ def test_what_apps_write(tmp_path: Path, name: str) -> None:
     highest = 0.15 * Grapple().mode5.omega_rad_s
     assert np.abs(series.value).max() == pytest.approx(highest, rel=0.08)
     finding = identify("slew", "", [series])
-    assert finding.usable, finding.poor
+    assert finding.usable, finding.problems
     assert finding.period_s and finding.damping_ratio
     assert finding.period_s.value == pytest.approx(PERIOD, rel=0.002)
     assert finding.damping_ratio.value == pytest.approx(Grapple().mode5.zeta, rel=0.05)

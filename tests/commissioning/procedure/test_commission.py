@@ -90,7 +90,7 @@ def test_a_poor_swing_leaves_the_step_open_and_says_what_to_do(machine: Path) ->
     assert "It would write" not in shown
     assert COPY.read_bytes() == machine.read_bytes()
     assert steps()["swing"]["status"] == "open"
-    assert steps()["swing"]["poor"]
+    assert steps()["swing"]["problems"]
 
 
 def exchanged(text: str) -> str:
@@ -213,6 +213,14 @@ def test_a_damaged_state_is_named_and_left(machine: Path, text: str) -> None:
     shown = commission("--yes", code=2)
     assert f"{STATE}: expected the state of a commissioning" in shown
     assert STATE.read_text() == text
+
+
+def test_problems_of_an_older_program_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "state.json"
+    path.write_text('{"version": 1, "steps": {"swing": {"status": "open", "poor": ["short"]}}}')
+    state = read_state(path)
+    assert state is not None
+    assert state.of("swing").problems == ["short"]
 
 
 @pytest.mark.slow

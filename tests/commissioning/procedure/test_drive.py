@@ -96,7 +96,7 @@ def only(mode: Mode, change: Callable[[Stroke], list[Stroke]]) -> Change:
 def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path) -> None:
     driver = Driver()
     one, proposal = drive(machine, driver, SIGNALS)
-    assert proposal.poor == []
+    assert proposal.problems == []
     measured: Any = proposal.numbers["crane"]
     copy = machine.with_name("copy.yaml")
     copy.write_bytes(machine.read_bytes())
@@ -118,7 +118,7 @@ def test_a_filter_that_takes_no_swing_away_is_too_poor(machine: Path) -> None:
     ]
     machine.write_text("\n".join(lines))
     _, proposal = drive(machine, Driver(), SIGNALS)
-    assert "% of the swing is left" in proposal.poor[0]
+    assert "% of the swing is left" in proposal.problems[0]
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_what_nothing_measures_is_judged_by_eye(machine: Path) -> None:
     driver = Driver("less")
     one, proposal = drive(machine, driver, {})
     assert "drive: by eye: slew, near_far: I drove both times, and saw" in driver.questions[0]
-    assert proposal.poor == []
+    assert proposal.problems == []
     assert "crane" not in proposal.numbers
     one.accept(proposal)
     assert one.state.of("drive").why == "slew, near_far judged by eye"
@@ -147,7 +147,7 @@ def test_what_nothing_measures_is_judged_by_eye(machine: Path) -> None:
 )
 def test_nothing_measured_and_nothing_seen_is_no_yes(machine: Path, saw: str, text: str) -> None:
     one, proposal = drive(machine, Driver(saw), {})
-    assert [fault.startswith(text) for fault in proposal.poor] == [True]
+    assert [fault.startswith(text) for fault in proposal.problems] == [True]
     assert one.state.of("drive").status is Status.OPEN
 
 
@@ -155,7 +155,7 @@ def test_nothing_measured_and_nothing_seen_is_no_yes(machine: Path, saw: str, te
 def test_one_of_two_planes_is_measured_the_other_judged_by_eye(machine: Path) -> None:
     driver = Driver("less")
     one, proposal = drive(machine, driver, {"slew": SIGNALS["slew"]})
-    assert proposal.poor == []
+    assert proposal.problems == []
     assert {*proposal.numbers} == {"crane", "near_far"}
     assert len(driver.questions) == 1
     one.accept(proposal)
@@ -170,7 +170,7 @@ def test_a_drive_in_which_nothing_moved(machine: Path, mode: Mode) -> None:
     driver = Driver("less")
     _, proposal = drive(machine, driver, {}, only(mode, lambda _one: []))
     text = "its joystick was moved for 0.0 s of full deflection in the drive"
-    assert proposal.poor == [f"{n}: {text} {when}: drive it as it says" for n in SIGNALS]
+    assert proposal.problems == [f"{n}: {text} {when}: drive it as it says" for n in SIGNALS]
     assert driver.questions == []
     assert [path.name for path in proposal.pictures if path.suffix == ".png"] == [
         "drive-before.png",
@@ -185,7 +185,7 @@ def test_a_drive_without_enable(machine: Path) -> None:
     )
     assert (
         "slew: its valve received no motion in the drive before: hold the enable"
-        in proposal.poor[0]
+        in proposal.problems[0]
     )
 
 
@@ -193,8 +193,8 @@ def test_a_drive_without_enable(machine: Path) -> None:
 def test_another_drive_with_the_filters_than_without(machine: Path) -> None:
     change = only(Mode.SHAPED, lambda one: [replace(one, level=0.4 * one.level)])
     _, proposal = drive(machine, Driver(), SIGNALS, change)
-    assert all("drive the same both times" in fault for fault in proposal.poor)
-    assert len(proposal.poor) == 2
+    assert all("drive the same both times" in fault for fault in proposal.problems)
+    assert len(proposal.problems) == 2
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_a_drive_without_a_rest(machine: Path) -> None:
         return replace(task, script=Script("on", strokes, task.script.duration_s))
 
     _, proposal = drive(machine, Driver(), SIGNALS, changed)
-    assert proposal.poor[0].startswith("no rest of 3.5 s after all joysticks were let go")
+    assert proposal.problems[0].startswith("no rest of 3.5 s after all joysticks were let go")
 
 
 @pytest.mark.slow
@@ -215,8 +215,8 @@ def test_a_sensor_that_falls_silent_is_no_grapple_that_hangs_still(machine: Path
         return name == log and time_s > 4.0
 
     _, proposal = drive(machine, Driver(), SIGNALS, without=without)
-    assert "slew: drive-" in proposal.poor[0]
-    assert "SwayPerpendicular: no value for 13." in proposal.poor[0]
+    assert "slew: drive-" in proposal.problems[0]
+    assert "SwayPerpendicular: no value for 13." in proposal.problems[0]
 
 
 @pytest.mark.slow
@@ -234,7 +234,7 @@ def test_without_the_step_swing_the_sway_sensor_measures(machine: Path) -> None:
     machine.write_text(text)
     driver = Driver()
     _, proposal = drive(machine, driver, {})
-    assert proposal.poor == []
+    assert proposal.problems == []
     assert driver.questions == []
     shown = "\n".join(part["text"] for part in proposal.parts if "text" in part)
     assert "Swing measured: slew by SwayAngle.Across, near_far by SwayAngle.Along" in shown

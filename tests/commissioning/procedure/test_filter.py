@@ -88,7 +88,7 @@ def test_the_recommended_one_is_that_which_damps_this_machine(machine: Path) -> 
     assert (one.numbers["recommended"], one.numbers["chosen"]) == ("gff", "gff")
     assert one.numbers["slew"]["robust"]["verdict"] != "good"
     assert one.numbers["slew"]["gff"]["verdict"] == "good"
-    assert one.poor == []
+    assert one.problems == []
 
 
 @pytest.mark.slow
@@ -96,9 +96,9 @@ def test_a_filter_that_does_not_damp_stays_open_whoever_chose_it(machine: Path) 
     slow_valve(machine)
     machine.write_text(machine.read_text().replace("max_pct: 40", "max_pct: 100"))
     one = outcome(machine, Person("robust"))
-    assert [fault.partition(":")[0] for fault in one.poor] == ["slew", "near_far"]
-    assert "useless" in one.poor[0]
-    assert "--duration" in one.poor[0]
+    assert [fault.partition(":")[0] for fault in one.problems] == ["slew", "near_far"]
+    assert "useless" in one.problems[0]
+    assert "--duration" in one.problems[0]
 
 
 def test_a_tool_that_comes_to_rest_by_itself_gets_none(machine: Path) -> None:
@@ -106,7 +106,7 @@ def test_a_tool_that_comes_to_rest_by_itself_gets_none(machine: Path) -> None:
     machine.write_text(re.sub(r"decay_per_swing: [\d.]+", "damping_ratio: 0.9", text))
     person = Person()
     one = outcome(machine, person)
-    assert one.poor == ["no filter suits every axis; see above"]
+    assert one.problems == ["no filter suits every axis; see above"]
     assert one.edit is None
     assert person.asked == ""
     said = "\n".join(part["text"] for part in one.sheet.parts)

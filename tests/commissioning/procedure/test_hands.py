@@ -70,7 +70,7 @@ def both(one: Stroke) -> list[Stroke]:
 def test_joysticks_moved_otherwise(machine: Path, change: Any, text: str) -> None:
     before = machine.read_bytes()
     outcome = run(machine, "joysticks", strokes(change))
-    assert outcome.poor[0].startswith(text)
+    assert outcome.problems[0].startswith(text)
     assert not outcome.diff
     assert machine.read_bytes() == before
 
@@ -78,33 +78,33 @@ def test_joysticks_moved_otherwise(machine: Path, change: Any, text: str) -> Non
 @pytest.mark.slow
 def test_joysticks_without_enable(machine: Path) -> None:
     outcome = run(machine, "joysticks", lambda task: replace(task, released=(0.0, 9.0)))
-    assert outcome.poor[0].startswith("slew: the enable switch was not seen held")
+    assert outcome.problems[0].startswith("slew: the enable switch was not seen held")
 
 
 @pytest.mark.slow
 def test_a_dry_drive_without_one_axis(machine: Path) -> None:
     outcome = run(machine, "dry", strokes(lambda one: [one] if one.axis == "slew" else []))
-    assert [fault.partition(":")[0] for fault in outcome.poor] == ["near_far", "lift"]
+    assert [fault.partition(":")[0] for fault in outcome.problems] == ["near_far", "lift"]
 
 
 @pytest.mark.slow
 def test_a_dry_drive_without_enable(machine: Path) -> None:
     outcome = run(machine, "dry", lambda task: replace(task, released=(0.0, 100.0)))
-    assert "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_OFF)" in outcome.poor[0]
+    assert "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_OFF)" in outcome.problems[0]
 
 
 @pytest.mark.slow
 def test_a_first_motion_to_one_side(machine: Path) -> None:
     change = strokes(lambda one: [replace(one, level=abs(one.level))])
     outcome = run(machine, "motion", change)
-    assert {fault.partition(":")[0] for fault in outcome.poor} == {"slew", "near_far", "lift"}
-    assert "its valve did not follow its joystick in both directions" in outcome.poor[0]
+    assert {fault.partition(":")[0] for fault in outcome.problems} == {"slew", "near_far", "lift"}
+    assert "its valve did not follow its joystick in both directions" in outcome.problems[0]
 
 
 @pytest.mark.slow
 def test_a_first_motion_with_the_enable_held_all_the_time(machine: Path) -> None:
     outcome = run(machine, "motion", lambda task: replace(task, released=None))
-    assert outcome.poor == [
+    assert outcome.problems == [
         "the enable was not let go while an axis moved, or is in no message of a joystick: let it"
         " go in motion; neutral has to follow at once"
     ]
@@ -118,7 +118,7 @@ def test_a_bus_on_which_nothing_comes(machine: Path) -> None:
     bench = Silent(None)
     one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
     outcome = one.run(one.step("buses"))
-    assert any("bus crane: no frame was received: is the machine on" in f for f in outcome.poor)
+    assert any("bus crane: no frame was received: is the machine on" in f for f in outcome.problems)
 
 
 class Renamed(Simulated):
@@ -144,7 +144,7 @@ def test_an_axis_has_whatever_name_the_file_gives_it(machine: Path, step: str) -
     bench = Renamed(names)
     one = Procedure(Files(other), bench, load_deployment, STEPS, origin=other)
     proposal = one.run(one.step(step))
-    assert proposal.poor == []
+    assert proposal.problems == []
     assert {*names} <= proposal.numbers.keys()
 
 
@@ -165,7 +165,7 @@ def renamed(machine: Path, names: dict[str, str]) -> Path:
 def test_a_rotator_with_a_rocker_of_two_signals(machine: Path, step: str) -> None:
     add_rotator(machine)
     proposal = run(machine, step, lambda task: task)
-    assert proposal.poor == []
+    assert proposal.problems == []
     assert not proposal.diff
     assert "rotator" in proposal.numbers
 

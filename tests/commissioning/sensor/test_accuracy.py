@@ -23,9 +23,9 @@ def judge(drive: Drive, case: Sequence[float], part: float = 1.0) -> Finding:
     finding = drive.finding(gain=sign, delay_s=delay_s, offset_deg=offset, noise_deg=noise)
     print(
         f"{drive.axis} {case}: {finding.invert} {1000 * finding.delay_s.value:.0f} ms"
-        f" {finding.offset.value:.2f} {finding.noise:.3f} {finding.poor}"
+        f" {finding.offset.value:.2f} {finding.noise:.3f} {finding.problems}"
     )
-    assert not finding.poor
+    assert not finding.problems
     assert finding.invert == (sign < 0.0) ^ (drive.axis == "slew")
     assert abs(finding.delay_s.value - delay_s) < 0.015
     assert abs(finding.offset.value - offset) < 0.2
@@ -65,7 +65,7 @@ def test_an_inclinometer_of_j1939_leads_by_what_corrects_its_gyro(axis: str) -> 
     for fusion_s in (4.0, 10.0):
         lead_s = math.atan(1.0 / (omega * fusion_s)) / omega
         finding = drive.finding(delay_s=0.1, fusion_s=fusion_s)
-        assert not finding.poor
+        assert not finding.problems
         assert abs(finding.delay_s.value - (0.1 - lead_s)) < 0.02
 
 

@@ -31,8 +31,8 @@ def at_rest() -> Series:
 
 def refused(series: Series, *texts: str) -> None:
     finding = examine(AXIS, series)
-    print(finding.poor)
-    (fault,) = finding.poor
+    print(finding.problems)
+    (fault,) = finding.problems
     for text in texts:
         assert text in fault
 
@@ -45,7 +45,7 @@ def pushed(time: Array, at_s: float, degrees: float = 6.0) -> Array:
 
 @pytest.mark.slow
 def test_the_same_data_is_good_enough() -> None:
-    assert not examine(AXIS, good()).poor
+    assert not examine(AXIS, good()).problems
 
 
 @pytest.mark.slow
@@ -76,7 +76,7 @@ def test_pushes_by_hand_while_it_is_driven(degrees: float) -> None:
 def test_one_push_is_seen_or_does_no_harm(at_s: float) -> None:
     one = good()
     finding = examine(AXIS, replace(one, value=one.value + pushed(one.time_s, at_s, 2.0)))
-    assert finding.poor or abs(finding.delay_s.value - 0.05) < 0.03
+    assert finding.problems or abs(finding.delay_s.value - 0.05) < 0.03
 
 
 @pytest.mark.slow
@@ -93,7 +93,7 @@ def test_a_drive_of_all_axes_is_refused_or_shows_the_truth(seed: int, axis: str)
     """Those that showed a delay 20 ms too large while a lift next to it counted as none."""
     drive = Drive(machine(), axis, 10.0, random_script(seed, 60.0))
     finding = drive.finding(delay_s=0.1, offset_deg=2.0, gain=-1.0)
-    assert finding.poor or abs(finding.delay_s.value - 0.1) < 0.015
+    assert finding.problems or abs(finding.delay_s.value - 0.1) < 0.015
 
 
 def test_a_swing_that_no_command_explains() -> None:

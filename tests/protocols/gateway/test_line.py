@@ -160,6 +160,18 @@ def test_enable_off_leaves_with_its_frame_and_neutral_in_the_same(rig: GatewayRi
     assert rig.state() == ("TRIPPED", "ENABLE_LOST")
 
 
+def test_a_release_that_is_over_makes_the_next_frame_neutral(rig: GatewayRig) -> None:
+    rig.moving()
+    rig.receive(rig.joystick(Slew=1000, Enable=0))
+    passed = rig.receive(rig.joystick(Slew=1000))
+    assert passed is not None
+    assert (rig.decoded(passed)["Slew"], rig.decoded(passed)["Enable"]) == (0, 1)
+    rig.tick()
+    assert rig.state() == ("TRIPPED", "ENABLE_LOST")
+    rig.run(3, Enable=0)
+    rig.moving()
+
+
 def test_a_trip_that_is_noted_makes_the_next_frame_neutral(rig: GatewayRig) -> None:
     """The last frame did not reach the ECU: the velocity of the last tick goes no further."""
     rig.moving()
@@ -229,16 +241,22 @@ def test_ten_late_frames_in_one_tick_leave_in_their_order(rig: GatewayRig) -> No
     assert rig.now_ns == 3 * TICK_NS
 
 
-def test_a_pressed_emergency_stop_makes_the_next_frame_neutral(tmp_path: Path) -> None:
+@pytest.mark.parametrize("over", [False, True])
+def test_a_pressed_emergency_stop_makes_the_next_frame_neutral(tmp_path: Path, over: bool) -> None:
     """It leaves before the tick in which the axes trip."""
     stop = STOP.replace("bus: crane", "bus: joysticks").replace("60", "1000")
     last = "status: { bus: machine, message: ShaperStatus }"
     rig = GatewayRig(tmp_path, yaml=((last, stop + last),), dbc=tuple(DBC.items()))
-    free, pressed = (Frame("joysticks", STOP_ID, False, bytes((n, n, 0))) for n in (0, 1))
-    rig.receive(free)
+
+    def stop(count: int, pressed: int) -> Frame:
+        return Frame("joysticks", STOP_ID, False, bytes((pressed, count, 0)))
+
+    rig.receive(stop(0, 0))
     rig.run(3)
     assert rig.run(30, Slew=1000)["Slew"] > 300
-    rig.receive(pressed)
+    rig.receive(stop(1, 1))
+    if over:
+        rig.receive(stop(2, 0))
     passed = rig.receive(rig.joystick(Slew=1000))
     assert passed is not None
     assert (rig.decoded(passed)["Slew"], rig.decoded(passed)["Enable"]) == (0, 1)

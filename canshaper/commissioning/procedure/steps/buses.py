@@ -46,7 +46,7 @@ def run(context: Context) -> Outcome:
     for finding in findings:
         outcome.sheet.print(f"{finding.level.value}: {finding.subject}: {finding.found}")
         if finding.level is Level.BAD:
-            outcome.poor.append(f"{finding.subject}: {finding.found}: {finding.remedy}")
+            outcome.problems.append(f"{finding.subject}: {finding.found}: {finding.remedy}")
     if traffic.frames:
         outcome.figures[""] = lambda: figure(traffic, deployment)
     return outcome

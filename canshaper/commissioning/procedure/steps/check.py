@@ -38,7 +38,7 @@ def run(context: Context) -> Outcome:
     source = Source(deployment.path)
     faults = [*unstated(deployment)]
     faults += [] if context.bench.simulated else rehearsed_valves(deployment.config)
-    outcome.poor += [str(source.problem(place, text)) for place, text in faults]
+    outcome.problems += [str(source.problem(place, text)) for place, text in faults]
     axes = stopping(deployment)
     outcome.figures[""] = lambda: figure(axes)
     limits = {name: axis.limits for name, axis in deployment.config.axes.items()}

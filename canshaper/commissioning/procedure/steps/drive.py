@@ -43,7 +43,7 @@ def run(context: Context) -> Outcome:
     outcome = Outcome(files=_driven(context, axes))
     before, after = (read_traffic(log, deployment) for log in outcome.files)
     _compare_work(outcome, axes, before, after)
-    if outcome.poor:
+    if outcome.problems:
         for name, traffic in (("before", before), ("after", after)):
             title = f"Filters {DRIVES[name][0]}: what was driven"
             outcome.figures[name] = partial(joysticks_figure, traffic, title)
@@ -51,7 +51,7 @@ def run(context: Context) -> Outcome:
     fastest = ", ".join(f"{n} {a.limits.max_pct:g} %" for n, a in deployment.config.axes.items())
     outcome.sheet.print(f"max_pct in both drives: {fastest}")
     if isinstance(context.bench, Simulated):
-        crane = context.bench.parameters
+        crane = context.bench.parameters(deployment)
         raw, shaped = (simulated_recording(log, deployment, crane) for log in outcome.files)
         _measured(context, outcome, raw, shaped)
         return outcome
@@ -109,13 +109,15 @@ def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Tra
             moved = max(map(abs, one.axes[name].valve.value), default=0.0) > LEAST_MOVED
             if driven_s < LEAST_DRIVEN_S:
                 text = f"{name}: its joystick was moved for {driven_s:.1f} s of full deflection"
-                outcome.poor.append(f"{text} in the drive {when}: drive it as it says")
+                outcome.problems.append(f"{text} in the drive {when}: drive it as it says")
             elif not moved:
                 text = f"{name}: its valve received no motion in the drive {when}"
-                outcome.poor.append(f"{text}: hold the enable; see docs/states.md for the reason")
+                outcome.problems.append(
+                    f"{text}: hold the enable; see docs/states.md for the reason"
+                )
         if min(both) > LEAST_DRIVEN_S and max(both) > MOST_UNLIKE * min(both):
             text = f"driven for {both[0]:.1f} s of full deflection before, {both[1]:.1f} s after"
-            outcome.poor.append(f"{name}: {text}: drive the same both times")
+            outcome.problems.append(f"{name}: {text}: drive the same both times")
     outcome.sheet.print(table)
 
 
@@ -145,13 +147,15 @@ def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
     if before is None or after is None:
         rest_s = RESIDUAL_DWELL_S + RESIDUAL_WINDOW_MIN_S
         text = f"no rest of {rest_s:g} s after all joysticks were let go"
-        outcome.poor.append(f"{text}, so no swing is left to compare: let go, and wait six seconds")
+        outcome.problems.append(
+            f"{text}, so no swing is left to compare: let go, and wait six seconds"
+        )
         return
     if before < LEAST_SWING_DEG or measures["shaped"]["peak_deg"] < MIN_RAW_DEG:
         peak = measures["shaped"]["peak_deg"]
         text = f"a swing of {before} degrees was left without filters, at most {peak} with them"
         remedy = "nothing to compare: push harder; is it the right signal, and the sensor on?"
-        outcome.poor.append(f"{text}: {remedy}")
+        outcome.problems.append(f"{text}: {remedy}")
         return
     left_pct = 100.0 * after / before
     outcome.numbers["crane"] = {
@@ -162,7 +166,7 @@ def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
     if left_pct > 100.0 - LEAST_REDUCTION_PCT:
         text = f"{left_pct:.0f} % of the swing is left ({before} to {after} degrees)"
         remedy = "do swing, valve and filter again with what hangs on the crane now"
-        outcome.poor.append(f"{text}, expected less than a tenth: {remedy}")
+        outcome.problems.append(f"{text}, expected less than a tenth: {remedy}")
 
 
 def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
@@ -182,10 +186,10 @@ def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
         outcome.numbers.update({name: {"judged": "by eye", "saw": saw} for name in axes})
     elif saw == SAME:
         text = f"{names}: by eye the filters take no swing away"
-        outcome.poor.append(f"{text}: do swing, valve and filter again")
+        outcome.problems.append(f"{text}: do swing, valve and filter again")
     else:
         text = f"{names}: nothing measured the swing, and no one has judged it by eye"
-        outcome.poor.append(
+        outcome.problems.append(
             f"{text}: watch the grapple in both drives, then answer {LESS} or {SAME}"
         )
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.procedure.bench import STILL_MOVES, Mode, Task
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.joysticks import LEAST
-from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
+from canshaper.commissioning.procedure.traffic import Traffic, read_traffic
 from canshaper.report import style
 from canshaper.report.console import axis_title, new_table
 from canshaper.shaping.states import Reason, State
@@ -46,20 +46,21 @@ def run(context: Context) -> Outcome:
         least, most = min(axis.joystick.value, default=0.0), max(axis.joystick.value, default=0.0)
         if min(-least, most) < LEAST:
             text = f"its joystick went from {100 * least:.0f} to {100 * most:.0f} %"
-            outcome.poor.append(f"{name}: {text}: move it to both ends, enable held")
+            outcome.problems.append(f"{name}: {text}: move it to both ends, enable held")
         elif axis.states and not {state for _, state, _ in axis.states} & DRIVEN:
-            text = f"{name}: it was never {State.ACTIVE.name}, but {_reasons(axis)}"
+            reasons = dict.fromkeys(f"{state} ({reason})" for _, state, reason in axis.states)
+            text = f"{name}: it was never {State.ACTIVE.name}, but {', '.join(reasons)}"
             if context.bench.simulated and axis.states[-1][2] == Reason.NODE_FAULT.name:
                 text = f"NOTE: {text}: at the desk no other controller starts the nodes"
                 outcome.sheet.print(text)
             else:
-                outcome.poor.append(f"{text}: see docs/states.md for that reason")
+                outcome.problems.append(f"{text}: see docs/states.md for that reason")
     if context.bench.simulated:
         sent = sum(len(axis.valve.value) for axis in traffic.axes.values())
         outcome.numbers["valve_frames"] = sent
         outcome.sheet.print(f"valve frames: {sent}")
         if sent:
-            outcome.poor.append(f"expected no valve frame, got {sent}; do not go on")
+            outcome.problems.append(f"expected no valve frame, got {sent}; do not go on")
     outcome.figures[""] = lambda: figure(
         traffic, "Dry drive: the joysticks as the daemon sees them"
     )
@@ -82,10 +83,6 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
     if traffic.missed_deadlines is not None:
         outcome.numbers["missed_deadlines"] = traffic.missed_deadlines
         outcome.sheet.print(f"missed deadlines: {traffic.missed_deadlines}")
-
-
-def _reasons(axis: AxisTraffic) -> str:
-    return ", ".join(dict.fromkeys(f"{state} ({reason})" for _, state, reason in axis.states))
 
 
 def figure(traffic: Traffic, title: str) -> Figure:

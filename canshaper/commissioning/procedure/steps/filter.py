@@ -6,7 +6,7 @@ from functools import partial
 
 from rich.table import Table
 
-from canshaper.commissioning import robust, tuned
+from canshaper.commissioning import robust_report, tuned
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging, swings
 from canshaper.commissioning.robust import RobustDesign, design_robust
@@ -51,9 +51,10 @@ def run(context: Context) -> Outcome:
     offers = {name: _offers(deployment, name, outcome) for name in swinging(deployment)}
     kinds = [kind for kind in _NAMES if all(kind in one for one in offers.values())]
     if not kinds:
-        outcome.poor.append("no filter suits every axis; see above")
+        outcome.problems.append("no filter suits every axis; see above")
         return outcome
-    recommended = min(kinds, key=lambda kind: max(_rank(one[kind]) for one in offers.values()))
+    words = {kind: [by_kind[kind].verdict.word for by_kind in offers.values()] for kind in kinds}
+    recommended = min(kinds, key=lambda kind: max(map(_WORDS.index, words[kind])))
     for name, by_kind in offers.items():
         outcome.sheet.print(_table(name, by_kind))
     before = context.state.of(FILTER.name).numbers.get("chosen")
@@ -74,7 +75,7 @@ def run(context: Context) -> Outcome:
         designs.append(offer.design)
         _show(deployment, offer.design, outcome)
         if offer.verdict.useless:
-            outcome.poor.append(f"{name}: {offer.verdict}")
+            outcome.problems.append(f"{name}: {offer.verdict}")
     outcome.edit = partial(_write, designs=designs)
     return outcome
 
@@ -121,10 +122,6 @@ def _offer(deployment: Deployment, design: Design) -> Offer:
     return Offer(design, chosen, verdict, {key: round(one, 2) for key, one in figures.items()})
 
 
-def _rank(offer: Offer) -> int:
-    return _WORDS.index(offer.verdict.word)
-
-
 def _cells(offer: Offer) -> tuple[str, ...]:
     f = offer.figures
     left = f"{f['left_pct']:.1f}", f"{f['left_within_10_pct']:.1f}"
@@ -154,8 +151,8 @@ def _show(deployment: Deployment, design: Design, outcome: Outcome) -> None:
     """Print and draw the design that was chosen."""
     name = design.bound.name
     if isinstance(design, RobustDesign):
-        robust.print_design(deployment, design, outcome.sheet)
-        outcome.figures[name] = partial(robust.figure, design)
+        robust_report.print_design(deployment, design, outcome.sheet)
+        outcome.figures[name] = partial(robust_report.figure, design)
     else:
         tuned.print_tuned(deployment, design, outcome.sheet)
         outcome.figures[name] = partial(tuned.figure, design)
@@ -165,7 +162,7 @@ def _write(deployment: Deployment, designs: list[Design]) -> list[str]:
     lines: list[str] = []
     for one in designs:
         lines += (
-            robust.write_design(deployment, one)
+            robust_report.write_design(deployment, one)
             if isinstance(one, RobustDesign)
             else tuned.write_tuned(deployment, one)
         )

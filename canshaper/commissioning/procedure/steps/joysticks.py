@@ -55,7 +55,7 @@ def run(context: Context) -> Outcome:
         if other:
             wrong[name] = other
         elif fault := _fault(deployment, name, axis, moved):
-            outcome.poor.append(fault)
+            outcome.problems.append(fault)
     outcome.sheet.print(table)
     for name, (joystick, signal) in wrong.items():
         outcome.sheet.print(f"{name}: the file names another signal than {joystick}.{signal}")

@@ -61,15 +61,15 @@ def run(context: Context) -> Outcome:
         allowed_s = FRAMES * (period_ms + cycle_ms) / 1000.0
         if not _follows(axis):
             text = "its valve did not follow its joystick in both directions"
-            outcome.poor.append(f"{name}: {text}: see the picture, then move it again")
+            outcome.problems.append(f"{name}: {text}: see the picture, then move it again")
         for after_s in _releases(axis):
             slowest_s = max(slowest_s or 0.0, after_s)
             if after_s > allowed_s:
                 text = f"neutral only {after_s:.3f} s after the enable was let go"
-                outcome.poor.append(f"{name}: {text}, expected {allowed_s:.3f} s; do not go on")
+                outcome.problems.append(f"{name}: {text}, expected {allowed_s:.3f} s; do not go on")
     if slowest_s is None:
         text = "the enable was not let go while an axis moved, or is in no message of a joystick"
-        outcome.poor.append(f"{text}: let it go in motion; neutral has to follow at once")
+        outcome.problems.append(f"{text}: let it go in motion; neutral has to follow at once")
     else:
         outcome.numbers["enable_to_neutral_s"] = round(slowest_s, 3)
         outcome.sheet.print(f"enable let go in motion: neutral after {slowest_s:.3f} s")

@@ -128,7 +128,7 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
     for part in one.parts:
         again = shown(part)
         parts.append(html.text(again) if isinstance(again, str) else html.table(again))
-    parts += [html.text(f"NOT ENOUGH DATA: {fault}") for fault in one.poor]
+    parts += [html.text(f"NOT ENOUGH DATA: {fault}") for fault in one.problems]
     if name != DRIVE.name:  # that one is on the first page
         parts += _pictures(one, folder)
     if one.diff:

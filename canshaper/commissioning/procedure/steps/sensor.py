@@ -32,7 +32,7 @@ def run(context: Context) -> Outcome:
                 "delay_s": round(finding.delay_s.value, 4),
             }
         outcome.sheet.print(*(f"  note: {note}" for note in finding.notes))
-        outcome.poor += [f"{finding.axis}: {fault}" for fault in finding.poor]
+        outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
     if any(finding.fit for finding in findings):
         outcome.figures[""] = partial(figure, findings)
     given = None if bench.simulated else log

@@ -64,10 +64,11 @@ def run(context: Context) -> Outcome:
         text = "the length of the rope is measured, which says how it swings"
         outcome.sheet.print(f"ok: {', '.join(ropes)}: {text}")
     sources = _swing_sources(bench, deployment, axes)
-    missing = [name for name in axes if not _has(sources, name)]
+    shown = {**sources.signals, **sources.tables, **sources.timed}
+    missing = [name for name in axes if name not in shown]
     if missing:
         text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
-        outcome.poor.append(f"{text} table, or a stopwatch")
+        outcome.problems.append(f"{text} table, or a stopwatch")
     findings: list[Finding] = []
     logs: list[Path] = []
     if sources.signals:
@@ -105,8 +106,9 @@ def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) ->
     for name in axes:
         sensor = deployment.axes[name].sway_sensor
         default = sensor.name if sensor else NONE
-        if name in SIMULATED and not isinstance(deployment.messages.find("GrappleSway"), str):
-            default = SIMULATED[name]
+        shown = SIMULATED.get(deployment.coordinates.get(name, ""), "")
+        if shown and not isinstance(deployment.messages.find(shown.partition(".")[0]), str):
+            default = shown
         question = (
             f"swing: {name}: what shows it: MESSAGE.SIGNAL of the bus, file of a phone (.csv), or"
             " stopwatch SWINGS SECONDS FIRST LAST such as 10 23.6 20 5"
@@ -126,10 +128,6 @@ def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) ->
         else:
             sources.signals[name] = answer
     return sources
-
-
-def _has(sources: _Sources, name: str) -> bool:
-    return name in {**sources.signals, **sources.tables, **sources.timed}
 
 
 def _task(axes: Sequence[str], mode: Mode) -> Task:
@@ -172,7 +170,7 @@ def _origin(logs: Sequence[Path], deployment: Deployment, *, simulated: bool) ->
 def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
     for finding in findings:
         outcome.sheet.print("\n".join(lines(finding)))
-        outcome.poor += [f"{finding.axis}: {fault}" for fault in finding.poor]
+        outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
         if finding.period_s and finding.damping_ratio:
             outcome.numbers[finding.axis] = {
                 "period_s": round(finding.period_s.value, 4),

@@ -46,7 +46,7 @@ def run(context: Context) -> Outcome:
             bench.calibrate(deployment, drive, words)
             results[name] = drive.result()
         except CalibrationError as error:
-            outcome.poor.append(f"{name}: {error}; do it again")
+            outcome.problems.append(f"{name}: {error}; do it again")
     for name, result in results.items():
         top_pct = 100.0 * ramps[name].top
         outcome.sheet.print("\n".join(curve_lines(deployment, name, result, top_pct)))
@@ -62,7 +62,9 @@ def run(context: Context) -> Outcome:
         text = f"{', '.join(left)}: nothing on a bus shows the speed, so the valve is not measured"
         outcome.sheet.print(f"NOTE: {text}; put deadband_pct of its data sheet into the file")
     if left and not results:
-        outcome.poor.append("no valve can be measured; skip it, or name MESSAGE.SIGNAL of a speed")
+        outcome.problems.append(
+            "no valve can be measured; skip it, or name MESSAGE.SIGNAL of a speed"
+        )
     if results:
         outcome.edit = partial(_write, results=results, simulated=bench.simulated)
     return outcome
