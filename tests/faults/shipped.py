@@ -36,10 +36,10 @@ NAMES = (
     "forwarder-pump",
     "forwarder-load",
     "bridge-crane",
-    "tower-crane",
-    "telehandler",
     "excavator",
     "multicopter",
+    "tower-crane",
+    "telehandler",
 )
 CHECKSUM = "checksum: { signal: Checksum, kind: crc8_sae_j1850 }"
 MADE = {

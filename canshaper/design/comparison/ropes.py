@@ -101,8 +101,8 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     if missing := [one for one in axes if one not in by_coordinate]:
         names = f"{', '.join(axes[:-1])} and {axes[-1]}"
         raise DesignError(f"expected {names} in crane, without {missing[0]}")
-    nominal_m = getattr(crane, kind).rope_m
-    by_length = " by length" if is_measured(deployment) else ""
+    measured = is_measured(deployment)
+    rope_m, by_length = (_FOR_M[kind], " by length") if measured else (_nominal_m(deployment), "")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
     for axis in (by_coordinate[one] for one in axes):
         sway = swinging_axis(deployment, axis)[1]
@@ -114,7 +114,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
         gff[axis] = filter_of("gff", a1=2.000001 / omega, a2=1.0 / omega**2)
     return [
         RopeFilter("off", {}, bypass=True),
-        RopeFilter(f"ZVD for {nominal_m:g} m", zvd, rope_m=nominal_m),
+        RopeFilter(f"ZVD for {rope_m:g} m", zvd, rope_m=rope_m),
         RopeFilter(f"ZV{by_length}", zv),
         RopeFilter(f"G_FF{by_length}", gff),
         RopeFilter("the file's", {}),
@@ -126,12 +126,12 @@ def is_measured(deployment: Deployment) -> bool:
     return any(axis.rope for axis in deployment.axes.values())
 
 
-def ropes_m(deployment: Deployment) -> tuple[float, ...]:
-    """Return the ropes with which filters are compared."""
-    if is_measured(deployment):
-        return ROPES_M
-    nominal_m = changed_parameters([], deployment).overhead.rope_m
-    return 0.9 * nominal_m, nominal_m, 1.1 * nominal_m
+def _nominal_m(deployment: Deployment) -> float:
+    """Return the rope of the simulated crane at the start."""
+    rope_m: float = getattr(
+        changed_parameters([], deployment), kind_of(deployment.by_coordinate)
+    ).rope_m
+    return rope_m
 
 
 def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
@@ -152,7 +152,7 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
 
 
 def works(deployment: Deployment) -> Iterator[Work]:
-    """What a crane of this kind does: with each rope still, or hoisted in travel and after it."""
+    """What a crane does: with each rope still, or hoisted in travel and after it."""
     kind = kind_of(deployment.by_coordinate)
     if kind == TOWER:
         for rope_m, radius_m in PLACES_M:
@@ -163,12 +163,14 @@ def works(deployment: Deployment) -> Iterator[Work]:
             for name, strokes in _of_luffing():
                 yield Work(f"{rope_m:g} m {name}", rope_m, strokes)
         return
-    for rope_m in ropes_m(deployment):
-        for name, *own in _of_bridge(rope_m, HOIST in deployment.by_coordinate):
+    nominal_m, hoists = _nominal_m(deployment), HOIST in deployment.by_coordinate
+    wrong = 0.9 * nominal_m, nominal_m, 1.1 * nominal_m
+    for rope_m in ROPES_M if is_measured(deployment) else wrong:
+        for name, *own in _of_bridge(rope_m, hoists):
             yield Work(f"{rope_m:g} m {name}", rope_m, tuple(own))
 
 
-def _of_bridge(rope_m: float, hoist: bool) -> Iterator[tuple[Any, ...]]:
+def _of_bridge(rope_m: float, hoists: bool) -> Iterator[tuple[Any, ...]]:
     up = 1.0 if rope_m >= 4.0 else -1.0
     hoist_s = min(6.0, 1.8 * rope_m - 3.0) if up > 0.0 else 5.0
     travel = Stroke(BRIDGE, 0.5, 6.0, 1.0)
@@ -177,7 +179,7 @@ def _of_bridge(rope_m: float, hoist: bool) -> Iterator[tuple[Any, ...]]:
     yield "still", Stroke(BRIDGE, 0.5, 4.0, 1.0), Stroke(BRIDGE, 4.5, 4.0, -1.0)
     yield "still", Stroke(TROLLEY, 0.5, 0.3, 1.0)
     yield "still", *both
-    if not hoist:
+    if not hoists:
         return
     yield "hoisted", *both, Stroke(HOIST, 2.0, hoist_s, up)
     yield "hoisted", travel, Stroke(HOIST, 3.0, 8.0, -1.0)
