@@ -29,6 +29,7 @@ from canshaper_sim.axes import (
     LUFFING_AXES,
     NEAR_FAR,
     ON_ROPE,
+    OVERHEAD,
     SLEW,
     TOWER,
     TROLLEY,
@@ -44,6 +45,8 @@ from canshaper_sim.strokes import Script, Stroke
 ROPES_M = (2.0, 5.0, 10.0, 25.0)
 # Of a tower crane: rope and radius at the start, m.
 PLACES_M = ((10.0, 40.0), (30.0, 20.0), (30.0, 40.0), (30.0, 60.0), (50.0, 40.0))
+# The rope that a filter is made for which follows none.
+_FOR_M = {OVERHEAD: 8.0, TOWER: 20.0, LUFFING: 8.0}
 _LUFFING_ROPES_M, _SEEDS, _RANDOM_S = (4.0, 8.0, 16.0), 3, 30.0
 # Nobody waits longer than a swing to see what is left.
 _LONGEST_LOOK_S = 11.0
@@ -95,7 +98,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     Raises:
         DesignError: an axis is missing.
     """
-    by_coordinate, crane = deployment.by_coordinate, changed_parameters([], deployment)
+    by_coordinate = deployment.by_coordinate
     kind = kind_of(by_coordinate)
     axes = [one for one in AXES_OF[kind] if one not in WITHOUT_SWAY]
     if missing := [one for one in axes if one not in by_coordinate]:
@@ -104,7 +107,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     measured = is_measured(deployment)
     rope_m, by_length = (_FOR_M[kind], " by length") if measured else (_nominal_m(deployment), "")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
-    for axis in (by_coordinate[one] for one in axes):
+    for axis in (by_coordinate[one] for one in axes if one not in WITHOUT_SWAY):
         sway = swinging_axis(deployment, axis)[1]
         mode, period_s = sway.mode(), tick_s(deployment, axis)
         taps = [round(tap, 8) for tap in zv_taps(mode, period_s)]
@@ -230,7 +233,7 @@ def left_deg(deployment: Deployment, job: Job) -> float:
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
     look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
     script = Script("rope", strokes, end_s + look_s).moving(deployment.by_coordinate)
-    kind, start = kind_of(deployment.by_coordinate), {"rope_m": rope_m}
+    kind, start = kind_of(deployment.coordinates.values()), {"rope_m": rope_m}
     if work.radius_m is not None:
         start["start_radius_m"] = work.radius_m
     changes = {kind: replace(getattr(crane, kind), **start)}
