@@ -18,6 +18,7 @@ from canshaper.errors import DesignError
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import script_for
+from canshaper_sim.overhead import OverheadBoom
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
@@ -105,8 +106,10 @@ def test_what_a_file_says_of_its_crane_is_simulated(tmp_path: Path) -> None:
     assert parameters.overhead.rope_m == 5.0
     assert parameters.overhead.bridge.lag_s == 0.3
     assert changed_parameters(["overhead.rope_m=6"], read(MULTICOPTER)).overhead.rope_m == 6.0
-    plant = PlantNode(read(MULTICOPTER))
-    assert plant.crane.parameters.overhead == parameters.overhead
+    boom = PlantNode(read(MULTICOPTER)).crane.boom
+    assert isinstance(boom, OverheadBoom)
+    assert boom.rope_m == 5.0
+    assert boom.axes["bridge"].valve.parameters == parameters.overhead.bridge
     file = changed(tmp_path, ("kind: cartesian,", "kind: cartesian, simulated: { rope: 1 },"))
     with pytest.raises(DesignError, match=r"bridge-crane.yaml: crane.simulated: rope=1.*parameter"):
         changed_parameters([], load_deployment(file))
