@@ -10,7 +10,7 @@ for and no boom bends, as in the paper.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple, cast
 
 from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import (
@@ -373,8 +373,9 @@ class RopeCrane(Crane):
         p = parameters or CraneParameters()
         self._rope: OverheadBoom = getattr(p, kind).boom(p.ends)
         self._rope.swing(sway or Sway())
-        own = CraneParameters(ends=p.ends, sway_sensor=p.sway_sensor)
-        super().__init__(own, sway, cast("CraneBoom", self._rope))
+        own: Any = {kind: getattr(p, kind)}
+        known = CraneParameters(ends=p.ends, sway_sensor=p.sway_sensor, **own)
+        super().__init__(known, sway, cast("CraneBoom", self._rope))
 
     def _advance(self, step_s: float) -> None:
         self._rope.advance(step_s)

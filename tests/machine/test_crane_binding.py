@@ -36,7 +36,7 @@ def test_without_it_the_names_say_it() -> None:
     [
         ("hoist: hoist }", "hoist: winch }", "crane.hoist: expected an axis, got 'winch'"),
         ("trolley: trolley", "trolley: bridge", "crane.trolley: expected an axis of its own, got"),
-        ("bridge: bridge,", "slew: bridge,", "crane.slew: expected one of the keys kind, bridge,"),
+        ("bridge: bridge,", "slew: bridge,", "crane.slew: expected one of the keys simulated,"),
         (
             "kind: cartesian",
             "kind: polar",
