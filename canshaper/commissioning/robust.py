@@ -66,6 +66,7 @@ class RobustDesign:
         lengths_m: shortest and longest pendulum that it was designed for, in place of a range.
         sway: what the file has to have as the swing then, by key.
         at: number of its breakpoint in the gain schedule; None for the axis' own filter.
+        rope: what the file has to have as the length that it follows, by key.
     """
 
     bound: BoundAxis
@@ -81,6 +82,7 @@ class RobustDesign:
     lengths_m: tuple[float, float] | None = None
     sway: dict[str, float] = field(default_factory=dict)
     at: int | None = None
+    rope: dict[str, float] = field(default_factory=dict)
 
     @property
     def chosen(self) -> Filter:
@@ -107,7 +109,8 @@ def design_robust(
         axis: name of an axis with sway data.
         at: number of a breakpoint in the gain schedule; None for the axis' own filter.
         range_pct: lengths of the pendulum that it covers, +- %.
-        lengths_m: instead: shortest and longest pendulum that it covers.
+        lengths_m: instead: shortest and longest pendulum that it covers; of a rope that it
+            follows, which it is designed for at its shortest.
         duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
         residual_pct: instead: the shortest that leaves at most this.
         second: a second mode as the option --second has it.
@@ -122,7 +125,14 @@ def design_robust(
     mode = sway.mode()
     lengths_pct: Sequence[float] = LENGTHS_PCT
     changes: dict[str, float] = {}
-    if lengths_m is not None:
+    rope: dict[str, float] = {}
+    lasts = sway.ends()[1].period_s / mode.period_s if bound.rope else 1.0
+    if lengths_m is not None and bound.rope:
+        mode, changes = _swing_at(sway, lengths_m[0])
+        rope = {"lowest_m": lengths_m[0], "highest_m": lengths_m[1]}
+        lasts = math.sqrt(lengths_m[1] / lengths_m[0])
+        lengths_m = None
+    elif lengths_m is not None:
         mode, range_pct, changes = _between(sway, lengths_m)
         lengths_pct = tuple(part * range_pct for part in (-1.0, -0.5, 0.0, 0.5, 1.0))
     rate, tail_s = bound.config.limits.slowest_per_s, bound.config.limits.tail_s
@@ -186,12 +196,13 @@ def design_robust(
         shaper,
         measured,
         section,
-        round(shaper.duration_s + 0.1, 1) if tail_s < shaper.duration_s else None,
+        round(lasts * shaper.duration_s + 0.1, 1) if tail_s < lasts * shaper.duration_s else None,
         verdict,
         (two, without) if two else None,
         lengths_m,
         changes,
         at,
+        rope,
     )
 
 
@@ -201,13 +212,18 @@ def _between(
     """The swing in the middle of two lengths, its range in +- %, its keys in the file."""
     low_m, high_m = lengths_m
     length_m = round(0.5 * (low_m + high_m), 4)
+    mode, changes = _swing_at(sway, length_m)
+    return mode, round(50.0 * (high_m - low_m) / length_m, 1), changes
+
+
+def _swing_at(sway: Sway, length_m: float) -> tuple[SwayMode, dict[str, float]]:
+    """The swing of a pendulum of this length, its keys in the file."""
     if sway.length_m is not None:
         changes = {"length_m": length_m}
     else:
         swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), sway.mode().damping_ratio)
         changes = {"period_s": round(swing.period_s, 4)}
-    mode = sway.model_copy(update=changes).mode()
-    return mode, round(50.0 * (high_m - low_m) / length_m, 1), changes
+    return sway.model_copy(update=changes).mode(), changes
 
 
 def summary_line(one: RobustDesign) -> str:
@@ -254,7 +270,8 @@ def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
         parts.append((place, gone | one.section))
     longest = max(designs, key=lambda one: one.shaper.duration_s)
     name, sway = longest.bound.name, designs[0].sway
-    return write_filters(deployment, name, parts, longest.needed_s, "robust", sway=sway)
+    own = {"sway": sway, "rope": designs[0].rope}
+    return write_filters(deployment, name, parts, longest.needed_s, "robust", **own)
 
 
 def figure(one: RobustDesign) -> "Figure":
