@@ -19,6 +19,7 @@ def write_filters(
     verb: str,
     *,
     sway: Mapping[str, FileValue] | None = None,
+    rope: Mapping[str, FileValue] | None = None,
 ) -> list[str]:
     """Write filters, and a longer tail where the stopping distance of the file allows it.
 
@@ -32,6 +33,7 @@ def write_filters(
         tail_s: tail that they need; None or less than that of the file changes nothing.
         verb: that designed them.
         sway: keys of the axis' own swing to write with them.
+        rope: keys of the length that it follows.
 
     Returns:
         Lines that have changed, which kind its own replaces, and why the tail has not.
@@ -47,6 +49,8 @@ def write_filters(
     ]
     if sway:
         changes.append((("axes", axis, "sway"), sway, note(verb)))
+    if rope:
+        changes.append((("axes", axis, "sway", "length"), rope, note(verb)))
     kept = None
     if tail_s is not None and tail_s > config.limits.tail_s:
         limits = config.limits.model_copy(update={"tail_s": tail_s})

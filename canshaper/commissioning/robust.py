@@ -54,6 +54,8 @@ class RobustTask:
         lengths_m: shortest and longest pendulum that it covers, in place of a range.
         sway: what the file has to have as the swing then, by key.
         second: a second mode that it covers too.
+        rope: what the file has to have as the length that it follows, by key.
+        lasts: how much longer it takes on the longest rope that it follows.
     """
 
     bound: BoundAxis
@@ -64,6 +66,8 @@ class RobustTask:
     lengths_m: tuple[float, float] | None = None
     sway: dict[str, float] = field(default_factory=dict)
     second: SecondMode | None = None
+    rope: dict[str, float] = field(default_factory=dict)
+    lasts: float = 1.0
 
     @property
     def tick_s(self) -> float:
@@ -144,7 +148,7 @@ class RobustDesign:
     @property
     def needed_s(self) -> float | None:
         """Tail that it needs, where that of the file is shorter."""
-        lasts_s = self.shaper.duration_s
+        lasts_s = self.task.lasts * self.shaper.duration_s
         return round(lasts_s + 0.1, 1) if self.bound.config.limits.tail_s < lasts_s else None
 
 
@@ -167,7 +171,8 @@ def design_robust(
         axis: name of an axis with sway data.
         at: number of a breakpoint in the gain schedule; None for the axis' own filter.
         range_pct: lengths of the pendulum that it covers, +- %.
-        lengths_m: instead: shortest and longest pendulum that it covers.
+        lengths_m: instead: shortest and longest pendulum that it covers; of a rope that it
+            follows, which it is designed for at its shortest.
         duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
         residual_pct: instead: the shortest that leaves at most this.
         second: a second mode as the option --second has it.
@@ -181,6 +186,8 @@ def design_robust(
     sway = sway if at is None else bound.config.gain_schedule[at].sway
     tick_ms = bound.period_ticks * deployment.config.tick_ms
     task = RobustTask(bound, at, sway.mode(), tick_ms, range_pct)
+    if bound.rope:
+        task, lengths_m = _following(task, sway, lengths_m), None
     if lengths_m is not None:
         task = _between(task, sway, lengths_m)
     if residual_pct is not None and duration_s is not None:
@@ -238,14 +245,27 @@ def _between(task: RobustTask, sway: Sway, lengths_m: tuple[float, float]) -> Ro
     """The task for the swing in the middle of two lengths, with its range and its keys."""
     low_m, high_m = lengths_m
     length_m = round(0.5 * (low_m + high_m), 4)
+    range_pct = round(50.0 * (high_m - low_m) / length_m, 1)
+    return replace(_at(task, sway, length_m), range_pct=range_pct, lengths_m=lengths_m)
+
+
+def _following(task: RobustTask, sway: Sway, lengths_m: tuple[float, float] | None) -> RobustTask:
+    """The task for the shortest rope; with lengths of these, and with their keys."""
+    if lengths_m is None:
+        return replace(task, lasts=sway.ends()[1].period_s / task.mode.period_s)
+    rope = {"lowest_m": lengths_m[0], "highest_m": lengths_m[1]}
+    lasts = math.sqrt(lengths_m[1] / lengths_m[0])
+    return replace(_at(task, sway, lengths_m[0]), rope=rope, lasts=lasts)
+
+
+def _at(task: RobustTask, sway: Sway, length_m: float) -> RobustTask:
+    """The task for the swing of a pendulum of this length, with its keys."""
     if sway.length_m is not None:
         changes = {"length_m": length_m}
     else:
         swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), task.mode.damping_ratio)
         changes = {"period_s": round(swing.period_s, 4)}
-    mode = sway.model_copy(update=changes).mode()
-    range_pct = round(50.0 * (high_m - low_m) / length_m, 1)
-    return replace(task, mode=mode, range_pct=range_pct, lengths_m=lengths_m, sway=changes)
+    return replace(task, mode=sway.model_copy(update=changes).mode(), sway=changes)
 
 
 def _second(text: str | None, task: RobustTask) -> SecondMode | None:

@@ -80,8 +80,9 @@ def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
         gone = dict.fromkeys(present.filter.model_dump(exclude_none=True))
         parts.append((place, gone | one.section))
     longest = max(designs, key=lambda one: one.shaper.duration_s)
-    name, sway = longest.bound.name, designs[0].task.sway
-    return write_filters(deployment, name, parts, longest.needed_s, "robust", sway=sway)
+    name, task = longest.bound.name, designs[0].task
+    own = {"sway": task.sway, "rope": task.rope}
+    return write_filters(deployment, name, parts, longest.needed_s, "robust", **own)
 
 
 def figure(one: RobustDesign) -> "Figure":

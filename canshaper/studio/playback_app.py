@@ -15,9 +15,8 @@ from canshaper import __version__
 from canshaper.errors import CanshaperError
 from canshaper.studio.access import Access
 from canshaper.studio.playback import Playback
-from canshaper.studio.server import links_of, page_app
+from canshaper.studio.server import drawn_of, page_app
 from canshaper.studio.stage import RAW
-from canshaper.studio.view import SWAY_OF
 
 COLORS = ("--shaped", "--other", "--raw")
 """Colours of the cranes but the raw one, by the names in the style."""
@@ -88,7 +87,6 @@ class _Kept:
             "version": __version__,
             "file": self._file,
             "axes": playback.axes,
-            "sway_of": SWAY_OF,
             "cranes": names,
             "colors": {RAW: "--raw", **colors},
             "drives": False,
@@ -96,7 +94,7 @@ class _Kept:
             "playback": True,
             "profiles": False,
             "sliders": {},
-            **links_of(playback.parameters),
+            **drawn_of(playback.parameters, playback.films[0].view.moves),
         }
 
 

@@ -3,7 +3,7 @@
 import asyncio
 import itertools
 import socket
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,8 @@ from canshaper.studio.commission import Commission
 from canshaper.studio.sliders import RANGES
 from canshaper.studio.stage import MACHINE, RAW, Stage
 from canshaper.studio.swing import residuals
-from canshaper.studio.view import SWAY_OF
+from canshaper.studio.view import sway_of
+from canshaper_sim.axes import OVERHEAD, kind_of
 from canshaper_sim.crane import CraneParameters
 
 # From the first byte, or from the end of the last answer, to the end of a request.
@@ -212,14 +213,13 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
         "version": __version__,
         "file": stage.deployment.path.name,
         "axes": list(stage.deployment.axes),
-        "sway_of": SWAY_OF,
         "cranes": list(stage.cranes),
         "colors": {name: "--raw" if name == RAW else "--shaped" for name in stage.cranes},
         "drives": stage.cab is not None,
         "machine": MACHINE in stage.cranes,
         "numbers": stage.numbers is not None,
         "profiles": any(j.next_profile for j in stage.deployment.config.joysticks.values()),
-        **links_of(parameters),
+        **drawn_of(parameters, stage.deployment.coordinates),
         "preference": stage.preference is not None,
         "sliders": {
             name: {"range": RANGES[name], "numbers": [[n.key, n.value, n.power] for n in numbers]}
@@ -228,12 +228,18 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
     }
 
 
-def links_of(parameters: CraneParameters) -> dict[str, Any]:
-    """How long the links of the crane are that is drawn."""
-    grapple = parameters.grapple
+def drawn_of(parameters: CraneParameters, coordinates: Mapping[str, str]) -> dict[str, Any]:
+    """What a page draws: how long the links of the crane are, which swing each axis excites.
+
+    Of an overhead crane ``hall`` says how long runway, bridge and rope are; of others it is None.
+    """
+    grapple, own = parameters.grapple, parameters.overhead
+    hall = {"runway": own.runway_m, "span": own.span_m, "rope": own.rope_max_m}
     return {
+        "sway_of": sway_of(coordinates),
         "boom": parameters.joints.boom._asdict(),
         "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
+        "hall": hall if kind_of(coordinates.values()) == OVERHEAD else None,
     }
 
 

@@ -18,20 +18,29 @@ from canshaper.studio.axis_view import AxisView, rounded
 from canshaper.studio.sources import Sources
 from canshaper.studio.swing import Swing
 from canshaper.studio.words import fault_words, reason_words, said, state_level, state_words
-from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.axes import BRIDGE, EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW, TROLLEY
 
 SILENT_S = 0.5
 """A daemon or a crane that has sent nothing for so long is shown as silent."""
 
 ACROSS, ALONG = "across", "along"
-SWAY_OF = {
+_SWAY_OF = {
     SLEW: ACROSS,
     NEAR_FAR: ALONG,
     LIFT_CYLINDER: ALONG,
     KNUCKLE: ALONG,
     EXTENSION: ALONG,
+    BRIDGE: ACROSS,
+    TROLLEY: ALONG,
 }
-"""Which swing an axis excites, across the boom or along it."""
+# Of a model: it lags behind the tip, and across the boom and below a trolley that is negative.
+_BEHIND = (SLEW, BRIDGE, TROLLEY)
+
+
+def sway_of(coordinates: Mapping[str, str]) -> dict[str, str]:
+    """Which swing an axis excites, by its name: across boom or bridge, or along it."""
+    return {axis: _SWAY_OF[moved] for axis, moved in coordinates.items() if moved in _SWAY_OF}
+
 
 Report = Callable[[str, str], None]
 """Takes a text and how bad that is: "info", "warn" or "bad"."""
@@ -47,12 +56,15 @@ class CraneView:
 
     def __init__(self, deployment: Deployment, report: Report) -> None:
         self._deployment = deployment
+        self.moves = deployment.coordinates
+        self._sway_of = sway_of(self.moves)
         self._report = report
         self.axes = {name: AxisView() for name in deployment.axes}
         self._profiles = {name: profile_by_number(axis) for name, axis in deployment.axes.items()}
         self.sway_deg: tuple[float, float] | None = None
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
+        self.trolley: tuple[float, ...] | None = None  # along runway, bridge and rope, m
         self.aim: tuple[float, float] | None = None  # slewed, degrees, and radius, m
         self.simulated = False
         self.missed = 0
@@ -88,6 +100,8 @@ class CraneView:
             ("GrappleSway", self._sway),
             ("TipPosition", self._position),
             ("JointPosition", self._joints),
+            ("LoadSway", self._load),
+            ("CranePosition", self._trolley),
         ):
             message = self._message(message_name)
             if message is not None:
@@ -182,6 +196,7 @@ class CraneView:
             "crane": self.crane_there(now_s),
             "pose": self.pose,
             "joints": self.joints,
+            "trolley": self.trolley,
             "aim": self.aim if self.daemon_there(now_s) else None,
             "sway": self.sway_deg or self._predicted(),
             "measured": self.sway_deg is not None and not self.simulated,
@@ -201,8 +216,8 @@ class CraneView:
         predicted = {ACROSS: 0.0, ALONG: 0.0}
         known = False
         for name, axis in self.axes.items():
-            if axis.predicted_deg is not None and name in SWAY_OF:
-                predicted[SWAY_OF[name]] += axis.predicted_deg
+            if axis.predicted_deg is not None and name in self._sway_of:
+                predicted[self._sway_of[name]] += axis.predicted_deg
                 known = True
         return (predicted[ACROSS], predicted[ALONG]) if known else None
 
@@ -236,8 +251,7 @@ class CraneView:
         if (values := codec.decode(data)) is None:
             return
         view, state, reason = self.axes[name], int(values["State"]), int(values["Reason"])
-        # The model lags behind the tip; across the boom that is the negative direction.
-        sign = -1.0 if SWAY_OF.get(name) == ACROSS else 1.0
+        sign = -1.0 if self.moves.get(name) in _BEHIND else 1.0
         view.predicted_deg = sign * values["PredictedSway"]
         if self.sway_deg is None and (predicted := self._predicted()):
             self._swing.add(predicted, now_s)
@@ -274,6 +288,10 @@ class CraneView:
         values: Any = message.decode(data)
         self._sway_at((float(values["SwayPerpendicular"]), float(values["SwayParallel"])), now_s)
 
+    def _load(self, message: Message, data: bytes, now_s: float) -> None:
+        values: Any = message.decode(data)
+        self._sway_at((float(values["SwayBridge"]), float(values["SwayTrolley"])), now_s)
+
     def _sway_at(self, sway_deg: tuple[float, float], now_s: float) -> None:
         self.sway_deg = sway_deg
         self._swing.add(sway_deg, now_s)
@@ -283,6 +301,11 @@ class CraneView:
         values: Any = message.decode(data)
         angle, radius, height = (float(values[n]) for n in ("SlewAngle", "Radius", "Height"))
         self.pose = (angle, radius, height)
+        self._crane_s = now_s
+
+    def _trolley(self, message: Message, data: bytes, now_s: float) -> None:
+        values: Any = message.decode(data)
+        self.trolley = tuple(float(values[n]) for n in ("Bridge", "Trolley", "RopeLength"))
         self._crane_s = now_s
 
     def _joints(self, message: Message, data: bytes, now_s: float) -> None:

@@ -152,3 +152,21 @@ def test_on_a_large_screen_charts_and_words_are_larger(
     for name, least_px in (("#chart-command", 300), ("#axes td", 40)):
         box = page.locator(name).first.bounding_box()
         assert box and box["height"] > least_px
+
+
+def test_the_load_of_a_bridge_crane_is_drawn_and_seen_from_above(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own(file="bridge-crane.yaml"))
+    expect(page.locator("#scene")).to_be_visible()
+    expect(page.locator("#sway-of")).to_have_text("degrees, along the runway")
+    page.keyboard.press("b")
+
+    def drive() -> None:
+        page.keyboard.down("d")
+        page.wait_for_timeout(900)
+        page.keyboard.up("d")
+        page.wait_for_timeout(2500)
+        assert past_cm(page)["raw"] > 30
+
+    undisturbed(page, drive)

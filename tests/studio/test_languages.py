@@ -16,7 +16,7 @@ KEY = re.compile(r"""data-t(?:-\w+)?="([\w.]+)"|["`]([a-z]\w*(?:\.\w+)+)["`]""")
 NOT_TEXTS = re.compile(r"\.(js|csv|png|json)$")
 # Keys that scripts put together, by what they begin with.
 COMPOSED = ("term.", "axis.", "way.", "crane.", "slider.", "stick.", "gamepad.", "chart.a")
-COMPOSED += ("status.", "step.", "said.", "level.", "study.")
+COMPOSED += ("status.", "step.", "said.", "level.", "study.", "chart.hall.")
 NAMES = {"canshaper", "canshaper studio", "Commissioning, canshaper studio", "studio"}
 NAMES |= {"CSV", "PNG", "A/B"}
 

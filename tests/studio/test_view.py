@@ -70,6 +70,17 @@ def test_nothing_is_known_at_the_start(watched: Watched) -> None:
     assert {axis["level"] for axis in shown["axes"].values()} == {"off"}
 
 
+def test_a_bridge_crane_has_a_trolley_and_a_load() -> None:
+    """A model lags behind its trolley: that is negative on both axes."""
+    watched = Watched("bridge-crane")
+    predicted = [watched.status(State.ACTIVE, Reason.JOYSTICK_MOVED, 3.0, "bridge")]
+    assert watched.receive(predicted)["sway"] == (-3.0, 0.0)
+    shown = watched.receive(watched.sway(2.0, -1.0))
+    assert shown["sway"] == pytest.approx((2.0, -1.0), abs=0.01)
+    assert shown["trolley"] == (0.0, 0.0, 8.0)
+    assert shown["measured"] and shown["crane"] and shown["pose"] is None
+
+
 @pytest.mark.parametrize("name", [*FILES, "two-cranes"])
 def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
     watched = Watched(name)

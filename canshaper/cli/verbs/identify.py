@@ -58,7 +58,7 @@ def identify(
         None, "--channel", help="Bus of the log, where it has more."
     ),
     about_s: float | None = typer.Option(
-        None, "--about", min=0.3, max=12.0, help="Period as far as it is known, s."
+        None, "--about", min=0.3, max=25.0, help="Period as far as it is known, s."
     ),
     swings: float | None = typer.Option(None, "--swings", help="Stopwatch: full swings counted."),
     seconds: float | None = typer.Option(None, "--seconds", help="Stopwatch: time they took."),

@@ -24,7 +24,8 @@ def robust(
         None,
         "--lengths",
         metavar="LOW:HIGH",
-        help="Instead: shortest and longest pendulum in m, for a load without a signal.",
+        help="Instead: shortest and longest pendulum in m, for a load without a signal, or of a"
+        " rope that the axis follows.",
     ),
     loads: bool = typer.Option(
         False, "--loads", help="Design every breakpoint of the gain schedule."
@@ -58,7 +59,9 @@ def robust(
 
     With --lengths one response holds from an empty grapple to a full one; the swing in the file
     becomes that of the middle. Of several least taps the one counts that leaves least through the
-    limits of the axis. With --loads the table has what each design leaves with the other loads.
+    limits of the axis. Of an axis that follows its rope they are that rope's, and the response is
+    that of the shortest, within --range. With --loads the table has what each design leaves with
+    the other loads.
 
     With --second it leaves a second mode in peace too, such as that of grapple and rotator with
     long logs, and prints what that costs and gains. The picture, with --picture or --report, has
@@ -75,6 +78,8 @@ def robust(
       canshaper robust config/forwarder.yaml --axis near_far --lengths 1.2:1.6
 
       canshaper robust config/forwarder-load.yaml --axis near_far --loads --duration 1.8
+
+      canshaper robust bridge.yaml --axis trolley --lengths 2:30 --range 5
 
       canshaper robust config/forwarder.yaml --axis near_far --second 0.6,0.1,20
 
@@ -101,10 +106,6 @@ def robust(
     if write and not loads and not lengths_m:
         own = "--lengths LOW:HIGH that while the load is not known"
         refuse_scheduled(deployment, axis, f"--loads writes all of them, {own}")
-    bound = deployment.axes.get(axis)
-    if lengths_m and bound and bound.rope:
-        text = "expected an axis that does not follow its rope, got"
-        raise UsageError(f"--lengths: {text} {axis}: one filter, without --lengths, is for all")
     options: dict[str, Any] = {"range_pct": range_pct, "residual_pct": residual_pct}
     options |= {"duration_s": duration_s, "second": second}
     if loads:
@@ -122,7 +123,9 @@ def robust(
         data = {"loads": [*map(_result, designs)]} if loads else _result(designs[0])
         files = {"picture": path, "written": deployment.path if write else None}
         echo(json.dumps(data | files, indent=2, default=str))
-    lines = [f"sway: {flow(one.task.sway)}" for one in designs if one.task.sway]
+    tasks = [one.task for one in designs]
+    sways = [one.sway | ({"length": one.rope} if one.rope else {}) for one in tasks]
+    lines = [f"sway: {flow(sway)}" for sway in sways if sway]
     lines += [f"filter: {flow(one.section)}" for one in designs]
     lines = [*changed, written_line(deployment.path)] if write else lines
     results.print("\n".join(lines), soft_wrap=True)

@@ -243,7 +243,7 @@ export class Charts {
     this.axis = axis;
     this.drawn = 0;
     const way = this.hello.sway_of[axis];
-    document.getElementById("sway-of").textContent = text(way ? `chart.${way}` : "chart.nosway");
+    document.getElementById("sway-of").textContent = text(way ? `chart.${this.hello.hall ? "hall." : ""}${way}` : "chart.nosway");
   }
 
   resize() {

@@ -24,25 +24,9 @@ export class Crane {
     this.wood = new THREE.MeshLambertMaterial({ color: 0x9a7650 });
     this.base = new THREE.Group();
     this.group.add(this.base);
-    this.carrier();
     this.slew = new THREE.Group();
     this.group.add(this.slew);
-    const pillar = new THREE.Mesh(new THREE.CylinderGeometry(0.2, 0.3, hello.boom.pillar_m - 0.75, 16), this.steel);
-    pillar.rotation.x = Math.PI / 2;
-    pillar.position.z = 0.75 + (hello.boom.pillar_m - 0.75) / 2;
-    this.slew.add(pillar);
-    this.main = this.beam(0.3, 0.24, this.steel);
-    this.outer = this.beam(0.25, 0.2, this.steel);
-    this.telescope = this.beam(0.16, 0.13, this.dark);
-    this.cylinder = this.beam(0.09, 0.09, this.dark);
-    this.joints = [0.2, 0.17].map((r) => {
-      const mesh = new THREE.Mesh(new THREE.CylinderGeometry(r, r, 0.36, 14), this.dark);
-      this.slew.add(mesh);
-      return mesh;
-    });
-    this.link = this.beam(0.05, 0.05, this.dark);
-    this.grapple = this.buildGrapple();
-    this.slew.add(this.grapple);
+    this.build(hello);
     this.plumb = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ transparent: true, opacity: 0.5 }));
     this.plumb.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(6), 3));
     this.plumb.frustumCulled = false;
@@ -64,6 +48,27 @@ export class Crane {
     this.aim = new THREE.Mesh(new THREE.SphereGeometry(0.35, 20, 14),
       new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.35 }));
     this.group.add(this.aim);
+  }
+
+  /** Its parts: here a forwarder's. */
+  build(hello) {
+    this.carrier();
+    const pillar = new THREE.Mesh(new THREE.CylinderGeometry(0.2, 0.3, hello.boom.pillar_m - 0.75, 16), this.steel);
+    pillar.rotation.x = Math.PI / 2;
+    pillar.position.z = 0.75 + (hello.boom.pillar_m - 0.75) / 2;
+    this.slew.add(pillar);
+    this.main = this.beam(0.3, 0.24, this.steel);
+    this.outer = this.beam(0.25, 0.2, this.steel);
+    this.telescope = this.beam(0.16, 0.13, this.dark);
+    this.cylinder = this.beam(0.09, 0.09, this.dark);
+    this.joints = [0.2, 0.17].map((r) => {
+      const mesh = new THREE.Mesh(new THREE.CylinderGeometry(r, r, 0.36, 14), this.dark);
+      this.slew.add(mesh);
+      return mesh;
+    });
+    this.link = this.beam(0.05, 0.05, this.dark);
+    this.grapple = this.buildGrapple();
+    this.slew.add(this.grapple);
   }
 
   /** The forwarder it stands on, and a few logs. */
@@ -171,14 +176,7 @@ export class Crane {
     const { pose } = crane;
     this.group.visible = Boolean(pose); // none is invented
     if (!pose) return;
-    if (this.modelled !== !crane.measured || this.simulated !== crane.simulated) {
-      this.modelled = !crane.measured;
-      this.simulated = crane.simulated;
-      this.write();
-      this.seeThrough();
-    }
-    this.grapple.visible = this.link.visible = Boolean(crane.sway);
-    this.shade.visible = this.grapple.visible && !this.ghostly;
+    this.known(crane);
     this.slew.rotation.z = pose[0] * RAD;
     const points = boomPoints(hello.boom, pose, crane.joints);
     const at = ([r, z]) => new THREE.Vector3(r, 0, z);
@@ -192,19 +190,35 @@ export class Crane {
     const tip = at(points.tip);
     const hung = grapplePoints(hello.grapple, crane.sway);
     const joint = tip.clone().add(new THREE.Vector3(...hung.joint));
-    const end = tip.clone().add(new THREE.Vector3(...hung.grapple));
-    span(this.link, tip, joint);
-    this.grapple.position.copy(joint);
-    this.grapple.quaternion.setFromUnitVectors(DOWN, end.clone().sub(joint).normalize());
-    const line = this.plumb.geometry.attributes.position;
-    line.array.set([tip.x, 0, tip.z, tip.x, 0, 0.02]);
-    line.needsUpdate = true;
+    this.hang(tip, joint, tip.clone().add(new THREE.Vector3(...hung.grapple)));
     this.aim.visible = Boolean(crane.aim);
     if (crane.aim) {
       const [angle, radius] = [crane.aim[0] * RAD, crane.aim[1]];
       const down = grapplePoints(hello.grapple).grapple[2];
       this.aim.position.set(radius * Math.cos(angle), radius * Math.sin(angle), tip.z + down);
     }
+  }
+
+  /** Take whether its sway is measured, and whether there is one. */
+  known(crane) {
+    if (this.modelled !== !crane.measured || this.simulated !== crane.simulated) {
+      this.modelled = !crane.measured;
+      this.simulated = crane.simulated;
+      this.write();
+      this.seeThrough();
+    }
+    this.grapple.visible = this.link.visible = Boolean(crane.sway);
+    this.shade.visible = this.grapple.visible && !this.ghostly;
+  }
+
+  /** Hang the tool from the tip by a joint, towards an end, with its plumb line and shade. */
+  hang(tip, joint, end) {
+    span(this.link, tip, joint);
+    this.grapple.position.copy(joint);
+    this.grapple.quaternion.setFromUnitVectors(DOWN, end.clone().sub(joint).normalize());
+    const line = this.plumb.geometry.attributes.position;
+    line.array.set([tip.x, tip.y, tip.z, tip.x, tip.y, 0.02]);
+    line.needsUpdate = true;
     const over = end.applyAxisAngle(UP, this.slew.rotation.z);
     this.shade.position.set(over.x, over.y, 0.01);
   }
@@ -214,9 +228,13 @@ export class Crane {
     const { pose } = crane;
     if (!pose || !crane.sway) return;
     const tip = boomPoints(hello.boom, pose, crane.joints).tip;
-    const end = new THREE.Vector3(tip[0], 0, tip[1])
+    this.mark(new THREE.Vector3(tip[0], 0, tip[1])
       .add(new THREE.Vector3(...grapplePoints(hello.grapple, crane.sway).grapple))
-      .applyAxisAngle(UP, pose[0] * RAD);
+      .applyAxisAngle(UP, pose[0] * RAD));
+  }
+
+  /** Draw its way on to here. */
+  mark(end) {
     if (this.points === TRAIL) this.path.copyWithin(0, 3);
     else this.points += 1;
     this.path.set([end.x, end.y, end.z], (this.points - 1) * 3);
@@ -226,7 +244,7 @@ export class Crane {
 }
 
 /** Lay a beam of unit length along x from a to b. */
-function span(mesh, a, b) {
+export function span(mesh, a, b) {
   const along = b.clone().sub(a);
   const length = Math.max(1e-3, along.length());
   mesh.position.copy(a).addScaledVector(along, 0.5);

@@ -43,6 +43,13 @@ export function grapplePoints(grapple, sway) {
   };
 }
 
+/** Trolley and load from the middle of runway and bridge, as [along the runway, along the bridge, upwards], m. */
+export function ropePoints([runway, bridge, rope], sway) {
+  const [along, across] = [0, 1].map((k) => Math.tan((sway?.[k] ?? 0) * RAD));
+  const down = rope / Math.hypot(1, along, across);
+  return { tip: [runway, bridge, 0], load: [runway + down * along, bridge + down * across, -down] };
+}
+
 function clamp(value) {
   return Math.max(-1, Math.min(1, value));
 }

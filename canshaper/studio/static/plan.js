@@ -1,6 +1,6 @@
 // The cranes from above, on one scale: the way of tip and grapple, and how far the grapple gets past
 // a tip that stands.
-import { boomPoints, grapplePoints } from "/static/geometry.js";
+import { boomPoints, grapplePoints, ropePoints } from "/static/geometry.js";
 import { nameOf, text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
@@ -12,7 +12,11 @@ const FREE_M = 0.8; // around what is drawn
 const DRAW_MS = 50;
 
 /** Tip and grapple from above, [x, y]; the boom that has not slewed lies along x. */
-export function fromAbove(hello, { pose, joints, sway, aim }) {
+export function fromAbove(hello, { pose, joints, trolley, sway, aim }) {
+  if (trolley) {
+    const { tip, load } = ropePoints(trolley, sway);
+    return { tip: tip.slice(0, 2), grapple: sway ? load.slice(0, 2) : null, aim: null };
+  }
   const [s, c] = [Math.sin(pose[0] * RAD), Math.cos(pose[0] * RAD)];
   const at = (out, side) => [out * c - side * s, out * s + side * c];
   const radius = boomPoints(hello.boom, pose, joints).tip[0];
@@ -60,7 +64,7 @@ export class Plan {
 
   add(shown) {
     for (const [name, crane] of Object.entries(shown.cranes)) {
-      if (crane.pose) this.ways[name]?.add(shown.t, fromAbove(this.hello, crane));
+      if (crane.pose || crane.trolley) this.ways[name]?.add(shown.t, fromAbove(this.hello, crane));
     }
   }
 

@@ -1,5 +1,6 @@
 // The cranes in three dimensions. Inside `world` z is up, as in the model.
 import * as THREE from "/static/vendor/three.js";
+import { BridgeCrane } from "/static/bridge_crane.js";
 import { Crane, css } from "/static/crane.js";
 import { craneName, nameOf, text } from "/static/language.js";
 
@@ -33,9 +34,9 @@ export class Scene {
     this.camera = new THREE.PerspectiveCamera(FIELD_DEG, 1, 0.1, 120);
     // Two stand side by side; of more the eye is farther away.
     const far = Math.max(1, 0.4 + 0.3 * hello.cranes.length);
-    this.camera.position.set(-10.2, 7.6, 4.4).multiplyScalar(far);
+    this.camera.position.set(...(hello.hall ? [-14, 3, 5] : [-10.2, 7.6, 4.4])).multiplyScalar(far);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
-    this.controls.target.set(1.4, 1.55, 0);
+    this.controls.target.set(1.4, hello.hall ? 3.2 : 1.55, 0);
     this.controls.maxPolarAngle = 1.52;
     this.controls.minDistance = 4;
     this.controls.maxDistance = 45;
@@ -53,7 +54,7 @@ export class Scene {
     this.world.add(this.ground);
     this.cranes = {};
     hello.cranes.forEach((name, i) => {
-      const crane = new Crane(hello, nameOf("crane", name), hello.colors[name]);
+      const crane = new (hello.hall ? BridgeCrane : Crane)(hello, nameOf("crane", name), hello.colors[name]);
       crane.side = ((hello.cranes.length - 1) / 2 - i) * APART_M;
       this.cranes[name] = crane;
       this.world.add(crane.group);
@@ -195,5 +196,6 @@ function mixed(a, b, part) {
   const mix = (x, y) => (x && y ? x.map((v, i) => v + (y[i] - v) * part) : y);
   const pose = mix(a.pose, b.pose);
   if (a.pose && b.pose) pose[0] = a.pose[0] + (((b.pose[0] - a.pose[0] + 540) % 360) - 180) * part;
-  return { ...b, pose, joints: mix(a.joints, b.joints), sway: mix(a.sway, b.sway) };
+  const [joints, trolley, sway] = ["joints", "trolley", "sway"].map((key) => mix(a[key], b[key]));
+  return { ...b, pose, joints, trolley, sway };
 }

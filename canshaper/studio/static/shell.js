@@ -78,7 +78,7 @@ export class Shell {
   show(message) {
     this.scene?.add(message);
     this.plan.add(message);
-    const known = Object.values(message.cranes).some((crane) => crane.pose);
+    const known = Object.values(message.cranes).some((crane) => crane.pose || crane.trolley);
     byId("nopose").hidden = known;
     byId("scene").hidden = !known || this.other !== null;
   }

@@ -14,6 +14,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shaping.sway import GRAVITY_M_S2
 from tests.cli.invocation import invoke
 from tests.rigs.files import ROOT
+from tests.rigs.overhead import changed
 
 
 @pytest.fixture
@@ -168,7 +169,21 @@ def test_one_filter_beside_those_of_a_schedule_is_not_written(
     assert file.read_bytes() == before
 
 
-def test_a_filter_that_follows_its_rope_needs_no_lengths() -> None:
-    text = words("bridge-crane.yaml", "--axis", "trolley", "--lengths", "2:30", code=2)
-    says = "--lengths: expected an axis that does not follow its rope, got trolley: one filter,"
-    assert text == f"{says} without --lengths, is for all"
+@pytest.mark.slow
+def test_lengths_of_an_axis_that_follows_its_rope_are_those_of_the_rope(tmp_path: Path) -> None:
+    file = changed(tmp_path, ("tail_s: 10, stop_s: 10", "tail_s: 7, stop_s: 12"), ("30 }", "20 }"))
+    options = ["--axis", "trolley", "--lengths", "2:25", "--range", "5"]
+    assert "sway: { length_m: 2.0, length: { lowest_m: 2.0, highest_m: 25.0 } }" in words(
+        str(file), *options
+    )
+    words(str(file), *options, "--write")
+    trolley = load_deployment(file).axes["trolley"].config
+    assert trolley.sway and trolley.sway.length
+    ends = trolley.sway.length_m, trolley.sway.length.lowest_m, trolley.sway.length.highest_m
+    assert ends == (2.0, 2.0, 25.0)
+    design = trolley.filter.design()
+    assert design
+    assert design.period_s == pytest.approx(2.0 * math.pi * math.sqrt(2.0 / 9.81), rel=1e-3)
+    assert design.duration_s
+    # What a filter drawn out to the longest rope takes.
+    assert trolley.limits.tail_s == pytest.approx(design.duration_s * math.sqrt(12.5), abs=0.2)
