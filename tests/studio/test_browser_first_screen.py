@@ -33,8 +33,10 @@ def test_the_first_screen_has_cranes_state_reason_and_stop(
         box = page.locator(name).bounding_box()
         assert box and box["y"] >= 0 and box["y"] + box["height"] <= height, name
         assert box["x"] >= 0 and box["x"] + box["width"] <= width, name
+    assert page.locator("#swings").evaluate("(one) => one.scrollWidth <= one.clientWidth")
+    page.evaluate("scrollTo(0, 900)")
     stop = page.locator("#stop").bounding_box()
-    assert stop and stop["width"] >= 80
+    assert stop and stop["width"] >= 80 and stop["y"] >= 0
 
 
 @pytest.mark.parametrize("width", [390, 1440])
@@ -93,6 +95,22 @@ def test_a_crane_without_anti_sway_is_not_called_shaped(
     expect(name).to_have_text("anti-sway off", timeout=SOON_MS)
     page.keyboard.press("n")
     expect(name).to_have_text("shaped", timeout=SOON_MS)
+
+
+def test_a_time_of_the_other_setting_is_not_shown(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    still = page.locator("#still-shaped")
+
+    def drive() -> None:
+        drives(page)
+        page.keyboard.up("a")
+        expect(still).to_contain_text("still after")
+
+    undisturbed(page, drive)
+    page.keyboard.press("n")
+    expect(still).to_have_text("", timeout=SOON_MS)
 
 
 def test_the_colours_of_states_are_explained(shared: Studio, tab: Callable[..., Page]) -> None:

@@ -165,6 +165,10 @@ export class Panel {
     if (now - this.shownAt < SHOW_MS && mine === this.mine && !soon) return;
     this.shownAt = now;
     this.mine = mine;
+    // A time measured before anti-sway was switched says nothing of the setting that is named now.
+    if (shown.antisway !== (this.antisway ??= shown.antisway)) this.before = shown.cranes.shaped?.still;
+    else if (shown.cranes.shaped?.still !== this.before) this.before = undefined;
+    this.antisway = shown.antisway;
     for (const [name, crane] of Object.entries(shown.cranes)) {
       const { name: title, number, from, still, why } = this.swings[name];
       set(title, craneName(name, shown));
@@ -174,7 +178,8 @@ export class Panel {
       if (!known) set(from, text("swing.unknown"));
       else set(from, text(crane.measured ? "swing.measured" : crane.simulated ? "swing.simulated" : "swing.modelled"));
       const s = crane.still?.toFixed(1);
-      set(still, known && s ? text(crane.swings ? "still.swings" : "still.after", { s }) : "");
+      const past = name === "shaped" && !crane.swings && crane.still === this.before;
+      set(still, known && s && !past ? text(crane.swings ? "still.swings" : "still.after", { s }) : "");
       from.parentElement.classList.toggle("modelled", Boolean(known && !crane.measured));
       if (this.hello.machine) this.showSources(crane.sources);
       for (const [axis, values] of Object.entries(crane.axes)) {
