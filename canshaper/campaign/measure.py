@@ -1,18 +1,20 @@
 """One drive of a campaign, measured while it is driven: no frame is recorded."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from canshaper.campaign.draw import Setting, draw_drive, driven_axes
+from canshaper.campaign.native import NativeCrane
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
 from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
+from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
-from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY, kind_of
-from canshaper_sim.crane import CraneParameters, CraneState
+from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, TIP_AXES, WITHOUT_SWAY, kind_of
+from canshaper_sim.crane import CraneParameters
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import dwell_s
@@ -22,17 +24,58 @@ Row = dict[str, Any]
 """Row of one drive: seed, operator, fault, what was drawn, what was measured."""
 
 
+# One drive in so many is driven by both engines.
+BOTH_OF = 50
+
+
 def measured_drive(
-    deployment: Deployment, seed: int, ranges: Uncertainty, nominal: CraneParameters | None = None
+    deployment: Deployment,
+    seed: int,
+    ranges: Uncertainty,
+    nominal: CraneParameters | None = None,
+    native: NativeCrane | None = None,
 ) -> Row:
     """Draw a drive, drive it and measure it; see ``draw_drive``.
 
     A broken promise is a valve frame that the gate had to refuse: it knows nothing of how
-    the controller makes a frame, only what was asked and what the limits are.
+    the controller makes a frame, only what was asked and what the limits are. In C there is none.
+
+    Args:
+        deployment: the machine.
+        seed: of the drive.
+        ranges: from which the crane is drawn.
+        nominal: the crane that the ranges are about.
+        native: drives what it can; one drive in ``BOTH_OF`` is driven by both.
+
+    Raises:
+        CampaignError: both drive it, and not alike.
     """
     setting = draw_drive(deployment, seed, ranges, nominal)
-    drive = _Drive(deployment, setting, nominal or changed_parameters([], deployment))
-    raw = None if setting.fault else _Drive(deployment, setting, drive.nominal, bypass=True)
+    nominal = nominal or changed_parameters([], deployment)
+    row = native and _row(deployment, seed, setting, nominal, native)
+    if row and seed % BOTH_OF:
+        return row
+    own = _row(deployment, seed, setting, nominal)
+    assert own
+    for name, value in own.items() if row else ():
+        if value != row[name] and name != "engine" and not own["broken"]:
+            text = f"expected the same {name} of both engines, got {value!r} and {row[name]!r}"
+            raise CampaignError(f"drive {seed}: {text} in C; --engine python drives without it")
+    return {**own, "engine": "both"} if row else own
+
+
+def _row(
+    deployment: Deployment,
+    seed: int,
+    setting: Setting,
+    nominal: CraneParameters,
+    native: NativeCrane | None = None,
+) -> Row | None:
+    """The row of a setting; None where the C has no part for it."""
+    drive = _Drive(deployment, setting, nominal, native)
+    if not drive.driven:
+        return None
+    raw = None if setting.fault else _Drive(deployment, setting, nominal, native, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,
@@ -41,6 +84,7 @@ def measured_drive(
         "broken": len(drive.refused),
         "why": drive.refused[0] if drive.refused else "",
         "swung_over": drive.swung_over,
+        "engine": "native" if native else "python",
     }
 
 
@@ -51,7 +95,7 @@ class _Drive:
     and it leaves as much as its largest swing.
 
     Attributes:
-        nominal: the crane whose full speeds the operator expects.
+        driven: it was; else the C has no part for it.
         measures: see ``MEASURES``.
         refused: valve frames that the gate has refused, with their times.
         swung_over: its grapple swung above the horizontal.
@@ -62,25 +106,40 @@ class _Drive:
         deployment: Deployment,
         setting: Setting,
         nominal: CraneParameters,
+        native: NativeCrane | None = None,
         *,
         bypass: bool = False,
     ) -> None:
+        tracks = _Tracks(deployment, setting, nominal)
+        self.refused = list[str]()
+        if native:
+            columns = native.drive(setting, native.hands(setting, bypass=bypass))
+            self.driven = columns is not None
+            if columns is None:
+                return
+            self.swung_over = tracks.take(*columns)
+        else:
+            self.driven, self.swung_over = True, self._simulate(deployment, setting, tracks, bypass)
+        self.measures = tracks.measures()
+        if self.swung_over:
+            self.measures["residual_deg"] = self.measures["peak_deg"]
+            self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
+
+    def _simulate(
+        self, deployment: Deployment, setting: Setting, tracks: "_Tracks", bypass: bool
+    ) -> bool:
+        """Drive in Python, behind the gate; whether it swung over."""
         options: DriveOptions = {**setting.options, "bypass": bypass}
         simulation = Simulation(deployment, setting.script, **options)
         plant = simulation.plant
-        tracks = _Tracks(deployment, setting, nominal, plant)
-        self.nominal, self.refused = nominal, list[str]()
         for time_ms in simulation.ticks():
-            tracks.add(time_ms)
+            tracks.add(time_ms, plant)
             for event in simulation.controller.events:
                 if isinstance(event, RefusalEvent):
                     self.refused.append(f"{time_ms / 1000.0:.2f} s: {event.text}")
             if plant.crane.swung_over:
-                break
-        self.measures, self.swung_over = tracks.measures(), plant.crane.swung_over
-        if self.swung_over:
-            self.measures["residual_deg"] = self.measures["peak_deg"]
-            self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
+                return True
+        return False
 
 
 class _Tracks:
@@ -90,14 +149,14 @@ class _Tracks:
     """
 
     def __init__(
-        self, deployment: Deployment, setting: Setting, nominal: CraneParameters, plant: PlantNode
+        self, deployment: Deployment, setting: Setting, nominal: CraneParameters
     ) -> None:
         crane, _ = driven_axes(deployment)
         driven = driven_part(deployment, crane)
         self._moves = moves = driven.coordinates
         axes = sorted(moves, key=lambda one: ALL_AXES.index(moves[one]))
         self._dwell_s = dwell_s(driven)
-        self._plant, self._script = plant, setting.script
+        self._script = setting.script
         self._tick_s = deployment.config.tick_ms / 1000.0
         self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}
         self._full = nominal.full_speeds(kind_of(moves.values()))
@@ -105,16 +164,27 @@ class _Tracks:
         self._t_s: list[float] = []
         self._commands: dict[str, list[float]] = {name: [] for name in axes}
         self._speeds: dict[str, list[float]] = {name: [] for name in axes}
-        self._states: list[CraneState] = []
+        self._poses: list[tuple[float, float]] = []  # theta1, radius
         self._across: list[float] = []
         self._along: list[float] = []
 
-    def add(self, time_ms: int) -> None:
+    def take(self, columns: Sequence[list[float]], t_s: list[float]) -> bool:
+        """Take what the C has driven, see ``NativeCrane.drive``; whether it swung over."""
+        theta1, radius_m, *of_axes, across, along = *columns[:5], *columns[5:7]
+        self._t_s, self._poses = t_s, [*zip(theta1, radius_m, strict=True)]
+        self._across, self._along = [*map(math.degrees, across)], [*map(math.degrees, along)]
+        for name, moved in self._moves.items():
+            number = TIP_AXES.index(moved)
+            self._speeds[name], self._commands[name] = of_axes[number], columns[7 + number]
+        return max(abs(across[-1]), abs(along[-1])) > math.pi / 2.0
+
+    def add(self, time_ms: int, plant: PlantNode) -> None:
         """Take the state of the crane after a tick."""
-        plant, moves = self._plant, self._moves
+        moves = self._moves
         crane, commands, speeds = plant.crane, self._commands, self._speeds
         self._t_s.append(time_ms / 1000.0)
-        self._states.append(state := crane.state)
+        state = crane.state
+        self._poses.append((state.theta1_rad, state.radius_m))
         # A slope and the wind hold the grapple askew: that is no swing.
         across, along = crane.rest_rad
         self._across.append(math.degrees(state.theta5_rad - across))
@@ -127,10 +197,7 @@ class _Tracks:
         """Return the measures of the drive by the names of ``MEASURES``; None for a missing one."""
         across, along = self._across, self._along
         swing = [*map(math.hypot, across, along)]
-        tip = [
-            (at.radius_m * math.cos(at.theta1_rad), at.radius_m * math.sin(at.theta1_rad))
-            for at in self._states
-        ]
+        tip = [(r_m * math.cos(theta1), r_m * math.sin(theta1)) for theta1, r_m in self._poses]
         axes = {
             name: AxisTrace(
                 [self._script.command(name, time_s) for time_s in self._t_s],
