@@ -44,6 +44,14 @@ def compiler() -> list[str]:
     return [found]
 
 
+def has_compiler() -> bool:
+    """Whether a C compiler is here."""
+    try:
+        return shutil.which(compiler()[0]) is not None
+    except NativeError:
+        return False
+
+
 def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -> Path:
     """Compile the C with these tables into a shared library in a folder.
 
