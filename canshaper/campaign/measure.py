@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from canshaper.campaign.draw import Setting, draw_drive, driven_axes
-from canshaper.campaign.native import NativeCrane
+from canshaper.campaign.native import NativeCrane, Packed
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
 from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
@@ -52,11 +52,12 @@ def measured_drive(
     """
     setting = draw_drive(deployment, seed, ranges, nominal)
     nominal = nominal or changed_parameters([], deployment)
-    row = native and _row(deployment, seed, setting, nominal, native)
+    row = None
+    if native and native.has(setting):
+        row = _row(deployment, seed, setting, nominal, native)
     if row and seed % BOTH_OF:
         return row
     own = _row(deployment, seed, setting, nominal)
-    assert own
     for name, value in own.items() if row else ():
         if value != row[name] and name != "engine" and not own["broken"]:
             text = f"expected the same {name} of both engines, got {value!r} and {row[name]!r}"
@@ -70,12 +71,14 @@ def _row(
     setting: Setting,
     nominal: CraneParameters,
     native: NativeCrane | None = None,
-) -> Row | None:
-    """The row of a setting; None where the C has no part for it."""
-    drive = _Drive(deployment, setting, nominal, native)
-    if not drive.driven:
-        return None
-    raw = None if setting.fault else _Drive(deployment, setting, nominal, native, bypass=True)
+) -> Row:
+    """The row of a setting."""
+    frames = native and native.frames(setting)
+    drive = _Drive(deployment, setting, nominal, native, frames)
+    raw = None
+    if not setting.fault:
+        frames = native and frames and native.switched_off(frames)
+        raw = _Drive(deployment, setting, nominal, native, frames, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,
@@ -95,7 +98,6 @@ class _Drive:
     and it leaves as much as its largest swing.
 
     Attributes:
-        driven: it was; else the C has no part for it.
         measures: see ``MEASURES``.
         refused: valve frames that the gate has refused, with their times.
         swung_over: its grapple swung above the horizontal.
@@ -107,20 +109,17 @@ class _Drive:
         setting: Setting,
         nominal: CraneParameters,
         native: NativeCrane | None = None,
+        frames: Packed | None = None,
         *,
         bypass: bool = False,
     ) -> None:
         tracks = _Tracks(deployment, setting, nominal)
         self.refused = list[str]()
-        if native:
-            columns = native.drive(setting, native.hands(setting, bypass=bypass))
-            self.driven = columns is not None
-            if columns is None:
-                return
-            self.swung_over = tracks.take(*columns)
+        if native and frames:
+            self.swung_over = tracks.take(*native.drive(setting, frames))
         else:
-            self.driven, self.swung_over = True, self._simulate(deployment, setting, tracks, bypass)
-        self.measures = tracks.measures()
+            self.swung_over = self._simulate(deployment, setting, tracks, bypass)
+        self.measures = tracks.measures(crane_only=bypass)
         if self.swung_over:
             self.measures["residual_deg"] = self.measures["peak_deg"]
             self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
@@ -148,9 +147,7 @@ class _Tracks:
     Speeds are parts of the nominal full speeds: what the operator expects of a deflection.
     """
 
-    def __init__(
-        self, deployment: Deployment, setting: Setting, nominal: CraneParameters
-    ) -> None:
+    def __init__(self, deployment: Deployment, setting: Setting, nominal: CraneParameters) -> None:
         crane, _ = driven_axes(deployment)
         driven = driven_part(deployment, crane)
         self._moves = moves = driven.coordinates
@@ -170,7 +167,7 @@ class _Tracks:
 
     def take(self, columns: Sequence[list[float]], t_s: list[float]) -> bool:
         """Take what the C has driven, see ``NativeCrane.drive``; whether it swung over."""
-        theta1, radius_m, *of_axes, across, along = *columns[:5], *columns[5:7]
+        theta1, radius_m, *of_axes, across, along = columns[:7]
         self._t_s, self._poses = t_s, [*zip(theta1, radius_m, strict=True)]
         self._across, self._along = [*map(math.degrees, across)], [*map(math.degrees, along)]
         for name, moved in self._moves.items():
@@ -193,8 +190,11 @@ class _Tracks:
             commands[name].append(plant.command(name))
             speeds[name].append(crane.speed(moves[name]))
 
-    def measures(self) -> dict[str, float | None]:
-        """Return the measures of the drive by the names of ``MEASURES``; None for a missing one."""
+    def measures(self, *, crane_only: bool) -> dict[str, float | None]:
+        """Return the measures of the drive by the names of ``MEASURES``; None for a missing one.
+
+        ``crane_only``: those of its axes are left out.
+        """
         across, along = self._across, self._along
         swing = [*map(math.hypot, across, along)]
         tip = [(r_m * math.cos(theta1), r_m * math.sin(theta1)) for theta1, r_m in self._poses]
@@ -210,14 +210,18 @@ class _Tracks:
         crane = CraneTrace(tip, tip, swing)
         recording = Recording(self._t_s, axes, crane, self._dwell_s)
         of_crane = crane_metrics(recording, crane, self._still_deg)
-        strokes = find_strokes(recording)
-        dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
-        return {
+        measured = {
             "still_s": of_crane.still_s,
             "residual_deg": of_crane.residual_deg,
             "peak_deg": of_crane.peak_deg,
             "run_on_s": of_crane.run_on_s,
             "run_on_m": of_crane.run_on_m,
+        }
+        if crane_only:
+            return measured
+        strokes = find_strokes(recording)
+        dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
+        return measured | {
             "travel_error_s": max(self._travel_errors(axes), default=None),
             "dip_pct": 100.0 * max(dips, default=0.0),
         }

@@ -1,4 +1,4 @@
-"""Drives of a campaign in C: controller, valves, tip and grapple, equal to Python's to the last bit.
+"""Drives of a campaign in C: controller, valves, tip and grapple, equal to Python's to the bit.
 
 Draws, joystick frames and measures are Python's. What the C has no part for is left to Python,
 drive by drive; the gate is Python's too, so that only Python's drives say whether it refuses.
@@ -24,6 +24,7 @@ from canshaper_sim.crane import FULL_SPEEDS, INTERNAL_STEP_S, CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.joysticks import JoystickNode
+from canshaper_sim.strokes import Script
 from canshaper_sim.valve import ValveParameters
 from canshaper_sim.valve_frames import CommandReader
 
@@ -48,6 +49,10 @@ _GRAPPLE = ("l1_m", "l2_m", "m1_kg", "m2_kg", "c5_n_m_s_rad", "c6_n_m_s_rad", "g
 _ABSENT = ("boom", "contact", "log", "pump_flow", "ends")
 _PLAIN = CraneParameters()
 _UNCOMPENSATED = ("load", "load_per_t")
+
+
+Packed = tuple[Any, Any]
+"""How many joystick frames come in each tick, and the frames, as arrays."""
 
 
 class _Valve(ctypes.Structure):
@@ -102,27 +107,52 @@ class NativeCrane:
         axes = deployment.by_coordinate
         self._wiring = [_wiring(deployment, axes.get(one)) for one in TIP_AXES]
 
-    def drive(
-        self, setting: Setting, hands: Joysticks
-    ) -> tuple[list[list[float]], list[float]] | None:
+        # What the switch for anti-sway changes in the frames; nothing else there hangs on it.
+        still = Script("still", (), 1.0)
+        hands = [JoystickNode(deployment, still, bypass=off) for off in (False, True)]
+        on, off = (self._packed(hand, 1)[1] for hand in hands)
+        self._switch = {
+            key: a ^ b for key, a, b in zip(on["id"], on["data"], off["data"], strict=True)
+        }
+
+    def has(self, setting: Setting) -> bool:
+        """Whether the C has a part for all of the crane that was drawn."""
+        parameters = setting.options["parameters"]
+        return parameters is not None and _simple(parameters)
+
+    def frames(self, setting: Setting) -> Packed:
+        """Joystick frames of a drive."""
+        hands: Joysticks = JoystickNode(self._deployment, setting.script)
+        if disturb := setting.options.get("disturb"):
+            hands = disturb(hands)
+        tick_ms = self._deployment.config.tick_ms
+        return self._packed(hands, -(-round(setting.script.duration_s * 1000.0) // tick_ms))
+
+    def switched_off(self, frames: Packed) -> Packed:
+        """The same frames with anti-sway switched off; of joysticks that are not disturbed."""
+        counts, array = frames
+        array = array.copy()
+        for key, bits in self._switch.items():
+            array["data"][array["id"] == key] ^= bits
+        return counts, array
+
+    def drive(self, setting: Setting, packed: Packed) -> tuple[list[list[float]], list[float]]:
         """Drive a setting.
 
         Args:
-            setting: what was drawn.
-            hands: who holds the joysticks.
+            setting: what was drawn; see ``has``.
+            packed: the joystick frames.
 
         Returns:
-            None where the C has no part for the crane. Otherwise columns of theta1, radius, speeds,
+            Columns of theta1, radius, speeds,
             theta5, theta6 and commands, the three coordinates in the order of ``TIP_AXES``; and
             the times of the ticks that were driven, s. Fewer than drawn: it swung over.
         """
-        options, deployment = setting.options, self._deployment
+        options, tick_ms = setting.options, self._deployment.config.tick_ms
         parameters = options["parameters"]
-        if parameters is None or not _simple(parameters):
-            return None
-        tick_ms = deployment.config.tick_ms
-        ticks = -(-round(setting.script.duration_s * 1000.0) // tick_ms)
-        counts, frames = self._frames(hands, ticks, tick_ms)
+        assert parameters
+        counts, frames = packed
+        ticks = len(counts)
         loads = [*options.get("loads", ())]
         steps = math.ceil(tick_ms / 1000.0 / INTERNAL_STEP_S - 1e-9)
         drive = _Drive(
@@ -147,8 +177,9 @@ class NativeCrane:
         driven = self._c.cs_drive(ctypes.byref(drive), *pointers, *after)
         return out[:, :driven].tolist(), [k * tick_ms / 1000.0 for k in range(driven)]
 
-    def _frames(self, hands: Joysticks, ticks: int, tick_ms: int) -> tuple[Any, Any]:
-        """Joystick frames of all ticks, and how many come in each."""
+    def _packed(self, hands: Joysticks, ticks: int) -> Packed:
+        """Joystick frames of some ticks."""
+        tick_ms = self._deployment.config.tick_ms
         by_tick = [hands.frames_of_tick(k * tick_ms, tick_ms) for k in range(ticks)]
         flat: list[Frame] = [frame for frames in by_tick for frame in frames]
         array = np.zeros(max(1, len(flat)), _FRAME)
@@ -160,12 +191,6 @@ class NativeCrane:
             joined = b"".join(one.ljust(8, b"\0") for one in data)
             array["data"][:] = np.frombuffer(joined, np.uint8).reshape(-1, 8)
         return np.array([*map(len, by_tick)], np.int32), array
-
-    def hands(self, setting: Setting, *, bypass: bool) -> Joysticks:
-        """Who holds the joysticks in a drive."""
-        node: Joysticks = JoystickNode(self._deployment, setting.script, bypass=bypass)
-        disturb = setting.options.get("disturb")
-        return disturb(node) if disturb else node
 
 
 def _cache_folder() -> Path:
