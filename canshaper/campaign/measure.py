@@ -52,17 +52,17 @@ def measured_drive(
     """
     setting = draw_drive(deployment, seed, ranges, nominal)
     nominal = nominal or changed_parameters([], deployment)
-    row = None
-    if native and native.has(setting):
-        row = _row(deployment, seed, setting, nominal, native)
-    if row and seed % BOTH_OF:
+    if not (native and native.has(setting)):
+        return _row(deployment, seed, setting, nominal)
+    row = _row(deployment, seed, setting, nominal, native)
+    if seed % BOTH_OF:
         return row
     own = _row(deployment, seed, setting, nominal)
-    for name, value in own.items() if row else ():
+    for name, value in own.items():
         if value != row[name] and name != "engine" and not own["broken"]:
             text = f"expected the same {name} of both engines, got {value!r} and {row[name]!r}"
             raise CampaignError(f"drive {seed}: {text} in C; --engine python drives without it")
-    return {**own, "engine": "both"} if row else own
+    return {**own, "engine": "both"}
 
 
 def _row(
@@ -73,11 +73,11 @@ def _row(
     native: NativeCrane | None = None,
 ) -> Row:
     """The row of a setting."""
-    frames = native and native.frames(setting)
+    frames = native.frames(setting) if native else None
     drive = _Drive(deployment, setting, nominal, native, frames)
     raw = None
     if not setting.fault:
-        frames = native and frames and native.switched_off(frames)
+        frames = native.switched_off(frames) if native and frames else None
         raw = _Drive(deployment, setting, nominal, native, frames, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {

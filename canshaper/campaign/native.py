@@ -170,7 +170,7 @@ class NativeCrane:
             ),
         )
         empty = np.array(_grapple(parameters.grapple))
-        loaded = np.array([(at, *_grapple(one)) for at, one in loads] or [0.0])
+        loaded = np.array([[at, *_grapple(one)] for at, one in loads])
         out = np.zeros((10, ticks))
         pointers = (array.ctypes.data_as(ctypes.c_void_p) for array in (empty, loaded))
         after = (array.ctypes.data_as(ctypes.c_void_p) for array in (counts, frames, out))
