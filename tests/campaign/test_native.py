@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.campaign import measure
+from canshaper.campaign import measure, run
 from canshaper.campaign.draw import draw_drive
 from canshaper.campaign.measure import Row, measured_drive
 from canshaper.campaign.native import PLANT, NativeCrane
@@ -99,6 +99,7 @@ def test_other_mathematics_are_refused(tmp_path: Path) -> None:
 def test_native_without_a_compiler_is_refused_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    run._native.cache_clear()  # of a machine that had one
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     arguments = ["campaign", str(ROBUST.path), "--engine", "native", "--out", str(tmp_path)]
