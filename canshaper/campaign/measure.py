@@ -1,18 +1,20 @@
 """One drive of a campaign, measured while it is driven: no frame is recorded."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from canshaper.campaign.draw import Setting, draw_drive, driven_axes
+from canshaper.campaign.native import NativeCrane, Packed
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
 from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
+from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
-from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY, kind_of
-from canshaper_sim.crane import CraneParameters, CraneState
+from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, TIP_AXES, WITHOUT_SWAY, kind_of
+from canshaper_sim.crane import CraneParameters
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import dwell_s
@@ -22,17 +24,61 @@ Row = dict[str, Any]
 """Row of one drive: seed, operator, fault, what was drawn, what was measured."""
 
 
+# One drive in so many is driven by both engines.
+BOTH_OF = 50
+
+
 def measured_drive(
-    deployment: Deployment, seed: int, ranges: Uncertainty, nominal: CraneParameters | None = None
+    deployment: Deployment,
+    seed: int,
+    ranges: Uncertainty,
+    nominal: CraneParameters | None = None,
+    native: NativeCrane | None = None,
 ) -> Row:
     """Draw a drive, drive it and measure it; see ``draw_drive``.
 
     A broken promise is a valve frame that the gate had to refuse: it knows nothing of how
-    the controller makes a frame, only what was asked and what the limits are.
+    the controller makes a frame, only what was asked and what the limits are. In C there is none.
+
+    Args:
+        deployment: the machine.
+        seed: of the drive.
+        ranges: from which the crane is drawn.
+        nominal: the crane that the ranges are about.
+        native: drives what it can; one drive in ``BOTH_OF`` is driven by both.
+
+    Raises:
+        CampaignError: both drive it, and not alike.
     """
     setting = draw_drive(deployment, seed, ranges, nominal)
-    drive = _Drive(deployment, setting, nominal or changed_parameters([], deployment))
-    raw = None if setting.fault else _Drive(deployment, setting, drive.nominal, bypass=True)
+    nominal = nominal or changed_parameters([], deployment)
+    if not (native and native.has(setting)):
+        return _row(deployment, seed, setting, nominal)
+    row = _row(deployment, seed, setting, nominal, native)
+    if seed % BOTH_OF:
+        return row
+    own = _row(deployment, seed, setting, nominal)
+    for name, value in own.items():
+        if value != row[name] and name != "engine" and not own["broken"]:
+            text = f"expected the same {name} of both engines, got {value!r} and {row[name]!r}"
+            raise CampaignError(f"drive {seed}: {text} in C; --engine python drives without it")
+    return {**own, "engine": "both"}
+
+
+def _row(
+    deployment: Deployment,
+    seed: int,
+    setting: Setting,
+    nominal: CraneParameters,
+    native: NativeCrane | None = None,
+) -> Row:
+    """The row of a setting."""
+    frames = native.frames(setting) if native else None
+    drive = _Drive(deployment, setting, nominal, native, frames)
+    raw = None
+    if not setting.fault:
+        frames = native.switched_off(frames) if native and frames else None
+        raw = _Drive(deployment, setting, nominal, native, frames, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,
@@ -41,6 +87,7 @@ def measured_drive(
         "broken": len(drive.refused),
         "why": drive.refused[0] if drive.refused else "",
         "swung_over": drive.swung_over,
+        "engine": "native" if native else "python",
     }
 
 
@@ -51,7 +98,6 @@ class _Drive:
     and it leaves as much as its largest swing.
 
     Attributes:
-        nominal: the crane whose full speeds the operator expects.
         measures: see ``MEASURES``.
         refused: valve frames that the gate has refused, with their times.
         swung_over: its grapple swung above the horizontal.
@@ -62,25 +108,37 @@ class _Drive:
         deployment: Deployment,
         setting: Setting,
         nominal: CraneParameters,
+        native: NativeCrane | None = None,
+        frames: Packed | None = None,
         *,
         bypass: bool = False,
     ) -> None:
+        tracks = _Tracks(deployment, setting, nominal)
+        self.refused = list[str]()
+        if native and frames:
+            self.swung_over = tracks.take(*native.drive(setting, frames))
+        else:
+            self.swung_over = self._simulate(deployment, setting, tracks, bypass)
+        self.measures = tracks.measures(crane_only=bypass)
+        if self.swung_over:
+            self.measures["residual_deg"] = self.measures["peak_deg"]
+            self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
+
+    def _simulate(
+        self, deployment: Deployment, setting: Setting, tracks: "_Tracks", bypass: bool
+    ) -> bool:
+        """Drive in Python, behind the gate; whether it swung over."""
         options: DriveOptions = {**setting.options, "bypass": bypass}
         simulation = Simulation(deployment, setting.script, **options)
         plant = simulation.plant
-        tracks = _Tracks(deployment, setting, nominal, plant)
-        self.nominal, self.refused = nominal, list[str]()
         for time_ms in simulation.ticks():
-            tracks.add(time_ms)
+            tracks.add(time_ms, plant)
             for event in simulation.controller.events:
                 if isinstance(event, RefusalEvent):
                     self.refused.append(f"{time_ms / 1000.0:.2f} s: {event.text}")
             if plant.crane.swung_over:
-                break
-        self.measures, self.swung_over = tracks.measures(), plant.crane.swung_over
-        if self.swung_over:
-            self.measures["residual_deg"] = self.measures["peak_deg"]
-            self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
+                return True
+        return False
 
 
 class _Tracks:
@@ -89,15 +147,13 @@ class _Tracks:
     Speeds are parts of the nominal full speeds: what the operator expects of a deflection.
     """
 
-    def __init__(
-        self, deployment: Deployment, setting: Setting, nominal: CraneParameters, plant: PlantNode
-    ) -> None:
+    def __init__(self, deployment: Deployment, setting: Setting, nominal: CraneParameters) -> None:
         crane, _ = driven_axes(deployment)
         driven = driven_part(deployment, crane)
         self._moves = moves = driven.coordinates
         axes = sorted(moves, key=lambda one: ALL_AXES.index(moves[one]))
         self._dwell_s = dwell_s(driven)
-        self._plant, self._script = plant, setting.script
+        self._script = setting.script
         self._tick_s = deployment.config.tick_ms / 1000.0
         self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}
         self._full = nominal.full_speeds(kind_of(moves.values()))
@@ -105,16 +161,27 @@ class _Tracks:
         self._t_s: list[float] = []
         self._commands: dict[str, list[float]] = {name: [] for name in axes}
         self._speeds: dict[str, list[float]] = {name: [] for name in axes}
-        self._states: list[CraneState] = []
+        self._poses: list[tuple[float, float]] = []  # theta1, radius
         self._across: list[float] = []
         self._along: list[float] = []
 
-    def add(self, time_ms: int) -> None:
+    def take(self, columns: Sequence[list[float]], t_s: list[float]) -> bool:
+        """Take what the C has driven, see ``NativeCrane.drive``; whether it swung over."""
+        theta1, radius_m, *of_axes, across, along = columns[:7]
+        self._t_s, self._poses = t_s, [*zip(theta1, radius_m, strict=True)]
+        self._across, self._along = [*map(math.degrees, across)], [*map(math.degrees, along)]
+        for name, moved in self._moves.items():
+            number = TIP_AXES.index(moved)
+            self._speeds[name], self._commands[name] = of_axes[number], columns[7 + number]
+        return max(abs(across[-1]), abs(along[-1])) > math.pi / 2.0
+
+    def add(self, time_ms: int, plant: PlantNode) -> None:
         """Take the state of the crane after a tick."""
-        plant, moves = self._plant, self._moves
+        moves = self._moves
         crane, commands, speeds = plant.crane, self._commands, self._speeds
         self._t_s.append(time_ms / 1000.0)
-        self._states.append(state := crane.state)
+        state = crane.state
+        self._poses.append((state.theta1_rad, state.radius_m))
         # A slope and the wind hold the grapple askew: that is no swing.
         across, along = crane.rest_rad
         self._across.append(math.degrees(state.theta5_rad - across))
@@ -123,14 +190,14 @@ class _Tracks:
             commands[name].append(plant.command(name))
             speeds[name].append(crane.speed(moves[name]))
 
-    def measures(self) -> dict[str, float | None]:
-        """Return the measures of the drive by the names of ``MEASURES``; None for a missing one."""
+    def measures(self, *, crane_only: bool) -> dict[str, float | None]:
+        """Return the measures of the drive by the names of ``MEASURES``; None for a missing one.
+
+        ``crane_only``: those of its axes are left out.
+        """
         across, along = self._across, self._along
         swing = [*map(math.hypot, across, along)]
-        tip = [
-            (at.radius_m * math.cos(at.theta1_rad), at.radius_m * math.sin(at.theta1_rad))
-            for at in self._states
-        ]
+        tip = [(r_m * math.cos(theta1), r_m * math.sin(theta1)) for theta1, r_m in self._poses]
         axes = {
             name: AxisTrace(
                 [self._script.command(name, time_s) for time_s in self._t_s],
@@ -143,14 +210,18 @@ class _Tracks:
         crane = CraneTrace(tip, tip, swing)
         recording = Recording(self._t_s, axes, crane, self._dwell_s)
         of_crane = crane_metrics(recording, crane, self._still_deg)
-        strokes = find_strokes(recording)
-        dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
-        return {
+        measured = {
             "still_s": of_crane.still_s,
             "residual_deg": of_crane.residual_deg,
             "peak_deg": of_crane.peak_deg,
             "run_on_s": of_crane.run_on_s,
             "run_on_m": of_crane.run_on_m,
+        }
+        if crane_only:
+            return measured
+        strokes = find_strokes(recording)
+        dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
+        return measured | {
             "travel_error_s": max(self._travel_errors(axes), default=None),
             "dip_pct": 100.0 * max(dips, default=0.0),
         }

@@ -11,9 +11,10 @@ from typing import Any
 
 from canshaper.campaign.engine import Engine
 from canshaper.campaign.measure import Row, measured_drive
+from canshaper.campaign.native import NativeCrane
 from canshaper.campaign.store import Store
 from canshaper.config.uncertainty import Uncertainty
-from canshaper.errors import CampaignError
+from canshaper.errors import CampaignError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
@@ -33,26 +34,40 @@ class Source:
         files: content of it and of its DBC files, by their absolute paths.
         ranges: from which its cranes are drawn; of two files that are compared, those of the first.
         changes: parameters of the nominal crane, NAME=VALUE.
+        engine: native or python; what C has no part for is Python's.
     """
 
     path: str
     files: tuple[tuple[str, bytes], ...]
     ranges: Uncertainty
     changes: tuple[str, ...] = ()
+    engine: str = "python"
 
     @classmethod
     def of(
-        cls, deployment: Deployment, ranges: Uncertainty, changes: Sequence[str] = ()
+        cls,
+        deployment: Deployment,
+        ranges: Uncertainty,
+        changes: Sequence[str] = (),
+        engine: str = "python",
     ) -> "Source":
         """Read the files of a deployment."""
         path = deployment.path.resolve()
         paths = [path, *((path.parent / name).resolve() for name in deployment.config.dbc)]
         files = tuple((str(one), one.read_bytes()) for one in paths)
-        return cls(str(path), files, ranges, tuple(changes))
+        return cls(str(path), files, ranges, tuple(changes), engine)
 
     def load(self) -> Deployment:
         """Load the deployment, once in a process."""
         return _loaded(self.path, self.files)
+
+    def native(self) -> NativeCrane | ConfigError | None:
+        """Controller and crane in C, once in a process; why not, or None without ``engine``.
+
+        Raises:
+            NativeError: it cannot be compiled here, or its arithmetic is another one.
+        """
+        return _native(self.path, self.files) if self.engine == "native" else None
 
     @property
     def about(self) -> dict[str, Any]:
@@ -83,11 +98,21 @@ def _loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deploymen
         return load_deployment(root / source_path.lstrip("/"))
 
 
+@cache
+def _native(source_path: str, files: tuple[tuple[str, bytes], ...]) -> NativeCrane | ConfigError:
+    try:
+        return NativeCrane(_loaded(source_path, files))
+    except ConfigError as error:
+        return error
+
+
 def drive_all(source: Source, seeds: Seeds) -> list[Row]:
     """Draw, drive and measure each of some drives."""
     deployment = source.load()
     nominal = changed_parameters([*source.changes], deployment)
-    return [measured_drive(deployment, seed, source.ranges, nominal) for seed in seeds]
+    native = source.native()
+    c = native if isinstance(native, NativeCrane) else None
+    return [measured_drive(deployment, seed, source.ranges, nominal, c) for seed in seeds]
 
 
 def shard_of(seeds: range, shard: str | None) -> range:

@@ -1,5 +1,6 @@
 """Summary of a campaign: quantiles, broken promises, the worst drives, the verdict."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -19,7 +20,7 @@ from canshaper.report.console import new_table
 
 Columns = Mapping[str, Sequence[Any]]
 # Not drawn, but measured or noted of a drive.
-_OUTCOMES = ("seed", *MEASURES, "raw_deg", "broken", "why", "swung_over", "fault")
+_OUTCOMES = ("seed", *MEASURES, "raw_deg", "broken", "why", "swung_over", "fault", "engine")
 WORST = 10
 # A drive is worse than without canshaper where it leaves so much more swing, deg.
 MORE_DEG = 0.3
@@ -32,7 +33,7 @@ class Promises:
     """Drives in which the gate had to refuse a valve frame.
 
     Attributes:
-        drives: all, those with faults too.
+        drives: all that the gate saw, those with faults too.
         broken: those that broke one.
         most: largest share of all drives that may break one.
         why: of the first of them.
@@ -87,6 +88,7 @@ class Summary:
         quantiles: by measure and quantile, of the drives without a fault of bus or sensor.
         faulty: the same, of those with one.
         counts: of drives without and with a fault, and of those whose grapple swung over.
+        engines: how many drives were driven by each: native, python, both.
         promises, worse: see there.
         influences: of the measures, each factor.
         worst: the drives that leave the most swing, without a fault.
@@ -96,6 +98,7 @@ class Summary:
     quantiles: Mapping[str, Mapping[str, Quantile]]
     faulty: Mapping[str, Mapping[str, Quantile]]
     counts: Mapping[str, int]
+    engines: Mapping[str, int]
     promises: Promises
     worse: Worse
     influences: Mapping[str, Sequence[Influence]]
@@ -124,7 +127,8 @@ def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
     faulty = _where(columns, [bool(fault) for fault in faults])
     quantiles = _quantiles(sound)
     broken = [k for k, count in enumerate(columns["broken"]) if count]
-    drives = len(columns["seed"])
+    engines = dict(Counter(columns["engine"]))
+    drives = len(columns["seed"]) - engines.get("native", 0)
     why = f"drive {columns['seed'][broken[0]]} at {columns['why'][broken[0]]}" if broken else ""
     factors = {name: column for name, column in sound.items() if name not in _OUTCOMES}
     return Summary(
@@ -135,6 +139,7 @@ def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
             "with_fault": len(faulty["seed"]),
             "swung_over": sum(columns["swung_over"]),
         },
+        engines,
         Promises(drives, len(broken), most_of(len(broken), drives), why),
         _worse(sound),
         {measure: influences(factors, sound[measure]) for measure in MEASURES},
@@ -263,7 +268,9 @@ def tables(summary: Summary) -> Iterator[Table]:
 
 def lines(summary: Summary) -> Iterator[str]:
     """Yield the lines that the tables do not have: promises, the verdict."""
-    promises = summary.promises
+    promises, engines = summary.promises, summary.engines
+    drives = ", ".join(f"{count} {name}" for name, count in sorted(engines.items()))
+    yield f"Drives by engine: {drives}; the gate sees all but native"
     yield f"In brackets: bounds with {_SURE} confidence; ?: too few drives for one"
     yield (
         f"Promises: {promises.broken} of {promises.drives} drives broke one;"

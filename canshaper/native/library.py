@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable
+from hashlib import sha256
 from pathlib import Path
 
 from canshaper.codec.frame import Frame
@@ -43,13 +44,21 @@ def compiler() -> list[str]:
     return [found]
 
 
+def has_compiler() -> bool:
+    """Whether a C compiler is here."""
+    try:
+        return shutil.which(compiler()[0]) is not None
+    except NativeError:
+        return False
+
+
 def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -> Path:
     """Compile the C with these tables into a shared library in a folder.
 
     Args:
         numbers: see ``tables``.
         folder: it gets the library, and the tables as source.
-        more: flags of the compiler besides the usual ones.
+        more: flags of the compiler besides the usual ones, and C files.
         sources: where the C stands.
 
     Raises:
@@ -71,6 +80,15 @@ def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -
     return library
 
 
+def _content(numbers: Numbers, sources: Path, more: Iterable[str]) -> str:
+    """Hash of all that a library is made of."""
+    version = subprocess.run([*compiler(), "--version"], capture_output=True, check=False).stdout
+    files = [*sorted(sources.rglob("*.[ch]")), *map(Path, (m for m in more if m.endswith(".c")))]
+    text = f"{compiler()}{FLAGS}{more}{sizes_source(numbers)}{tables_source(numbers)}"
+    parts = [version, text.encode(), *(path.read_bytes() for path in files)]
+    return sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()
+
+
 class _CFrame(ctypes.Structure):
     _fields_ = (
         ("id", ctypes.c_uint32),
@@ -86,22 +104,35 @@ class NativeLibrary:
 
     Args:
         deployment: the machine.
-        more: flags of the compiler besides the usual ones.
+        more: flags of the compiler besides the usual ones, and C files.
         sources: where the C stands.
+        cache: a folder that keeps what is compiled; without it is compiled every time.
 
     Raises:
         ConfigError: the C has no part for something of the deployment.
         NativeError: it cannot be compiled, or its arithmetic is another one.
     """
 
-    def __init__(self, deployment: Deployment, *more: str, sources: Path = C_FILES) -> None:
+    def __init__(
+        self,
+        deployment: Deployment,
+        *more: str,
+        sources: Path = C_FILES,
+        cache: Path | None = None,
+    ) -> None:
         numbers = tables(deployment)
         self.buses = list(deployment.config.buses)
         self.axes, self.motions = len(numbers["axis"]), len(numbers["motion"])
         self.valves = valve_keys(deployment)
         self.real = ctypes.c_float if "-DCS_FLOAT" in more else ctypes.c_double
-        with tempfile.TemporaryDirectory() as folder:
-            self.c = ctypes.CDLL(str(build(numbers, Path(folder), *more, sources=sources)))
+        with tempfile.TemporaryDirectory(dir=cache) as folder:
+            if cache is None:
+                library = build(numbers, Path(folder), *more, sources=sources)
+            else:
+                library = cache / f"{_content(numbers, sources, more)}.so"
+                if not library.exists():  # another process that compiles it too makes the same
+                    build(numbers, Path(folder), *more, sources=sources).replace(library)
+            self.c = ctypes.CDLL(str(library))
         self.c.cs_arithmetic.restype = ctypes.c_bool
         if not self.c.cs_arithmetic():
             text = "expected arithmetic as Python's, got another one"

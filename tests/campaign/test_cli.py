@@ -37,8 +37,9 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 def test_drives_are_summed_up_and_kept(tmp_path: Path) -> None:
     report = tmp_path.with_suffix(".html")
     arguments = ("-n", "24", "--processes", "1", "--out", str(tmp_path), "--report", str(report))
-    done = campaign(PLAIN, *arguments)
+    done = campaign(PLAIN, *arguments, "--engine", "python")
     assert done.exit_code == 0, done.output
+    assert "Drives by engine: 24 python; " in done.output
     assert "Promises: 0 of 24 drives" in report.read_text()
     assert "forwarder.yaml: 24 drives" in done.output
     assert "Promises: 0 of 24 drives broke one; with 95 % confidence at most 0.12 of" in done.output

@@ -100,6 +100,7 @@ def test_drives_that_leave_more_than_with_anti_sway_off_are_counted_and_named() 
         "fault": [""] * count,
         "broken": [0] * count,
         "why": [""] * count,
+        "engine": ["python", "both", *["native"] * (count - 2)],
         "operator": ["both"] * count,
         "swung_over": [False] * count,
         "raw_deg": raw,
@@ -111,6 +112,10 @@ def test_drives_that_leave_more_than_with_anti_sway_off_are_counted_and_named() 
     exact = stats.binomtest(3, 4)
     assert worse.high == pytest.approx(exact.proportion_ci(0.9, "exact").high)
     assert worse.low == pytest.approx(exact.proportion_ci(0.9, "exact").low)
+    assert "Drives by engine: 1 both, 4 native, 1 python; the gate sees all but native" in [
+        *lines(summarise(columns, {}))
+    ]
+    assert summarise(columns, {}).promises.drives == 2
     (head, first, *_) = [line for line in lines(summarise(columns, {})) if "off" in line]
     assert head.startswith("Worse than with anti-sway off, by more than 0.3 deg: 3 of 4 drives")
     assert first == "  drive 3: 9.00 deg, with anti-sway off 3.00"

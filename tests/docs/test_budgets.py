@@ -27,7 +27,7 @@ BUDGET = {
     "docs/api.md": 150,
     "docs/architecture.md": 310,
     "docs/calibration.md": 420,
-    "docs/campaign.md": 945,
+    "docs/campaign.md": 1035,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 790,
@@ -67,11 +67,11 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (65_165, "a new ability takes the room of an old one"),
-    "tests": (100_025, "one level for each behaviour"),
+    "canshaper": (65_565, "a new ability takes the room of an old one"),
+    "tests": (100_158, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (353, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (354, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -17,7 +17,7 @@ from canshaper.cli.common import (
     loader,
     os_errors,
 )
-from canshaper.errors import UsageError
+from canshaper.errors import ConfigError, UsageError
 
 if TYPE_CHECKING:
     from canshaper.campaign.engine import Engine
@@ -53,6 +53,9 @@ def campaign(
     merge: list[Path] | None = typer.Option(
         None, "--merge", metavar="FOLDER", help="Make none; take those of this folder too."
     ),
+    native: Literal["native", "python"] | None = typer.Option(
+        None, "--engine", help="What drives; by default C where a compiler is."
+    ),
     changes: list[str] | None = SET,
     report: Path | None = REPORT,
 ) -> None:
@@ -84,6 +87,7 @@ def campaign(
     from canshaper.campaign.run import Source, shard_of
     from canshaper.campaign.store import Store
     from canshaper.cli.results import Results
+    from canshaper.native.library import has_compiler
     from canshaper_sim.parameters import changed_parameters
 
     changed_parameters(changes or [])  # wrong ones are named before anything begins
@@ -93,7 +97,8 @@ def campaign(
     check_same_axes(files[0], files[-1])
     results = Results("Campaign", deployment, report)
     ranges = deployment.config.uncertainty
-    sources = [Source.of(one, ranges, changes or []) for one in files]
+    engine_name = native or ("native" if has_compiler() else "python")
+    sources = [Source.of(one, ranges, changes or [], engine_name) for one in files]
     stores = [
         Store(out / f"{'ab'[k]}-{one.path.stem}" if against else out, source.about)
         for k, (one, source) in enumerate(zip(files, sources, strict=True))
@@ -109,6 +114,11 @@ def campaign(
         if kept and not resume:
             text = f"--out: expected a folder without drives, or --resume; {out} has {kept}"
             raise UsageError(text)
+        if engine_name == "python" and not native:
+            echo("engine: python, for want of a C compiler", err=True)
+        for source in sources:  # compiled, and held against Python, before anything begins
+            if isinstance(why := source.native(), ConfigError):
+                echo(f"driven by Python: {why}", err=True)
         interrupted = _drive(engine(processes, scheduler, cluster), sources, seeds, stores)
     accepted = _report(files, stores, results)
     results.write()

@@ -1,0 +1,298 @@
+/* The simulated crane of sim/canshaper_sim around the controller: valves, a tip that is moved directly, a grapple.
+
+   The same operations in the same order as valve.py, actuator.py, tip_boom.py and grapple.py, so that a drive is equal
+   to the last bit. What is not here (pump, cushions, carrier, wind, contact, log, joints, ropes) native.py does not
+   bring here. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "cs_internal.h"
+
+enum { SLEW, NEAR_FAR, LIFT, COORDINATES };
+#define PENDING 256 /* changes of a command within the longest dead time, 0.2 s, of ticks of 1 ms */
+#define SAME_TIME_S 1e-9
+#define HORIZONTAL 0x1.921fb54442d18p+0 /* pi / 2 */
+
+/* As `_VALVE` of native.py has them; axis CS_NONE: no valve moves this coordinate. */
+typedef struct {
+    double dead_time, deadband, negative_more, hysteresis, negative_gain, flow_limit, rate, lag, full_speed, start, low, high;
+    int32_t axis, zero, step, full;
+} plant_valve;
+typedef struct { double l1, l2, m1, m2, c5, c6, g; } plant_grapple;
+typedef struct { double time_s; plant_grapple grapple; } plant_load;
+typedef struct {
+    plant_valve valve[COORDINATES];
+    double sway[4], tick_s, step_s;
+    int64_t tick_ms;
+    int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
+} plant_drive;
+
+typedef struct {
+    const plant_valve *p;
+    double command, played, spool, target, requested, flow_speed, time, due[PENDING], flow[PENDING];
+    uint32_t head, end;
+    double position, speed, start_acc, middle_acc, end_acc, middle_position, middle_speed;
+} actuator;
+typedef struct { double radius, radius_rate, radius_acc, slew_rate, slew_acc, height_acc; } tip_motion;
+
+static double flow_of(const plant_valve *p, double command)
+{
+    double deadband = p->deadband;
+    if (command < 0.0) { deadband = fmax(0.0, deadband + p->negative_more); }
+    double opening = (fabs(command) - deadband) / (1.0 - deadband);
+    if (opening <= 0.0) { return 0.0; }
+    double most = p->flow_limit;
+    if (command < 0.0) {
+        opening *= p->negative_gain;
+        most *= fmax(1.0, p->negative_gain);
+    }
+    return copysign(fmin(opening, most), command);
+}
+
+static void move_to(actuator *a, double flow)
+{
+    a->target = flow;
+    if (isinf(a->p->rate)) { a->spool = flow; }
+}
+
+static void set_command(actuator *a, double command)
+{
+    if (command == a->command) { return; }
+    a->command = command;
+    double half = 0.5 * a->p->hysteresis;
+    a->played = fmin(fmax(a->played, command - half), command + half);
+    double flow = flow_of(a->p, a->played);
+    if (flow == a->requested) { return; }
+    a->requested = flow;
+    if (a->p->dead_time > 0.0) {
+        a->due[a->end % PENDING] = a->time + a->p->dead_time;
+        a->flow[a->end % PENDING] = flow;
+        a->end++;
+    } else { move_to(a, flow); }
+}
+
+static void follow(actuator *a, double step_s)
+{
+    double lag = a->p->lag;
+    double gap = a->target - a->spool;
+    if (gap == 0.0) {
+        a->flow_speed = a->spool + ((a->flow_speed - a->spool) * exp(-step_s / lag));
+        return;
+    }
+    double ramp = copysign(a->p->rate, gap);
+    double arrival = gap / ramp;
+    double late = ramp * lag;
+    double offset = (a->flow_speed - a->spool) + late;
+    if (arrival > step_s) {
+        a->spool += ramp * step_s;
+        a->flow_speed = (a->spool - late) + (offset * exp(-step_s / lag));
+        return;
+    }
+    a->spool = a->target;
+    double at_arrival = (a->target - late) + (offset * exp(-arrival / lag));
+    a->flow_speed = a->target + ((at_arrival - a->target) * exp((arrival - step_s) / lag));
+}
+
+static void pass(actuator *a, double step_s)
+{
+    double rest = step_s;
+    while (a->head != a->end) {
+        double wait = a->due[a->head % PENDING] - a->time;
+        double flow = a->flow[a->head % PENDING];
+        if (wait > (rest + SAME_TIME_S)) { break; }
+        a->head++;
+        if (wait > SAME_TIME_S) {
+            wait = fmin(wait, rest);
+            follow(a, wait);
+            a->time += wait;
+            rest -= wait;
+        }
+        move_to(a, flow);
+    }
+    if (rest > 0.0) {
+        follow(a, rest);
+        a->time += rest;
+    }
+}
+
+static void advance(actuator *a, double h, double decay)
+{
+    const plant_valve *p = a->p;
+    double start = a->position, start_speed = a->speed, half = 0.5 * h;
+    double start_rate = (a->spool - a->flow_speed) / p->lag, middle;
+    if ((a->spool == a->target) && (a->head == a->end)) {
+        middle = a->spool + ((a->flow_speed - a->spool) * decay);
+        a->flow_speed = a->spool + ((middle - a->spool) * decay);
+        a->time = (a->time + half) + half;
+    } else {
+        pass(a, half);
+        middle = a->flow_speed;
+        pass(a, half);
+    }
+    double speed = a->flow_speed, end_rate = (a->spool - speed) / p->lag;
+    a->start_acc = p->full_speed * start_rate;
+    middle *= p->full_speed;
+    speed *= p->full_speed;
+    double end = start + ((h / 6.0) * ((start_speed + (4.0 * middle)) + speed));
+    a->end_acc = p->full_speed * end_rate;
+    if ((p->low <= end) && (end <= p->high)) {
+        a->middle_acc = 0.25 * ((((6.0 * (speed - start_speed)) / h) - a->start_acc) - a->end_acc);
+    } else {
+        end = (end < p->low) ? p->low : p->high;
+        speed = 0.0;
+        middle = 0.25 * (((6.0 * (end - start)) / h) - start_speed);
+        a->end_acc = 0.0;
+        double travel = (6.0 * (((end - start) / h) - start_speed)) / h;
+        double change = (6.0 * (speed - start_speed)) / h;
+        a->middle_acc = 0.5 * ((change - a->end_acc) - travel);
+        a->start_acc = travel - (2.0 * a->middle_acc);
+    }
+    a->middle_position = start + ((h / 24.0) * (((5.0 * start_speed) + (8.0 * middle)) - speed));
+    a->middle_speed = middle;
+    a->position = end;
+    a->speed = speed;
+}
+
+static void accelerations(const plant_grapple *q, const double *x, const tip_motion *t, double *out)
+{
+    double s5 = sin(x[0]), c5 = cos(x[0]), s6 = sin(x[1]), c6 = cos(x[1]), r5 = x[2], r6 = x[3];
+    double l1 = q->l1, l2 = q->l2, m1 = q->m1, m2 = q->m2, l3 = l1 + l2 * c6;
+    double w = t->slew_rate, wa = t->slew_acc, w2 = w * w;
+    double radial = t->radius_acc - t->radius * w2;
+    double tangential = t->radius * wa + 2.0 * t->radius_rate * w;
+    double weight = t->height_acc + q->g;
+    double inertia5 = m1 * l1 * l1 + m2 * l3 * l3;
+    double coupling = m2 * l2 * l3;
+    double torque5 = (m1 * l1 + m2 * l3) * (c5 * tangential + s5 * weight) - inertia5 * s5 * c5 * w2
+        - coupling * (2.0 * s6 * r5 * r6 + c5 * (s6 * wa + 2.0 * c6 * w * r6)) + q->c5 * r5;
+    double specific6 = s6 * (c5 * weight - s5 * tangential) - c6 * radial + s5 * (l1 * c6 + l2) * wa
+        + s6 * (l1 - l3 * c5 * c5) * w2 + l3 * r5 * (s6 * r5 + 2.0 * c6 * c5 * w) + q->c6 / (m2 * l2) * r6;
+    out[0] = -torque5 / inertia5;
+    out[1] = -specific6 / l2;
+}
+
+/* One step of Runge and Kutta; the tip at its start, middle and end. */
+static void swing(const plant_grapple *q, double *x, double h, const tip_motion *t)
+{
+    double half = 0.5 * h, sixth = h / 6.0, a[2], b[2], c[2], d[2];
+    accelerations(q, x, &t[0], a);
+    double xb[4] = {x[0] + half * x[2], x[1] + half * x[3], x[2] + half * a[0], x[3] + half * a[1]};
+    accelerations(q, xb, &t[1], b);
+    double xc[4] = {x[0] + half * xb[2], x[1] + half * xb[3], x[2] + half * b[0], x[3] + half * b[1]};
+    accelerations(q, xc, &t[1], c);
+    double xd[4] = {x[0] + h * xc[2], x[1] + h * xc[3], x[2] + h * c[0], x[3] + h * c[1]};
+    accelerations(q, xd, &t[2], d);
+    for (int i = 0; i < 2; i++) {
+        double rate = x[i + 2];
+        x[i] += sixth * (rate + 2.0 * (xb[i + 2] + xc[i + 2]) + xd[i + 2]);
+        x[i + 2] = rate + sixth * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+    }
+}
+
+/* A valve decodes for itself: what the DBC says of the bits. */
+static int64_t number_in(const cs_field *f, const uint8_t *data)
+{
+    uint64_t value = 0;
+    int32_t bit = f->start;
+    for (int32_t i = 0; i < f->length; i++) {
+        uint64_t one = ((uint32_t)data[bit / 8] >> (bit % 8)) & 1U;
+        if (f->motorola) {
+            value = (value << 1) | one;
+            bit = ((bit % 8) == 0) ? (bit + 15) : (bit - 1);
+        } else {
+            value |= one << i;
+            bit++;
+        }
+    }
+    bool negative = f->is_signed && ((value >> (f->length - 1)) & 1U);
+    return (int64_t)value - (negative ? ((int64_t)1 << f->length) : 0);
+}
+
+static double command_in(const plant_valve *p, const cs_frame *out, int32_t frames, double held)
+{
+    const cs_axis_config *axis = &cs_tables.axis[p->axis];
+    const cs_valve_config *valve = &cs_tables.valve[axis->valve];
+    for (int32_t i = 0; i < frames; i++) {
+        if ((out[i].id == valve->id) && (out[i].bus == valve->bus) && (out[i].extended == valve->extended)) {
+            int64_t steps = p->step * (number_in(&axis->setpoint, out[i].data) - p->zero);
+            held = (llabs(steps) <= p->full) ? ((double)steps / (double)p->full) : 0.0;
+        }
+    }
+    return held;
+}
+
+/* The crane measures the radius of its tip and sends it, as the controller receives it. */
+static void send_radius(cs_controller *s, double radius, int64_t now)
+{
+    for (int32_t i = 0; i < cs_tables.motions_n; i++) {
+        const cs_motion_config *m = &cs_tables.motion[i];
+        const cs_field *f = &m->radius.field;
+        int32_t bits = f->length - (f->is_signed ? 1 : 0);
+        double least = f->is_signed ? -ldexp(1.0, bits) : 0.0;
+        double raw = fmin(fmax(rint((radius - m->radius.offset) / m->radius.scale), least), ldexp(1.0, bits) - 1.0);
+        uint8_t data[CS_BYTES] = {0};
+        cs_field_write(f, data, (int64_t)raw);
+        cs_receive(s, &cs_tables, m->message.bus, m->message.id, m->message.extended, data, m->message.length, now);
+    }
+}
+
+/* Drive; counts: joystick frames before each tick. out, a column of d->ticks each: theta1, radius, three speeds, theta5,
+   theta6, three commands. Returns how many ticks were driven: a grapple above the horizontal ends it. */
+int32_t cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load *load, const int32_t *counts,
+                 const cs_frame *in, double *out)
+{
+    cs_controller s;
+    cs_frame frames[CS_VALVES];
+    actuator a[COORDINATES];
+    double decay[COORDINATES], x[4], h = d->step_s;
+    const plant_grapple *q = empty;
+    int32_t next = 0;
+    cs_init(&s, &cs_tables);
+    memset(a, 0, sizeof(a));
+    memcpy(x, d->sway, sizeof(x));
+    for (int32_t i = 0; i < COORDINATES; i++) {
+        a[i].p = &d->valve[i];
+        a[i].position = d->valve[i].start;
+        decay[i] = exp(-(0.5 * h) / d->valve[i].lag);
+    }
+    for (int32_t k = 0; k < d->ticks; k++) {
+        int64_t ms = k * d->tick_ms, now = ms * 1000000;
+        while ((next < d->loads_n) && ((double)ms >= (1000.0 * load[next].time_s))) { q = &load[next++].grapple; }
+        if ((k > 0) && d->radius) { send_radius(&s, a[NEAR_FAR].position, now); }
+        for (int32_t j = 0; j < counts[k]; j++, in++) {
+            cs_receive(&s, &cs_tables, in->bus, in->id, in->extended, in->data, in->length, now);
+        }
+        int32_t sent = cs_tick(&s, &cs_tables, now, 0, frames);
+        for (int32_t i = 0; i < COORDINATES; i++) {
+            double held = out[((7 + i) * d->ticks) + ((k > 0) ? (k - 1) : 0)];
+            double command = (d->valve[i].axis == CS_NONE) ? 0.0 : command_in(&d->valve[i], frames, sent, held);
+            out[((7 + i) * d->ticks) + k] = command;
+            set_command(&a[i], command);
+        }
+        for (int32_t n = 0; n < d->steps; n++) {
+            tip_motion t[3];
+            t[0] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, 0.0, a[SLEW].speed, 0.0, 0.0};
+            for (int32_t i = 0; i < COORDINATES; i++) { advance(&a[i], h, decay[i]); }
+            t[0].radius_acc = a[NEAR_FAR].start_acc;
+            t[0].slew_acc = a[SLEW].start_acc;
+            t[0].height_acc = a[LIFT].start_acc;
+            t[1] = (tip_motion){a[NEAR_FAR].middle_position, a[NEAR_FAR].middle_speed, a[NEAR_FAR].middle_acc,
+                                a[SLEW].middle_speed, a[SLEW].middle_acc, a[LIFT].middle_acc};
+            t[2] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, a[NEAR_FAR].end_acc,
+                                a[SLEW].speed, a[SLEW].end_acc, a[LIFT].end_acc};
+            swing(q, x, h, t);
+        }
+        double row[7] = {a[SLEW].position, a[NEAR_FAR].position, a[SLEW].speed, a[NEAR_FAR].speed, a[LIFT].speed, x[0], x[1]};
+        for (int32_t i = 0; i < 7; i++) { out[(i * d->ticks) + k] = row[i]; }
+        if ((fabs(x[0]) > HORIZONTAL) || (fabs(x[1]) > HORIZONTAL)) { return k + 1; }
+    }
+    return d->ticks;
+}
+
+/* What the crane needs of the mathematics library, to be held against Python's. */
+void cs_functions(double x, double *out)
+{
+    out[0] = sin(x);
+    out[1] = cos(x);
+    out[2] = exp(-fabs(x));
+}

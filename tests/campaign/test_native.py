@@ -1,0 +1,127 @@
+"""Drives in C: the rows of Python, or none."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.campaign import measure, run
+from canshaper.campaign.draw import draw_drive
+from canshaper.campaign.measure import Row, measured_drive
+from canshaper.campaign.native import PLANT, NativeCrane
+from canshaper.campaign.run import Source, drive_all
+from canshaper.cli.app import app
+from canshaper.config.uncertainty import Uncertainty
+from canshaper.errors import CampaignError, ConfigError, NativeError
+from canshaper.machine.binding import load_deployment
+from canshaper_sim.strokes import Script
+from tests.native.judge import needs_compiler
+from tests.rigs.files import CONFIG
+
+ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
+FAULTY = Uncertainty(bus_fault_pct=100.0)
+
+
+@pytest.fixture(autouse=True)
+def _compiler() -> None:
+    needs_compiler()
+
+
+def same(one: Row, other: Row) -> bool:
+    return {**one, "engine": ""} == {**other, "engine": ""}
+
+
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drives of 6 s."""
+
+    def drawn(*arguments: object) -> object:
+        setting = draw_drive(*arguments)  # type: ignore[arg-type]
+        strokes = tuple(one for one in setting.script.strokes if one.end_s < 4.0)
+        return replace(setting, script=Script("short", strokes, 6.0))
+
+    monkeypatch.setattr(measure, "draw_drive", drawn)
+
+
+@pytest.mark.parametrize(("seed", "ranges"), [(3, Uncertainty()), (7, FAULTY)])
+def test_a_row_of_c_is_that_of_python(
+    seed: int, ranges: Uncertainty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short(monkeypatch)
+    row = measured_drive(ROBUST, seed, ranges, native=NativeCrane(ROBUST))
+    assert (row["engine"], row["broken"]) == ("native", 0)
+    assert same(row, measured_drive(ROBUST, seed, ranges))
+
+
+def test_one_drive_in_fifty_is_driven_by_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    short(monkeypatch)
+    row = measured_drive(ROBUST, 50, Uncertainty(), native=NativeCrane(ROBUST))
+    assert (row["engine"], row["broken"]) == ("both", 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["forwarder", "forwarder-robust", "forwarder-gff"])
+@pytest.mark.parametrize("ranges", [Uncertainty(), FAULTY, Uncertainty(stops_pct=100.0)])
+def test_many_rows_are_those_of_python(name: str, ranges: Uncertainty) -> None:
+    deployment = load_deployment(CONFIG / f"{name}.yaml")
+    native = NativeCrane(deployment)
+    for seed in range(1, 30):
+        row = measured_drive(deployment, seed, ranges, native=native)
+        assert row["engine"] == "native"
+        assert same(row, measured_drive(deployment, seed, ranges))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "planted", [("0.25 * ((((6.0", "0.25000000001 * ((((6.0"), ("2.0 * s6", "2.1 * s6")]
+)
+def test_a_difference_is_refused_with_its_seed(
+    planted: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short(monkeypatch)
+    text = PLANT.read_text(encoding="utf-8")
+    plant = tmp_path / "cs_plant.c"
+    plant.write_text(text.replace(*planted), encoding="utf-8")
+    native = NativeCrane(ROBUST, plant)
+    with pytest.raises(CampaignError, match="drive 50: expected the same"):
+        measured_drive(ROBUST, 50, Uncertainty(), native=native)
+
+
+@pytest.mark.slow
+def test_other_mathematics_are_refused(tmp_path: Path) -> None:
+    plant = tmp_path / "cs_plant.c"
+    text = PLANT.read_text(encoding="utf-8")
+    plant.write_text(text.replace("out[2] = exp(", "out[2] = expf("), encoding="utf-8")
+    with pytest.raises(NativeError, match="expected sin, cos and exp as Python's"):
+        NativeCrane(ROBUST, plant)
+
+
+def test_native_without_a_compiler_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run._native.cache_clear()  # of a machine that had one
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    arguments = ["campaign", str(ROBUST.path), "--engine", "native", "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 2
+    text = "expected a C compiler (cc, gcc, clang, or CC), got none; apt-get install gcc"
+    assert done.output.splitlines() == [text]
+
+
+@pytest.mark.parametrize("changes", [{"slope_deg": [2.0, 3.0]}, {"wind_m_s": [5.0, 6.0]}])
+def test_a_drive_that_c_has_no_part_for_is_python_s(
+    changes: dict[str, list[float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short(monkeypatch)
+    ranges = Uncertainty(**changes)  # type: ignore[arg-type]
+    row = measured_drive(ROBUST, 3, ranges, native=NativeCrane(ROBUST))
+    assert row["engine"] == "python"
+
+
+def test_a_deployment_that_c_has_no_part_for_is_python_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    short(monkeypatch)
+    sensor = load_deployment(CONFIG / "forwarder-sensor.yaml")
+    source = Source.of(sensor, Uncertainty(), engine="native")
+    assert isinstance(source.native(), ConfigError)
+    assert [row["engine"] for row in drive_all(source, (1,))] == ["python"]
