@@ -66,7 +66,6 @@ class _Drive(ctypes.Structure):
     _fields_ = (
         ("valve", _Valve * len(TIP_AXES)),
         ("sway", ctypes.c_double * 4),
-        ("tick_s", ctypes.c_double),
         ("step_s", ctypes.c_double),
         ("tick_ms", ctypes.c_int64),
         *((name, ctypes.c_int32) for name in ("steps", "ticks", "loads", "radius")),
@@ -156,7 +155,6 @@ class NativeCrane:
         loads = [*options.get("loads", ())]
         steps = math.ceil(tick_ms / 1000.0 / INTERNAL_STEP_S - 1e-9)
         drive = _Drive(
-            tick_s=tick_ms / 1000.0,
             step_s=tick_ms / 1000.0 / steps,
             tick_ms=tick_ms,
             steps=steps,

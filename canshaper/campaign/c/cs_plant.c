@@ -22,7 +22,7 @@ typedef struct { double l1, l2, m1, m2, c5, c6, g; } plant_grapple;
 typedef struct { double time_s; plant_grapple grapple; } plant_load;
 typedef struct {
     plant_valve valve[COORDINATES];
-    double sway[4], tick_s, step_s;
+    double sway[4], step_s;
     int64_t tick_ms;
     int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
 } plant_drive;
