@@ -16,12 +16,6 @@ LAYOUT_SHIFTS = """() => { window.shifts = 0; new PerformanceObserver((list) => 
 }).observe({ type: "layout-shift", buffered: false }); }"""
 
 
-def drives(page: Page) -> None:
-    """Slew until the shaped crane moves."""
-    page.keyboard.down("a")
-    expect(state(page, 1)).to_have_text("moving, shaped", timeout=SOON_MS)
-
-
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize(("width", "height"), SIZES)
 def test_the_first_screen_has_cranes_state_reason_and_stop(
@@ -47,7 +41,8 @@ def test_stop_stops_and_its_events_stay_in_sight(
     page.evaluate(LAYOUT_SHIFTS)
 
     def drive() -> None:
-        drives(page)
+        page.keyboard.down("a")
+        expect(state(page, 1)).to_have_text("moving, shaped", timeout=SOON_MS)
         page.click("#stop")
         expect(page.locator("#why-shaped")).to_contain_text("tripped: neutral", timeout=SOON_MS)
         page.keyboard.up("a")
@@ -89,10 +84,13 @@ def test_a_crane_without_anti_sway_is_not_called_shaped(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
     page = tab(own())
-    name = page.locator(".swing b").first
+    name, still = page.locator(".swing b").first, page.locator("#still-shaped")
     expect(name).to_have_text("shaped")
+    page.keyboard.press("a", delay=500)
+    expect(still).to_contain_text("still after", timeout=SOON_MS)
     page.keyboard.press("n")
     expect(name).to_have_text("anti-sway off", timeout=SOON_MS)
+    expect(still).to_have_text("", timeout=SOON_MS)  # it was of the other setting
     page.keyboard.press("n")
     expect(name).to_have_text("shaped", timeout=SOON_MS)
 
