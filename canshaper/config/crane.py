@@ -5,11 +5,11 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from canshaper.config.section import Section
+from canshaper.config.section import Section, number
 
 
 class _Crane(Section):
-    simulated: dict[str, float] = Field(
+    simulated: dict[str, Annotated[float, number(-1e6, 1e6, "", "its value")]] = Field(
         {}, description="simulated crane: its parameters by the names of `sim --show`"
     )
 

@@ -242,7 +242,10 @@ def test_a_port_that_is_blocked_closes(slcan: Port) -> None:
     slcan.close()
 
 
-def test_what_was_sent_last_leaves_before_the_goodbye(slcan: Port, line: SerialLine) -> None:
+def test_what_was_sent_last_leaves_before_the_goodbye(
+    slcan: Port, line: SerialLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(apart, "CLOSE_S", ANSWER_S)  # a busy machine
     line.read()
     assert slcan.send(FRAME)
     slcan.close()

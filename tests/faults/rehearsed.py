@@ -36,8 +36,8 @@ def slow_file(name: str) -> Path:
     """A shipped deployment at reduced speed, which allows rehearsed faults."""
     text = (CONFIG / f"{name}.yaml").read_text(encoding="utf-8")
     text = text.replace("../dbc", str(ROOT / "dbc"))
-    text = re.sub(r"(\n *|[{ ])(rise_per_s: [25])(?=[,\n])", r"\1max_pct: 40,\1\2", text)
-    text = re.sub(r"(max_pct: 40),(?=\n)", r"\1", text)
+    text = re.sub(r"(\n *|[{ ])(rise_per_s: [125])(?=[,\n])", r"\1max_pct: 40,\1\2", text)
+    text = re.sub(r"(max_pct: 40),(?=\n)", r"\1", text).replace("max_pct: 50", "max_pct: 40")
     path = Path(directory().name) / f"{name}-rehearsed.yaml"
     path.write_text(text + CONTROL, encoding="utf-8")
     return path

@@ -8,7 +8,10 @@ import yaml
 from canshaper.config.source import Source
 from tests.rigs.files import CONFIG, Machine
 
-SHIPPED = ("forwarder", "forwarder-gff", "forwarder-joints", "forwarder-robust")
+SHIPPED = (
+    *("forwarder", "forwarder-gff", "forwarder-joints", "forwarder-robust"),
+    *("excavator", "multicopter"),
+)
 Change = Callable[[dict[str, Any], Machine], None]
 
 

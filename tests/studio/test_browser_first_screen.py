@@ -95,22 +95,6 @@ def test_a_crane_without_anti_sway_is_not_called_shaped(
     expect(name).to_have_text("shaped", timeout=SOON_MS)
 
 
-def test_a_time_of_the_other_setting_is_not_shown(
-    own: Callable[..., Studio], tab: Callable[..., Page]
-) -> None:
-    page = tab(own())
-    still = page.locator("#still-shaped")
-
-    def drive() -> None:
-        drives(page)
-        page.keyboard.up("a")
-        expect(still).to_contain_text("still after")
-
-    undisturbed(page, drive)
-    page.keyboard.press("n")
-    expect(still).to_have_text("", timeout=SOON_MS)
-
-
 def test_the_colours_of_states_are_explained(shared: Studio, tab: Callable[..., Page]) -> None:
     page = tab(shared)
     expect(page.locator("#levels span")).to_have_text(

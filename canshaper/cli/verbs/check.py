@@ -55,8 +55,11 @@ def check(
 
       canshaper check config/forwarder-robust.yaml --json
     """
+    from canshaper_sim.parameters import changed_parameters
+
     try:
         deployment = loader(file)()
+        changed_parameters([], deployment)  # what its crane is simulated with
     except ConfigError as error:
         if as_json:
             problems = [asdict(problem) for problem in error.problems]
