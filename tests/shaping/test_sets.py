@@ -161,6 +161,25 @@ def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:
         assert axis.sent >= before - 1e-9
 
 
+def test_a_load_that_is_known_late_has_hung_there_since_the_press_began() -> None:
+    """It has swung by what was sent since, and what the twin has not asked for is damped."""
+    late, known = axis_with("robust"), axis_with("robust")
+    known.retune(FULL, lambda sway: make("robust", sway))
+    past, own = [], SwayModel(FULL, TICK_S)
+    for command in [0.0] + 25 * [0.9]:
+        late.tick(CommandInput(command))
+        known.tick(CommandInput(command))
+        past.append(late.applied)
+        own.step(late.applied)
+    late.retune(FULL, lambda sway: make("robust", sway), past)
+    assert late.sway is not None
+    assert (late.sway.angle, late.sway.rate) == (own.angle, own.rate)
+    for command in 20 * [0.9] + 60 * [0.0]:
+        late.tick(CommandInput(command))
+        known.tick(CommandInput(command))
+        assert late.sent == pytest.approx(known.sent, abs=0.02)
+
+
 def test_inherited_history_gives_the_same_output() -> None:
     old = Fir(zv_taps(EMPTY, TICK_S))
     for n in range(200):
