@@ -70,11 +70,15 @@ def check_same_axes(first: Deployment, second: Deployment) -> None:
     """Look whether a seed means the same crane and operator with both deployments.
 
     Raises:
-        CampaignError: they have other axes: the same numbers would be drawn for other things.
+        CampaignError: they have other axes: the same numbers would be drawn for other things; or
+            their files say of another crane that it is simulated.
     """
     (_, ones), (_, others) = driven_axes(first), driven_axes(second)
     if ones != others:
         text = f"expected the axes of {first.path.name}, {', '.join(ones)}, got {', '.join(others)}"
+        raise CampaignError(f"{second.path}: {text}")
+    if changed_parameters([], first) != changed_parameters([], second):
+        text = f"expected the crane.simulated of {first.path.name}, got another crane"
         raise CampaignError(f"{second.path}: {text}")
 
 

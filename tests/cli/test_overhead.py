@@ -61,6 +61,16 @@ def test_work_needs_slew_and_near_far() -> None:
     assert "expected axes slew and near_far, got bridge, trolley, hoist" in said
 
 
+def test_a_parameter_is_judged_by_the_crane_of_the_file(tmp_path: Path) -> None:
+    kind = "kind: cartesian,"
+    file = changed(tmp_path, (kind, f"{kind} simulated: {{ overhead.rope_max_m: 50 }},"))
+    for verb in ("campaign", "studio"):
+        said = run(verb, str(file), "--set", "overhead.rope_m=60", code=2)
+        assert "overhead: rope_m: expected 1.5 .. 50.0, got 60.0" in said
+    said = run("campaign", str(FILE), "--against", str(file), "--out", str(tmp_path), code=2)
+    assert "expected the crane.simulated of bridge-crane.yaml, got another crane" in said
+
+
 def test_a_crane_that_moves_nothing_is_no_campaign(tmp_path: Path) -> None:
     crane = "crane: { kind: cartesian, bridge: bridge, trolley: trolley, hoist: hoist }"
     file = changed(tmp_path, (crane, ""))

@@ -90,8 +90,8 @@ def campaign(
     from canshaper.native.library import has_compiler
     from canshaper_sim.parameters import changed_parameters
 
-    changed_parameters(changes or [])  # wrong ones are named before anything begins
     deployment = loader(file)()
+    changed_parameters(changes or [], deployment)  # wrong ones are named before anything begins
     seeds = shard_of(range(first, first + drives), shard)
     files = [deployment, *([loader(against)()] if against else [])]
     check_same_axes(files[0], files[-1])

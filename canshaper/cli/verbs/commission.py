@@ -76,6 +76,7 @@ def commission(
     """
     from canshaper.commissioning.procedure.bench import check_rehearsal
     from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
+    from canshaper_sim.parameters import changed_parameters
 
     refuse_shipped(file)
     path = Path(file)
@@ -83,7 +84,9 @@ def commission(
         raise UsageError("--set: expected --simulated too, got none")
     work = path
     if simulated:
-        check_rehearsal(loader(file)())  # what is wrong in it is named by its own name
+        origin = loader(file)()
+        check_rehearsal(origin)  # what is wrong in it is named by its own name
+        changed_parameters(changes or [], origin)
         work = rehearsal_of(path) if listed else copy_for_rehearsal(path)
     files = Files(work)
 

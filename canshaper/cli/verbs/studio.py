@@ -121,7 +121,6 @@ def studio(
     # As a service manager ends it; uvicorn raises the signal again when it is done.
     signal.signal(signal.SIGTERM, interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
-        changed_parameters(changes or [])  # wrong ones are named before anything begins
         file = sensed(file, DEFAULT, sensor)
         drawn = [] if seeds is None else seeds
         if is_drive(file) or drawn or folder:
@@ -151,12 +150,12 @@ def studio(
             stage = _machine(file, interface, channel, (control,) if adjust else None)
         else:
             stage = _cranes(stack, file, interface, channel or [], changes or [], crane)
+        parameters = changed_parameters(changes or [], stage.deployment)
         own = deployment_path(file) == Path(file)
         commission = Commission(Path(file) if own else None, changes or [], machine=shadow)
         stack.callback(commission.close)
 
         def page(access: "Access") -> "ASGIApp":
-            parameters = changed_parameters(changes or [], stage.deployment)
             return build_app(stage, access, parameters, commission)
 
         serve(stack, host, port, page, stage)
@@ -190,10 +189,12 @@ def _cranes(
     from canshaper.studio.stage import Stage
     from canshaper.studio.words import Events
     from canshaper_sim.cranes import cranes
+    from canshaper_sim.parameters import changed_parameters
 
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     transports = _transports(interface, channel) if LINUX else []
     _, deployment = copied(deployment_path(file), directory)
+    changed_parameters(changes, deployment)  # wrong ones are named before anything begins
     stage = Stage(deployment, Events())
     crane = crane or next(iter(cranes(deployment)), None)
     if LINUX and len(deployment.config.buses) == 1 and not crane:

@@ -91,7 +91,7 @@ def study(
     signal.signal(signal.SIGTERM, interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
         all_changes = [*_START, *(changes or [])]
-        parameters = changed_parameters(all_changes)
+        parameters = changed_parameters(all_changes, loader(file)())
         if not _REACH_M[0] <= (start_m := parameters.start_radius_m) <= _REACH_M[1]:
             raise UsageError(f"--set start_radius_m: expected 2 .. 8 m, got {start_m:g}")
         task = {"placements": placements, "practice": practice, "break": pause_s}
@@ -119,6 +119,7 @@ def study(
 def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
     """The key of the study, made where it has none."""
     from canshaper.studio.study_files import KEY, Key
+    from canshaper_sim.parameters import changed_parameters
 
     paths = {Path(name).name: deployment_path(name) for name in (file, other)}
     if len(paths) < 2:
@@ -127,6 +128,8 @@ def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
     inputs = [(list(one.axes), [j.key for j in one.joysticks.values()]) for one in files]
     if inputs[0] != inputs[1]:
         raise UsageError(f"--with: expected axes and joysticks of {file}, got those of {other}")
+    if changed_parameters([], files[0]) != changed_parameters([], files[1]):
+        raise UsageError(f"--with: expected the crane.simulated of {file}, got that of {other}")
     if not any(axis.status for axis in files[0].axes.values()):
         raise UsageError(f"{file}: expected status messages, which say when the crane moves")
     folder.mkdir(parents=True, exist_ok=True)

@@ -56,13 +56,13 @@ def work(
     from canshaper_sim.operator_model import Operators
     from canshaper_sim.parameters import changed, changed_parameters
 
-    changed_parameters(changes or [])  # wrong ones are named before anything begins
     people = changed(Operators(), operators or [], "--operator")
     for given, (low, high), unit in zip(tolerance, (_CM, _DEG), ("cm", "degrees"), strict=True):
         if not low <= given <= high:
             expected = f"expected {low:g} .. {high:g} {unit}"
             raise UsageError(f"--tolerance: {expected}, got {given:g}")
     deployment = loader(file)()
+    changed_parameters(changes or [], deployment)  # wrong ones are named before anything begins
     results = Results("Seconds a move", deployment, report, picture)
     source = Source.of(deployment, deployment.config.uncertainty, changes or [])
     within = tolerance[0] / 100.0, tolerance[1] if tolerance[1] < _DEG[1] else math.inf

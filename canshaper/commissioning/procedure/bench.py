@@ -198,9 +198,6 @@ class Simulated:
     Args:
         person: who is shown the progress.
         changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
-
-    Raises:
-        UsageError: no such parameter.
     """
 
     simulated = True
@@ -208,7 +205,6 @@ class Simulated:
     def __init__(self, person: Person, changes: list[str]) -> None:
         self.person = person
         self.changes = changes
-        changed_parameters(changes)  # wrong ones are named before anything begins
 
     def parameters(self, deployment: Deployment) -> CraneParameters:
         """Return the crane of this file."""
