@@ -36,7 +36,9 @@ def compiler() -> list[str]:
         NativeError: there is none.
     """
     if named := os.environ.get("CC"):
-        return named.split()
+        if shutil.which((command := named.split())[0]) is None:
+            raise NativeError(f"CC: expected a C compiler, got {named!r}, which is not here")
+        return command
     found = next(filter(None, map(shutil.which, COMPILERS)), None)
     if found is None:
         text = f"expected a C compiler ({', '.join(COMPILERS)}, or CC), got none"
@@ -47,7 +49,7 @@ def compiler() -> list[str]:
 def has_compiler() -> bool:
     """Whether a C compiler is here."""
     try:
-        return shutil.which(compiler()[0]) is not None
+        return bool(compiler())
     except NativeError:
         return False
 
@@ -76,7 +78,8 @@ def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -
         check=False,
     )
     if done.returncode:
-        raise NativeError(f"{command[0]} failed: {' '.join(done.stderr.split())[:500]}")
+        why = " ".join(done.stderr.split())[:500] or f"exit code {done.returncode}"
+        raise NativeError(f"{command[0]} failed: {why}; CC may name another one")
     return library
 
 
