@@ -135,6 +135,7 @@ def test_a_page_shows_what_the_command_prints(
 ) -> None:
     """Line by line; a page may leave lines out, and spaces at their begin."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")  # not of the terminal of who runs it
     printed = CliRunner().invoke(app, shlex.split(command)).stdout
     there = {" ".join(line.split()) for line in printed.splitlines()}
     rows = [" ".join(line.split()) for line in shown.splitlines() if line.strip()]
