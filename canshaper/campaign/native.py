@@ -128,7 +128,7 @@ class NativeCrane:
         return self._packed(hands, -(-round(setting.script.duration_s * 1000.0) // tick_ms))
 
     def switched_off(self, frames: Packed) -> Packed:
-        """The same frames with anti-sway switched off; of joysticks that are not disturbed."""
+        """Return frames with anti-sway switched off; of joysticks that are not disturbed."""
         counts, array = frames
         array = array.copy()
         for key, bits in self._switch.items():
@@ -143,9 +143,9 @@ class NativeCrane:
             packed: the joystick frames.
 
         Returns:
-            Columns of theta1, radius, speeds,
-            theta5, theta6 and commands, the three coordinates in the order of ``TIP_AXES``; and
-            the times of the ticks that were driven, s. Fewer than drawn: it swung over.
+            Columns of theta1, radius, speeds, theta5, theta6 and commands, the three coordinates in
+            the order of ``TIP_AXES``; and the times of the ticks that were driven, s. Fewer than
+            drawn: it swung over.
         """
         options, tick_ms = setting.options, self._deployment.config.tick_ms
         parameters = options["parameters"]
@@ -224,7 +224,7 @@ def _wiring(deployment: Deployment, axis: str | None) -> dict[str, int]:
         return {"axis": -1}
     reader = CommandReader(deployment, axis)
     number = [*deployment.axes].index(axis)
-    return {"axis": number, "zero": reader._zero, "step": reader._step, "full": reader._full}
+    return {"axis": number, "zero": reader.zero, "step": reader.step, "full": reader.full}
 
 
 def _valve(parameters: CraneParameters, axis: str, wired: dict[str, int]) -> _Valve:

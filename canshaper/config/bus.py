@@ -87,7 +87,7 @@ class Match(Section):
         return self
 
     def may_be(self, other: "Match") -> bool:
-        """Whether both may mean one device: the same adapter, its channels not told apart."""
+        """Whether both may mean one device: the same adapter, its channels not distinguished."""
         keys = ("serial", "path", "port")
         both = [(getattr(self, key), getattr(other, key)) for key in keys]
         return any(one is not None and one == two for one, two in both[:2]) and all(

@@ -319,7 +319,7 @@ class AxisControl:
         return self.axis.sway.mode.angle_per_speed_rad * self._full_speed_m_s
 
     def own_swing(self, now_ns: int) -> float | None:
-        """What its sway sensor would show by its own motion, rad or rad/s; None without one."""
+        """Return the swing by its own motion as its sensor would show it, rad or rad/s."""
         sensed = self.axis.sensed
         return sensed.own(self._scale(now_ns)) if sensed else None
 

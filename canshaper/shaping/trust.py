@@ -123,7 +123,7 @@ class CrossedSway:
     Args:
         timing: of the sensor.
         noise: its standard deviation, rad or rad/s.
-        gains: for the free swing beside it, of angle, rate and offset.
+        gains: for the free swing of each hypothesis, of angle, rate and offset.
         value: the first measurement, rad or rad/s.
         other: what the other axis' sensor would show by that axis' own motion.
     """

@@ -229,7 +229,7 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
 
 
 def drawn_of(parameters: CraneParameters, coordinates: Mapping[str, str]) -> dict[str, Any]:
-    """What a page draws: how long the links of the crane are, which swing each axis excites.
+    """Return what a page draws: how long the links are, which swing each axis excites.
 
     Of an overhead crane ``hall`` says how long runway, bridge and rope are; of others it is None.
     """

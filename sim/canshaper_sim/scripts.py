@@ -17,9 +17,12 @@ from canshaper_sim.strokes import Script, Stroke
 _PULSE_RAMP_S = 0.10
 
 
-def _pulse(axis: str, level: float = 1.0) -> Script:
-    # 3 s of full deflection and 5 s of rest: the test input of the paper's section 4.
-    return Script(f"pulse-{axis}", (Stroke(axis, 0.5, 3.0, level, _PULSE_RAMP_S),), 8.5)
+def _pulse(
+    axis: str, level: float = 1.0, press_s: float = 3.0, rest_s: float = 5.0, of: str = ""
+) -> Script:
+    # By default 3 s of deflection and 5 s of rest: the test input of the paper's section 4.
+    stroke = Stroke(axis, 0.5, press_s, level, _PULSE_RAMP_S)
+    return Script(f"pulse-{axis}{of}", (stroke,), 0.5 + press_s + rest_s)
 
 
 # Both joysticks at once, as a person drives: out to the pile, and in over the bunk with a
@@ -204,18 +207,12 @@ SCRIPTS: dict[str, Script] = {
         *(_pulse(axis, level) for axis, level in _JOINT_PULSES),
         _DEMO_JOINTS,
         _LOADING_JOINTS,
-        *(
-            Script(f"pulse-{axis}", (Stroke(axis, 0.5, 6.0, 1.0, _PULSE_RAMP_S),), 31.5)
-            for axis in OVERHEAD_AXES
-        ),
+        *(_pulse(axis, press_s=6.0, rest_s=25.0) for axis in OVERHEAD_AXES),
         _DEMO_OVERHEAD,
-        *(
-            Script(f"pulse-{axis}-tower", (Stroke(axis, 0.5, 8.0, 1.0, _PULSE_RAMP_S),), 34.0)
-            for axis in (SLEW, NEAR_FAR)
-        ),
+        *(_pulse(axis, press_s=8.0, rest_s=25.5, of="-tower") for axis in (SLEW, NEAR_FAR)),
         _DEMO_TOWER,
         *(
-            Script(f"pulse-{axis}-luffing", (Stroke(axis, 0.5, 5.0, 1.0, _PULSE_RAMP_S),), 22.0)
+            _pulse(axis, press_s=5.0, rest_s=16.5, of="-luffing")
             for axis in (SLEW, LIFT_CYLINDER, EXTENSION)
         ),
         _DEMO_LUFFING,

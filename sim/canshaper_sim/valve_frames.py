@@ -18,9 +18,14 @@ class CommandReader:
     Args:
         deployment: names message and signals.
         axis: whose valve it is.
+
+    Attributes:
+        zero: raw value at rest.
+        step: raw values of a step of the command, 1 or -1.
+        full: steps of full speed.
     """
 
-    __slots__ = ("_codes", "_counter", "_flags", "_full", "_negative", "_signal", "_step", "_zero")
+    __slots__ = ("_codes", "_counter", "_flags", "_negative", "_signal", "full", "step", "zero")
 
     def __init__(self, deployment: Deployment, axis: str) -> None:
         section = deployment.axes[axis].config
@@ -36,9 +41,9 @@ class CommandReader:
         low, high = float(signal.minimum or 0.0), float(signal.maximum or 0.0)
         zero = scaling.zero or 0.0
         full = scaling.full or (min(zero - low, high - zero) if low < zero else high - zero)
-        self._zero = round((zero - signal.offset) / signal.scale)
-        self._full = int(full / abs(signal.scale) + _ROUNDING)
-        self._step = -1 if (signal.scale < 0.0) != scaling.invert else 1
+        self.zero = round((zero - signal.offset) / signal.scale)
+        self.full = int(full / abs(signal.scale) + _ROUNDING)
+        self.step = -1 if (signal.scale < 0.0) != scaling.invert else 1
         self._negative = self._codes = self._flags = None
         if forwarded and command.negative:
             self._negative = signals[command.negative]
@@ -56,15 +61,15 @@ class CommandReader:
 
     def command(self, data: bytes) -> float:
         """Command of a frame, -1 .. 1; 0 where its bytes are none."""
-        steps = self._step * (_raw(self._signal, data) - self._zero)
+        steps = self.step * (_raw(self._signal, data) - self.zero)
         if self._negative:
-            back = self._step * (_raw(self._negative, data) - self._zero)
+            back = self.step * (_raw(self._negative, data) - self.zero)
             if min(steps, back) != 0:
                 return 0.0
             steps -= back
         elif self._codes or self._flags:
             steps = steps * self._direction(data) if steps > 0 else 0
-        return steps / self._full if abs(steps) <= self._full else 0.0
+        return steps / self.full if abs(steps) <= self.full else 0.0
 
     def _direction(self, data: bytes) -> int:
         """1, -1, or 0 for neutral and for what is no direction."""

@@ -43,7 +43,7 @@ def test_luffing_leaves_a_tenth() -> None:
 
 @pytest.mark.slow
 def test_what_is_left_of_every_work() -> None:
-    """Of each kind of work with each rope at most a tenth of the largest raw swing."""
+    """Each kind of work with each rope leaves at most a tenth of its largest raw swing."""
     worst: dict[str, list[float]] = {}
     for work in works(read(FILE)):
         row = worst.setdefault(work.name, [0.0, 0.0])

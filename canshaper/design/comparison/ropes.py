@@ -107,7 +107,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     measured = is_measured(deployment)
     rope_m, by_length = (_FOR_M[kind], " by length") if measured else (_nominal_m(deployment), "")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
-    for axis in (by_coordinate[one] for one in axes if one not in WITHOUT_SWAY):
+    for axis in (by_coordinate[one] for one in axes):
         sway = swinging_axis(deployment, axis)[1]
         mode, period_s = sway.mode(), tick_s(deployment, axis)
         taps = [round(tap, 8) for tap in zv_taps(mode, period_s)]
@@ -131,9 +131,8 @@ def is_measured(deployment: Deployment) -> bool:
 
 def _nominal_m(deployment: Deployment) -> float:
     """Return the rope of the simulated crane at the start."""
-    rope_m: float = getattr(
-        changed_parameters([], deployment), kind_of(deployment.by_coordinate)
-    ).rope_m
+    crane: Any = getattr(changed_parameters([], deployment), kind_of(deployment.by_coordinate))
+    rope_m: float = crane.rope_m
     return rope_m
 
 
@@ -155,7 +154,7 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
 
 
 def works(deployment: Deployment) -> Iterator[Work]:
-    """What a crane does: with each rope still, or hoisted in travel and after it."""
+    """Yield the work of a crane: with each rope still, or hoisted in travel and after it."""
     kind = kind_of(deployment.by_coordinate)
     if kind == TOWER:
         for rope_m, radius_m in PLACES_M:
@@ -233,13 +232,13 @@ def left_deg(deployment: Deployment, job: Job) -> float:
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
     look_s = min(2.0 * math.pi * math.sqrt(max(rope_m, 8.0) / GRAVITY_M_S2), _LONGEST_LOOK_S)
     script = Script("rope", strokes, end_s + look_s).moving(deployment.by_coordinate)
-    kind, start = kind_of(deployment.coordinates.values()), {"rope_m": rope_m}
+    kind, start = kind_of(deployment.by_coordinate), {"rope_m": rope_m}
     if work.radius_m is not None:
         start["start_radius_m"] = work.radius_m
-    changes = {kind: replace(getattr(crane, kind), **start)}
-    crane = replace(crane, **changes)
+    own: Any = {kind: replace(getattr(crane, kind), **start)}
+    crane = replace(crane, **own)
     recording = drive(_with(deployment, one), script, parameters=crane, bypass=one.bypass)
-    assert recording.crane is not None  # of an overhead crane
+    assert recording.crane is not None  # its feedback has both planes
     swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
     return max(deg for time_s, deg in swing if time_s >= end_s)
 
