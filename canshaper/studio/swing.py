@@ -29,7 +29,7 @@ class Swing:
         self._still_deg = still_deg
         self._sways: deque[tuple[float, float]] = deque()
         self._over_s = -math.inf
-        self._moved = False
+        self._moved = self._drove = False
         self._released_s: float | None = None
 
     def add(self, sway_deg: tuple[float, float], now_s: float) -> None:
@@ -39,18 +39,20 @@ class Swing:
         if sway >= self._still_deg:
             self._over_s = now_s
 
-    def move(self, now_s: float, *, moved: bool) -> None:
-        """Take whether any joystick is deflected."""
+    def move(self, now_s: float, *, moved: bool, drives: bool) -> None:
+        """Take whether any joystick is deflected, and whether any valve is open."""
         if moved:
             self._released_s = None
-        elif self._moved:
+            self._drove = drives or (self._moved and self._drove)
+        elif self._moved and self._drove:
             self._released_s = now_s
         self._moved = moved
 
     def still_s(self, now_s: float) -> tuple[float | None, bool]:
         """Time from the release until the last sway that was no stillness, and whether it swings.
 
-        There is none before a release, and while a joystick is deflected. A swing is over when
+        There is none before a release, while a joystick is deflected, and after a press that opened
+        no valve. A swing is over when
         there has been no such sway for as long as a full swing.
         """
         if self._released_s is None:

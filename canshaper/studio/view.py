@@ -229,7 +229,8 @@ class CraneView:
             self._joystick_at(joystick.name, commands)
         axes = self._deployment.axes.items()
         bands = ((self.axes[n].joystick, a.config.command.neutral_pct / 100.0) for n, a in axes)
-        self._swing.move(now_s, moved=any(abs(at or 0.0) > band for at, band in bands))
+        moved = any(abs(at or 0.0) > band for at, band in bands)
+        self._swing.move(now_s, moved=moved, drives=any(a.valve for a in self.axes.values()))
 
     def _joystick_at(self, joystick: str, commands: Mapping[str, float | Reason]) -> None:
         """Keep the commands of a joystick by signal; one that is invalid or missing is unknown."""

@@ -129,6 +129,7 @@ def test_buttons_of_a_gamepad_enable_stop_and_switch_anti_sway(
     expect(seat).to_have_text("you drive")
     press(2)
     expect(page.locator("#antisway")).to_have_attribute("aria-pressed", "false")
+    expect(page.locator("#antisway b")).to_have_text("off")
     press(2)
     expect(page.locator("#antisway")).to_have_attribute("aria-pressed", "true")
     press(1)

@@ -154,6 +154,7 @@ def joystick(watched: Watched, slew: float) -> Frame:
 
 
 def test_still_after_is_the_time_from_the_release_to_the_last_swing(watched: Watched) -> None:
+    watched.receive([watched.valve("slew", 40)], 1.0)
     assert watched.receive([joystick(watched, 0.5), *watched.sway(6.0)], 1.0)["still"] is None
     shown = watched.receive([joystick(watched, 0.0), *watched.sway(6.0)], 2.0)
     assert (shown["still"], shown["swings"]) == (0.0, True)
@@ -164,6 +165,15 @@ def test_still_after_is_the_time_from_the_release_to_the_last_swing(watched: Wat
     assert watched.receive([joystick(watched, -0.5)], 7.0)["still"] is None
     watched.receive([joystick(watched, 0.0)], 8.0)
     assert watched.receive(watched.sway(0.1), 9.0)["still"] == 0.0
+
+
+def test_a_press_that_moves_nothing_has_no_time(watched: Watched) -> None:
+    """As in NEUTRAL_WAIT: nothing hung still after 0.0 s, since nothing drove."""
+    watched.receive([watched.valve("slew", 0), joystick(watched, 0.5)], 1.0)
+    assert watched.receive([joystick(watched, 0.0)], 2.0)["still"] is None
+    watched.receive([joystick(watched, 0.5), watched.valve("slew", 40), joystick(watched, 0.5)], 3.0)
+    watched.receive([watched.valve("slew", 0), joystick(watched, 0.5)], 4.0)
+    assert watched.receive([joystick(watched, 0.0)], 5.0)["still"] == 0.0
 
 
 def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -> None:

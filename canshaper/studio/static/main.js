@@ -91,6 +91,7 @@ function show(message) {
   byId("profile").querySelector("b").textContent = [...new Set(profiles.filter(Boolean))].join(" / ");
   byId("enable").setAttribute("aria-pressed", message.enable);
   byId("antisway").setAttribute("aria-pressed", message.antisway);
+  byId("antisway").querySelector("b").textContent = text(message.antisway ? "button.on" : "button.off");
 }
 
 function lost(reason) {
