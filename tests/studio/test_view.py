@@ -171,7 +171,9 @@ def test_a_press_that_moves_nothing_has_no_time(watched: Watched) -> None:
     """As in NEUTRAL_WAIT: nothing hung still after 0.0 s, since nothing drove."""
     watched.receive([watched.valve("slew", 0), joystick(watched, 0.5)], 1.0)
     assert watched.receive([joystick(watched, 0.0)], 2.0)["still"] is None
-    watched.receive([joystick(watched, 0.5), watched.valve("slew", 40), joystick(watched, 0.5)], 3.0)
+    watched.receive(
+        [joystick(watched, 0.5), watched.valve("slew", 40), joystick(watched, 0.5)], 3.0
+    )
     watched.receive([watched.valve("slew", 0), joystick(watched, 0.5)], 4.0)
     assert watched.receive([joystick(watched, 0.0)], 5.0)["still"] == 0.0
 
