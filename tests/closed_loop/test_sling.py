@@ -1,10 +1,11 @@
 """Hook and load on a simulated bridge crane: both modes, designed against by what the page says.
 
-``pytest -s -m slow tests/closed_loop/test_sling.py`` prints what is left of both, hook against
-trolley: off, and with a reversal that stops or that lets the response end.
+``pytest -s -m slow tests/closed_loop/test_sling.py`` prints what is left of both: off, and with a
+reversal that stops or that lets the response end; degrees, hook against trolley.
 """
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.strokes import Script, Stroke
-from tests.rigs.files import read
 from tests.rigs.overhead import FILE, changed
 from tests.sim.test_sling import modes
 
@@ -32,7 +33,7 @@ DRIVES = {
 }
 
 
-def machine(directory: Path, sling_m: float, ratio: float, *more: tuple[str, str]) -> Path:
+def machine(directory: Path, sling_m: float, ratio: float) -> Path:
     """The bridge crane without a length signal, with hook and load, for its first mode."""
     first_s = 2.0 * math.pi / modes(ROPE_M, sling_m, ratio)[0]
     own = f"overhead.rope_m: {ROPE_M}, overhead.sling.length_m: {sling_m}"
@@ -43,7 +44,6 @@ def machine(directory: Path, sling_m: float, ratio: float, *more: tuple[str, str
         (LENGTH, ""),
         ("length_m: 1.5\n", f"period_s: {first_s:.4f}\n"),
         ("designed_for: { period_s: 2.457", f"designed_for: {{ period_s: {first_s:.4f}"),
-        *more,
     )
 
 
@@ -52,10 +52,6 @@ def robust(file: Path, *words: str) -> tuple[int, str]:
         app, ["robust", str(file), "--axis", "bridge", "--range", "5", *words]
     )
     return done.exit_code, " ".join(done.output.split())
-
-
-def option(sling_m: float, ratio: float) -> str:
-    return f"{2.0 * math.pi / modes(ROPE_M, sling_m, ratio)[1]:.4f},{DAMPING},20"
 
 
 def left_deg(
@@ -82,7 +78,8 @@ def test_both_modes_are_left_in_peace_where_a_reversal_lets_the_response_end(
 ) -> None:
     """A reversal that stops cuts the response; what makes good for it knows the first mode."""
     file, omegas = machine(tmp_path, sling_m, ratio), modes(ROPE_M, sling_m, ratio)
-    status, output = robust(file, "--second", option(sling_m, ratio), "--write")
+    first_s, second_s = (2.0 * math.pi / omega for omega in omegas)
+    status, output = robust(file, "--second", f"{second_s:.4f},{DAMPING},20", "--write")
     assert status == 0
     limits = output[output.index("reversal: brake_shaped") :].split(" ")[:4]
     stops = load_deployment(file)
@@ -94,8 +91,7 @@ def test_both_modes_are_left_in_peace_where_a_reversal_lets_the_response_end(
         np.array([left_deg(one, name, omegas, bypass=off) for name in DRIVES])
         for one, off in ((stops, True), (stops, False), (ends, False))
     )
-    periods = ", ".join(f"{2.0 * math.pi / omega:.2f} s" for omega in omegas)
-    print(f"\nsling {sling_m:g} m, ratio {ratio:g}, modes {periods}; degrees left")
+    print(f"\nsling {sling_m} m, ratio {ratio}, {first_s:.2f} and {second_s:.2f} s; degrees left")
     for name, *each in zip(DRIVES, raw, stopped, ended, strict=True):
         print(f"{name:9}", *(f"{one[0]:7.2f} {one[1]:6.3f}" for one in each))
     assert (ended <= 0.1 * raw).all()
@@ -103,14 +99,29 @@ def test_both_modes_are_left_in_peace_where_a_reversal_lets_the_response_end(
 
 
 @pytest.mark.slow
-def test_a_reversal_that_lets_the_response_end_is_not_asked_for(tmp_path: Path) -> None:
-    file = machine(
-        tmp_path,
-        1.0,
-        1.0,
-        ("limits: { rise_per_s: 2", "limits: { allow_reverse: true, rise_per_s: 2"),
-    )
-    assert "brake_shaped" not in robust(file, "--second", option(1.0, 1.0), "--duration", "3")[1]
+@pytest.mark.parametrize(
+    ("sling_m", "ratio", "about"), [(2.0, 3.0, ()), (4.0, 1.0, ("--about", "5.5"))]
+)
+def test_identify_finds_both_modes(
+    tmp_path: Path, sling_m: float, ratio: float, about: tuple[str, ...]
+) -> None:
+    """In a log of a drive with anti-sway off, whose rope angle is sent to 0.01 degrees."""
+    file, log = machine(tmp_path, sling_m, ratio), tmp_path / "hook.log"
+    lines: list[str] = []
+
+    def note(frame: Frame, time_s: float) -> None:
+        lines.append(f"({1.7e9 + time_s:.6f}) can0 {frame.can_id:03X}#{frame.data.hex().upper()}")
+
+    script = Script("one", (Stroke("bridge", 1.0, 1.0, 1.0),), 60.0)
+    drive(load_deployment(file), script, on_frame=note, bypass=True)
+    log.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    signal = ("--file", str(file), "--signal", "bridge=LoadSway.SwayBridge")
+    done = CliRunner().invoke(app, ["identify", str(log), *signal, *about, "--out", str(tmp_path)])
+    said = " ".join(done.output.split())
+    found = [re.search(p, said) for p in (r"period_s: ([\d.]+)", r"--second ([\d.]+),")]
+    periods_s = [float(one[1]) for one in found if one]
+    expected = [2.0 * math.pi / omega for omega in modes(ROPE_M, sling_m, ratio)]
+    assert periods_s == pytest.approx(expected, rel=0.01), said
 
 
 def test_a_second_mode_is_refused_with_a_rope_that_is_followed(tmp_path: Path) -> None:
@@ -123,4 +134,3 @@ def test_a_second_mode_is_refused_with_a_rope_that_is_followed(tmp_path: Path) -
     assert done.exit_code == 2
     says = "axes.bridge.filter.designed_for.second: expected none with sway.length"
     assert says in " ".join(done.output.split())
-    assert read(FILE).axes["bridge"].rope
