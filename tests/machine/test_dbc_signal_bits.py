@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.machine.dbc_signals import signals_fault
+from canshaper.machine.dbc_text import signals_fault
 
 
 def fault(length: int, *signals: str) -> str | None:
