@@ -1,10 +1,12 @@
-"""Axes of a crane move coordinates of its tip, its trolley or its joints: which one moves which."""
+"""Sections of a crane: which coordinate each axis moves, and two axes as one motion."""
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from canshaper.config.inputs import Status
+from canshaper.config.limits import Position
 from canshaper.config.section import Section, number
 
 
@@ -69,3 +71,51 @@ def coordinates(
         return {name: name for name in axes if name in _BY_NAME}
     by_axis = {axis: coordinate for coordinate, axis in crane.moved.items()}
     return {name: by_axis[name] for name in axes if name in by_axis}
+
+
+class Radius(Position):
+    """Radius of the tip, measured."""
+
+    signal: str = Field(description="signal with the radius in m")
+    timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
+    """Age at which it counts as lost. In a motion a lost radius is carried on by the model of
+    near-far, and a jump is followed within a second."""
+
+
+class Motion(Section):
+    """Two-axis motion: velocities that two axes add for each other, see ``TwoAxisMotion``.
+
+    Without a radius, or without a near-far axis, slew gets what needs neither.
+    """
+
+    slew: str = Field(description="the axis that turns; it needs sway and slewing")
+    near_far: str | None = None
+    """The axis that moves the tip in and out; it needs sway. Without it slew gets what needs no
+    radius. A single joint of the boom is none."""
+    radius: Radius | None = None
+    """Radius of the tip, where it is measured."""
+    radius_m: Annotated[float, number(0.5, 120, "m", "radius of the grapple")] | None = None
+    """Instead: radius of the grapple, where it hardly changes."""
+    max_pct: Annotated[
+        float,
+        number(1, 50, "% of full speed", "fastest motion of an axis that its operator left alone"),
+    ] = 25.0
+    max_path_m: Annotated[
+        float, number(0.02, 2, "m", "farthest that near-far is moved in or out")
+    ] = 0.3
+    """Farthest that near-far is moved in or out; as far again where its sway sensor damps."""
+    max_s: Annotated[
+        float, number(0.5, 60, "s", "longest motion of an axis that its operator left alone")
+    ] = 6.0
+    aim: Status | None = None
+    """Message with the way that the tip still goes if the joysticks are let go now."""
+    waits: bool = Field(False, description="as if it were not there; commission takes this out")
+    """As if it were not there, on the first day; the step motion of commission takes this out."""
+
+    @model_validator(mode="after")
+    def _one_radius(self) -> Self:
+        if self.radius and self.radius_m:
+            raise ValueError("expected one of radius and radius_m, got both")
+        if self.near_far is None and (self.radius or self.radius_m or self.aim):
+            raise ValueError("expected near_far with a radius or an aim, got none")
+        return self

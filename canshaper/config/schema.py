@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from canshaper.config.bus import Bus, Control, Gateway
-from canshaper.config.crane import CraneSection
+from canshaper.config.crane import CraneSection, Motion
 from canshaper.config.filters import (
     Breakpoint,
     Filter,
@@ -23,7 +23,7 @@ from canshaper.config.inputs import (
     SwitchNames,
     SwitchSection,
 )
-from canshaper.config.limits import Hydraulics, Limits, Motion, Slewing, Sway
+from canshaper.config.limits import Hydraulics, Limits, Slewing, Sway
 from canshaper.config.section import VERSION, Section, number
 from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.shaping.registry import KINDS

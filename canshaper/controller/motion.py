@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from canshaper.config.limits import Motion
+from canshaper.config.crane import Motion
 from canshaper.controller.events import MotionEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.value import Value

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.message import Sender
-from canshaper.config.limits import Ends, OtherFlow, Radius, RopeSection
+from canshaper.config.crane import Radius
+from canshaper.config.limits import Ends, OtherFlow, RopeSection
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput

@@ -11,9 +11,9 @@ from cantools.database.can import Message
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.message import SentMessage
 from canshaper.codec.status import AIM, ReportedAim, StatusCodec
-from canshaper.config.crane import coordinates
+from canshaper.config.crane import Motion, Radius, coordinates
 from canshaper.config.inputs import InputSection
-from canshaper.config.limits import Motion, OtherFlow, Radius
+from canshaper.config.limits import OtherFlow
 from canshaper.config.schema import DeploymentConfig, EmergencyStop
 from canshaper.config.source import Place, Source
 from canshaper.machine.buses import BusLoad, bus_load

@@ -10,9 +10,10 @@ from canshaper.codec.frame import NULL, at_every_priority, has_destination, with
 from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.message import Protection
 from canshaper.codec.signals import LENGTHS, ends_fault, find_signal, radius_range
+from canshaper.config.crane import Radius
 from canshaper.config.filters import LoadState, ProfileSwitch
 from canshaper.config.inputs import InputSection
-from canshaper.config.limits import Ends, OtherFlow, Position, Radius, RopeSection
+from canshaper.config.limits import Ends, OtherFlow, Position, RopeSection
 from canshaper.config.schema import EmergencyStop, FeedbackSection, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup

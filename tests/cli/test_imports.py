@@ -10,7 +10,7 @@ from tests.cli.invocation import ROOT, SHIPPED
 
 # The recommended file loads so many of our modules and lines at most, the gate's 2 300 included.
 # It sends its aim point, for which it follows the run-on of its filters.
-MOST_MODULES, MOST_LINES = 116, 20_430
+MOST_MODULES, MOST_LINES = 115, 20_420
 # Nothing of these belongs on a small machine PC.
 HEAVY = ("casadi", "scipy", "numpy", "matplotlib", "pandas")
 

@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.machine.dbc_text import signals_fault
 from tests.machine.plain_dbc import OTHER, parts, whole
 from tests.rigs.files import Machine
 
@@ -145,3 +146,43 @@ def test_another_message_that_cannot_be_used(machine: Machine) -> None:
     result = machine.load().messages.find("Other")
     assert isinstance(result, str)
     assert "The signal Two does not fit in message Other" in result
+
+
+def overlap(length: int, *signals: str) -> str | None:
+    text = "".join(f' SG_ {signal}+ (1,0) [0|0] "" A\n' for signal in signals)
+    names, text_of_fault = signals_fault(text.encode(), length)
+    assert names == [signal.split()[0].encode() for signal in signals]
+    return text_of_fault
+
+
+@pytest.mark.parametrize(
+    ("length", "signals"),
+    [
+        (1, ("A m0 : 0|8@1", "B m1 : 0|8@1")),
+        (2, ("A m0 : 8|8@1", "B m0 : 0|8@1")),
+        (2, ("A : 7|8@0", "B : 15|8@0")),
+        (3, ("A : 7|8@0", "B : 15|8@0", "C : 23|8@0")),
+        (2, ("A : 7|4@0", "B : 0|4@1")),
+        (2, ("A : 3|8@0", "B : 4|4@1", "C : 8|4@1")),
+    ],
+)
+def test_signals_without_a_common_bit_have_no_fault(length: int, signals: tuple[str, ...]) -> None:
+    assert overlap(length, *signals) is None
+
+
+@pytest.mark.parametrize(
+    ("length", "signals", "first", "second"),
+    [
+        (1, ("M M : 0|8@1", "A m0 : 4|4@1"), "M", "A"),
+        (2, ("M M : 0|8@1", "A m0 : 8|8@1", "B m0 : 12|4@1"), "A", "B"),
+        (2, ("M M : 0|4@1", "N m0M : 4|4@1", "A : 8|8@1", "B : 8|8@1"), "A", "B"),
+        (1, ("A : 0|4@1", "B : 4|4@1", "C : 0|4@1"), "A", "C"),
+        (2, ("A : 7|4@0", "B : 4|4@1"), "A", "B"),
+        (2, ("A : 3|8@0", "B : 12|4@1"), "A", "B"),
+        (2, ("A : 0|12@1", "B : 8|4@1"), "A", "B"),
+    ],
+)
+def test_signals_with_a_common_bit_overlap(
+    length: int, signals: tuple[str, ...], first: str, second: str
+) -> None:
+    assert overlap(length, *signals) == f"has overlapping signals, {first} and {second}"

@@ -7,7 +7,8 @@ import pytest
 from pydantic import BaseModel
 
 from canshaper import Fir
-from canshaper.config.limits import Limits, Motion, Radius, Sway
+from canshaper.config.crane import Motion, Radius
+from canshaper.config.limits import Limits, Sway
 from canshaper.config.schema import AxisSection, Bus, Command, DeploymentConfig, Joystick, Valve
 from canshaper.errors import ConfigError
 from canshaper.native.source import sizes_source, tables_source

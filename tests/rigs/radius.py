@@ -1,7 +1,7 @@
 """The input of a measured radius by itself."""
 
 from canshaper.codec.frame import FrameFault
-from canshaper.config.limits import Radius
+from canshaper.config.crane import Radius
 from canshaper.inputs.value import PositionInput
 from canshaper.machine.inputs import BoundValue
 

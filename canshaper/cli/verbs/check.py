@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from canshaper.config.bus import Bus
-    from canshaper.config.limits import Motion
+    from canshaper.config.crane import Motion
     from canshaper.machine.deployment import Deployment
     from canshaper.machine.used_message import NamedCode
 
