@@ -35,7 +35,8 @@ class Reloads:
     def step(self, *, neutral: bool) -> None:
         """Go a step towards the deployment as its files are now.
 
-        Nothing is begun while something moves: even a new process costs a tick a millisecond.
+        Nothing is begun or taken while something moves: a new process costs a tick a millisecond,
+        and what was read may need modules that are not loaded yet.
 
         Args:
             neutral: nothing moves.
@@ -49,13 +50,13 @@ class Reloads:
                 self._reading = ConfigReload(self._load)
             except OSError as error:
                 self._refuse(f"cannot read: {error.strerror}")
-        elif self._reading and (result := self._reading.result()) is not None:
+        elif self._reading and neutral and (result := self._reading.result()) is not None:
             self._reading = None
             if isinstance(result, Deployment):
                 self.ready = result
             else:
                 self._refuse(result)
-        waiting = not neutral and bool(self._requested or self.ready)
+        waiting = not neutral and bool(self._requested or self._reading or self.ready)
         if waiting and not self._waiting_logged:
             log.info("reload=waiting until every axis is neutral")
         self._waiting_logged = waiting

@@ -1,5 +1,6 @@
 """What a daemon says of a reload, and what becomes of its ports."""
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -10,6 +11,7 @@ from canshaper.bus.port import ListeningPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.ports import open_ports
+from canshaper.daemon.reloads import Reloads
 from canshaper.errors import BusError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import BUS, SECOND, Bench, FakePort
@@ -154,3 +156,17 @@ def test_who_takes_part_has_the_port_itself_and_who_listens_one_around_it(bench:
     assert isinstance(port, ListeningPort)
     opened = {listening.config.buses["crane"]: port}
     assert open_ports(listening, opened, lambda _fault: None) == {"crane": port}
+
+
+def test_what_was_read_is_taken_in_neutral_alone() -> None:
+    """It may need modules that are not loaded, and it is large: no axis moves meanwhile."""
+    refused: list[str] = []
+    reloads = Reloads(lambda: 1 / 0, refused.append)  # type: ignore[arg-type,return-value]
+    reloads.request()
+    reloads.step(neutral=True)
+    assert reloads._reading
+    os.waitid(os.P_PID, reloads._reading._pid, os.WEXITED | os.WNOWAIT)
+    reloads.step(neutral=False)
+    assert not refused
+    reloads.step(neutral=True)
+    assert refused == ["ZeroDivisionError: division by zero"]
