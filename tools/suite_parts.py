@@ -69,12 +69,12 @@ FOREIGN = BIN.parent / "foreign"
 
 
 def no_foreign() -> str | None:
-    """Install other readers of exported files apart; return why they cannot be had, if so.
+    """Install what reads exports of others' kinds apart; return why it cannot be had, if so.
 
     Wherever python-can finds asammdf, every start takes a third of a second more.
     """
-    names = ["asammdf", "foxglove-sdk"]
-    if FOREIGN.is_dir():
+    names = ["asammdf", "fmpy>=0.3.20", "foxglove-sdk"]
+    if (FOREIGN / "fmpy").is_dir():
         return None
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(FOREIGN), *names]
     done = subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, check=False)
@@ -156,14 +156,17 @@ def rows_of_more() -> list[list[Part]]:
     study = pytest(*SPREAD, "-m", "study")
     proof = pytest(*SPREAD, "tests/proof")
     apart = {"PYTHONPATH": str(FOREIGN)}
-    files = ("tests/recording/test_mcap.py", "tests/recording/test_mf4.py")
+    files = [
+        f"tests/{one}.py"
+        for one in ("recording/test_mcap", "recording/test_mf4", "native/test_fmu")
+    ]
     return [
         [Part("types", "mypy, import contracts", types)],
         [Part("coverage", "every line and branch of what decides whether a valve moves", cover)],
         [Part("mutation-core", "a test notices every small change of the core", core)],
         [Part("proof", "rules of the gate, for all numbers", [proof])],
         [Part("slow", "tests of a second and more", [slow])],
-        [Part("exports", "MCAP, MF4 by others", [pytest(*files)], no_foreign, apart)],
+        [Part("exports", "MCAP, MF4, FMI by others", [pytest(*files)], no_foreign, apart)],
         [
             Part(
                 "socketcan-all",

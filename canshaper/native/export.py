@@ -78,11 +78,7 @@ def export(deployment: Deployment, out: Path, *, single: bool) -> list[str]:
         UsageError: the folder has files.
     """
     numbers = tables(deployment)
-    faults = [*unstated(deployment), *rehearsed_valves(deployment.config)]
-    if faults:
-        raise ConfigError([deployment.source.problem(*one) for one in faults])
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise UsageError(f"--out: expected a new or empty folder, got {out}")
+    check_exported(deployment, out)
     golden, precision = golden_drive(deployment), DOUBLE
     if single:
         golden, differ = in_float(deployment, golden)
@@ -101,6 +97,20 @@ def export(deployment: Deployment, out: Path, *, single: bool) -> list[str]:
     for name, text in files.items():
         (out / name).write_text(text, encoding="utf-8")
     return [precision.replace("`", ""), f"make -C {out} && {out}/selftest"]
+
+
+def check_exported(deployment: Deployment, out: Path) -> None:
+    """Look whether a deployment may be exported into a folder.
+
+    Raises:
+        ConfigError: ``canshaper run`` would not begin.
+        UsageError: the folder has files.
+    """
+    faults = [*unstated(deployment), *rehearsed_valves(deployment.config)]
+    if faults:
+        raise ConfigError([deployment.source.problem(*one) for one in faults])
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise UsageError(f"--out: expected a new or empty folder, got {out}")
 
 
 def _readme(deployment: Deployment, numbers: Numbers, golden: Golden, precision: str) -> str:

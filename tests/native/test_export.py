@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -145,3 +146,40 @@ def test_a_stop_over_a_way_that_is_not_stated_is_refused(tmp_path: Path) -> None
     code, text = run(str(tmp_path / "machine.yaml"), "--out", str(tmp_path / "axis"))
     assert code == EXIT_WRONG
     assert "axes.slew.limits.stop_distance_m: missing: to stop, the limits allow" in text
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "text"),
+    [
+        (
+            "forwarder.yaml",
+            ("--fmu", "plant", "--float"),
+            "--fmu: expected controller or plant, without --float",
+        ),
+        ("forwarder-sensor.yaml", ("--fmu", "controller"), "axes.slew.sway_sensor: expected none"),
+        ("forwarder-joints.yaml", ("--fmu", "plant"), "crane: expected one crane whose valves"),
+    ],
+)
+def test_a_unit_that_c_has_no_part_for_is_refused(
+    tmp_path: Path, file: str, options: tuple[str, ...], text: str
+) -> None:
+    code, said = run(file, "--out", str(tmp_path / "unit"), *options)
+    assert code == EXIT_WRONG
+    assert text in said
+    assert not (tmp_path / "unit").exists()
+
+
+def test_a_unit_without_a_compiler_has_its_sources(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "absent-cc")
+    code, said = run("forwarder.yaml", "--out", str(tmp_path / "unit"), "--fmu", "controller")
+    assert code == 0
+    assert "without a binary, its sources are to be compiled: CC: expected a C compiler" in said
+    with zipfile.ZipFile(tmp_path / "unit/controller.fmu") as archive:
+        names = archive.namelist()
+        built = archive.read("sources/buildDescription.xml").decode()
+    assert [one for one in names if one.startswith("binaries")] == []
+    assert {f"sources/{one}" for one in re.findall(r'SourceFile name="(.+?)"', built)} == {
+        one for one in names if one.endswith(".c")
+    }

@@ -1,0 +1,69 @@
+"""The simulated crane in C as a co-simulation unit, for another's controller or operator."""
+
+from collections.abc import Iterable
+
+from canshaper.campaign.native import PLANT, grapple_numbers, is_simple, steps_of, valve_numbers
+from canshaper.errors import ConfigError
+from canshaper.machine.deployment import Deployment
+from canshaper.native.fmu import Unit, Variable
+from canshaper.native.source import real
+from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW, TIP_AXES
+from canshaper_sim.cranes import cranes
+from canshaper_sim.parameters import changed_parameters
+
+_POSES = {
+    SLEW: ("angle", "Slew angle, counter-clockwise from above", "rad"),
+    NEAR_FAR: ("radius", "Distance of the tip from the slew axis", "m"),
+    LIFT: ("height", "Height of the tip", "m"),
+}
+
+
+def plant_unit(deployment: Deployment) -> Unit:
+    """Return the simulated crane of a deployment as a unit.
+
+    Raises:
+        ConfigError: the C has no part for something of it.
+    """
+    crane, axes = changed_parameters([], deployment), deployment.by_coordinate
+    moves_tip = not {*deployment.coordinates.values()} - {*TIP_AXES}
+    if not (moves_tip and is_simple(crane)) or len(cranes(deployment)) > 1:
+        text = "expected one crane whose valves move the tip, on level ground, with a pump that"
+        text += " has enough, for a unit of the plant: the C has no more"
+        raise ConfigError([deployment.source.problem(("crane",), text)])
+    names = [axes.get(one, one) for one in TIP_AXES]
+    starts = [valve_numbers(crane, one)["start"] for one in TIP_AXES]
+    poses = [(name, *_POSES[one]) for name, one in zip(names, TIP_AXES, strict=True)]
+    swings = (("across", "in slew direction"), ("along", "towards the crane"))
+    outputs = [
+        *(
+            Variable(f"{name}.{pose}", text, unit, start)
+            for (name, pose, text, unit), start in zip(poses, starts, strict=True)
+        ),
+        *(Variable(f"{name}.speed", f"Speed of {pose}", f"{u}/s") for name, pose, _, u in poses),
+        *(Variable(f"sway.{one}", f"Swing of the grapple {way}", "rad") for one, way in swings),
+        *(Variable(f"sway.{one}_rate", f"Rate of sway.{one}", "rad/s") for one, _ in swings),
+    ]
+    tick_ms, own = deployment.config.tick_ms, "cs_unit_plant.c"
+    steps = steps_of(tick_ms)
+    valves = ", ".join(_row(valve_numbers(crane, one).values()) for one in TIP_AXES)
+    step = f".steps = {steps['steps']}, .step_s = R({steps['step_s'].hex()})"
+    return Unit(
+        "plant",
+        f"Simulated crane of {deployment.path.name}: valves to swing",
+        tick_ms * 1_000_000,
+        [Variable(f"{one}.command", "Of the valve, a part of its full one", "1") for one in names],
+        outputs,
+        {
+            "cs_crane.h": PLANT.read_text(encoding="utf-8"),
+            own: PLANT.with_name(own).read_text(encoding="utf-8"),
+        },
+        f"""\
+#define R(x) (x)
+#define CS_UNIT_DRIVE {{.valve = {{{valves}}}, {step}}}
+#define CS_UNIT_GRAPPLE {_row(grapple_numbers(crane.grapple))}
+""",
+    )
+
+
+def _row(values: Iterable[float]) -> str:
+    return f"{{{', '.join(real(float(one)) for one in values)}}}"
