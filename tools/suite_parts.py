@@ -55,17 +55,31 @@ def no_lane() -> str | None:
     return done.stderr.strip().split("\n")[-1].removeprefix("lane: ") if done.returncode else None
 
 
-def no_chromium() -> str | None:
-    """Install Chromium where it is absent; return why there is none, if so."""
+def _no_program(tools: dict[str, str]) -> str | None:
+    """Install the Debian packages of absent programs; return why they cannot be had, if so."""
     try:
         with cache_lock():
-            install(missing({"chromium": "chromium"}))
+            install(missing(tools))
     except NoLane as error:
         return str(error)
     return None
 
 
+def no_chromium() -> str | None:
+    """Install Chromium where it is absent; return why there is none, if so."""
+    return _no_program({"chromium": "chromium"})
+
+
+def no_target() -> str | None:
+    """Install compiler and emulator of a Cortex-M; return why there are none, if so."""
+    tools = {"qemu-system-arm": "qemu-system-arm", "arm-none-eabi-gcc": "gcc-arm-none-eabi"}
+    if not NEWLIB.exists():  # the compiler's package only recommends it
+        tools["its C library"] = "libnewlib-arm-none-eabi"
+    return _no_program(tools)
+
+
 FOREIGN = BIN.parent / "foreign"
+NEWLIB = Path("/usr/lib/arm-none-eabi/newlib")
 
 
 def no_foreign() -> str | None:
@@ -152,7 +166,13 @@ def rows_of_more() -> list[list[Part]]:
     cover = [pytest(*SPREAD, few, "-m", "not slow", "--cov", "--cov-report=term", *gate)]
     core = [[sys.executable, "tools/mutation.py", f"-j{JOBS}", "core"]]
     service = [[sys.executable, "-m", "tests.lane.services", "-q"]]
-    slow = pytest(*SPREAD, "-m", "slow and not study", "--ignore=tests/proof")
+    slow = pytest(
+        *SPREAD,
+        "-m",
+        "slow and not study",
+        "--ignore=tests/proof",
+        "--ignore=tests/native/test_target.py",
+    )
     study = pytest(*SPREAD, "-m", "study")
     proof = pytest(*SPREAD, "tests/proof")
     apart = {"PYTHONPATH": str(FOREIGN)}
@@ -166,6 +186,14 @@ def rows_of_more() -> list[list[Part]]:
         [Part("mutation-core", "a test notices every small change of the core", core)],
         [Part("proof", "rules of the gate, for all numbers", [proof])],
         [Part("slow", "tests of a second and more", [slow])],
+        [
+            Part(
+                "target",
+                "self-test of an export on an emulated Cortex-M4F",
+                [pytest("tests/native/test_target.py")],
+                no_target,
+            )
+        ],
         [Part("exports", "MCAP, MF4, FMI by others", [pytest(*files)], no_foreign, apart)],
         [
             Part(

@@ -31,28 +31,22 @@ def plant_unit(deployment: Deployment) -> Unit:
         text += " has enough, for a unit of the plant: the C has no more"
         raise ConfigError([deployment.source.problem(("crane",), text)])
     names = [axes.get(one, one) for one in TIP_AXES]
-    starts = [valve_numbers(crane, one)["start"] for one in TIP_AXES]
-    poses = [(name, *_POSES[one]) for name, one in zip(names, TIP_AXES, strict=True)]
-    swings = (("across", "in slew direction"), ("along", "towards the crane"))
-    outputs = [
-        *(
-            Variable(f"{name}.{pose}", text, unit, start)
-            for (name, pose, text, unit), start in zip(poses, starts, strict=True)
-        ),
-        *(Variable(f"{name}.speed", f"Speed of {pose}", f"{u}/s") for name, pose, _, u in poses),
-        *(Variable(f"sway.{one}", f"Swing of the grapple {way}", "rad") for one, way in swings),
-        *(Variable(f"sway.{one}_rate", f"Rate of sway.{one}", "rad/s") for one, _ in swings),
-    ]
-    tick_ms, own = deployment.config.tick_ms, "cs_unit_plant.c"
-    steps = steps_of(tick_ms)
+    outputs, speeds = list[Variable](), list[Variable]()
+    for name, (moved, (pose, text, unit)) in zip(names, _POSES.items(), strict=True):
+        start = valve_numbers(crane, moved)["start"]
+        outputs.append(Variable(f"{name}.{pose}", text, unit, start))
+        speeds.append(Variable(f"{name}.speed", f"Speed of {pose}", f"{unit}/s"))
+    for one, way in (("across", "in slew direction"), ("along", "towards the crane")):
+        outputs.append(Variable(f"sway.{one}", f"Swing of the grapple {way}", "rad"))
+        speeds.append(Variable(f"sway.{one}_rate", f"Rate of sway.{one}", "rad/s"))
+    own, steps = "cs_unit_plant.c", steps_of(deployment.config.tick_ms)
     valves = ", ".join(_row(valve_numbers(crane, one).values()) for one in TIP_AXES)
     step = f".steps = {steps['steps']}, .step_s = R({steps['step_s'].hex()})"
     return Unit(
         "plant",
         f"Simulated crane of {deployment.path.name}: valves to swing",
-        tick_ms * 1_000_000,
         [Variable(f"{one}.command", "Of the valve, a part of its full one", "1") for one in names],
-        outputs,
+        [*outputs, *speeds],
         {
             "cs_crane.h": PLANT.read_text(encoding="utf-8"),
             own: PLANT.with_name(own).read_text(encoding="utf-8"),

@@ -96,7 +96,6 @@ class Unit:
     Attributes:
         kind: controller or plant.
         text: description of it.
-        tick_ns: its tick.
         inputs: by value reference, from 1 on.
         outputs: the ones behind them.
         sources: its C by file name, besides that of FMI.
@@ -105,7 +104,6 @@ class Unit:
 
     kind: str
     text: str
-    tick_ns: int
     inputs: Sequence[Variable]
     outputs: Sequence[Variable]
     sources: Mapping[str, str]
@@ -146,7 +144,6 @@ def controller_unit(deployment: Deployment) -> Unit:
     return Unit(
         "controller",
         f"Anti-sway of {deployment.path.name}: joysticks to valves",
-        numbers["tick_ns"],
         inputs,
         outputs,
         {
@@ -172,7 +169,7 @@ def write_fmu(unit: Unit, deployment: Deployment, out: Path) -> str:
     sources |= unit.sources
     starts = ", ".join(float(one.start).hex() for one in (*unit.inputs, *unit.outputs))
     sizes = f"""\
-#define CS_UNIT_TICK_NS {unit.tick_ns}
+#define CS_UNIT_TICK_NS {deployment.config.tick_ms * 1_000_000}
 #define CS_UNIT_INPUTS {len(unit.inputs)}
 #define CS_UNIT_VALUES {1 + len(unit.inputs) + len(unit.outputs)}
 #define CS_UNIT_START {{0.0, {starts}}}
@@ -226,7 +223,7 @@ def _model_description(unit: Unit, deployment: Deployment, name: str, token: str
         token=token,
         text=quoteattr("; ".join([unit.text, *deployment.identity.lines()])),
         version=version(),
-        tick_s=unit.tick_ns / 1e9,
+        tick_s=deployment.config.tick_ms / 1000.0,
         units="".join(f'<Unit name="{one}">{text}</Unit>' for one, text in UNITS.items()),
         types=types,
         variables="\n".join(elements),

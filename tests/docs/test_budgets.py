@@ -36,7 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2245,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
-    "docs/export.md": 410,
+    "docs/export.md": 480,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
@@ -67,8 +67,8 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (65_921, "a new ability takes the room of an old one"),
-    "tests": (100_392, "one level for each behaviour"),
+    "canshaper": (65_926, "a new ability takes the room of an old one"),
+    "tests": (100_469, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (356, "one that only hands on is joined to its reader")}

@@ -1,18 +1,23 @@
 """``canshaper export``: what it writes is built by make and CMake, and tests itself."""
 
+import json
 import re
 import shutil
 import subprocess
 import zipfile
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.cli.common import EXIT_WRONG
+from canshaper.machine.identity import program_sha256
 from tests.native.judge import needs_compiler
-from tests.rigs.files import ROOT
+from tests.rigs.files import CONFIG, ROOT, read
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -119,8 +124,22 @@ def test_in_float_it_says_what_differs(tmp_path: Path) -> None:
 def test_the_readme_names_the_deployment_and_the_program(exported: Path) -> None:
     text = (exported / "README.md").read_text(encoding="utf-8")
     assert "| near_far | 1 | 1 | NearFarCommand |" in text
-    for name in ("digest=0x", "program=sha256:", "deployment=sha256:", "dbc=sha256:", "c=sha256:"):
+    for name in ("digest=0x", "program=sha256:", "deployment=sha256:", "dbc=sha256:"):
         assert f"\n    {name}" in text
+
+
+def test_the_bill_of_materials_has_every_file(exported: Path) -> None:
+    text = (exported / "sbom.cdx.json").read_text(encoding="utf-8")
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
+    hashes = {one["name"]: one["hashes"][0]["content"] for one in json.loads(text)["components"]}
+    identity = read(CONFIG / "forwarder-gff.yaml").identity
+    assert hashes.pop("canshaper") == program_sha256()
+    assert hashes.pop("forwarder-gff.yaml") == identity.deployment
+    assert [hashes.pop(name) for name in identity.dbc] == list(identity.dbc.values())
+    files = {one for one in exported.rglob("*") if one.is_file()} - {exported / "sbom.cdx.json"}
+    assert hashes == {
+        str(one.relative_to(exported)): sha256(one.read_bytes()).hexdigest() for one in files
+    }
 
 
 def test_a_folder_with_files_is_left_alone(tmp_path: Path) -> None:

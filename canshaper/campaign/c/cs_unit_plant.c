@@ -22,7 +22,8 @@ const char *cs_unit_tick(void *state, int64_t tick, double *value)
     for (int32_t i = 0; i < COORDINATES; i++) { set_command(&s->a[i], fmin(fmax(value[1 + i], -1.0), 1.0)); }
     bool below = crane_tick(s, &drive, &grapple);
     for (int32_t i = 0; i < COORDINATES; i++) { *out++ = s->a[i].position; }
+    for (int32_t i = 0; i < 2; i++) { *out++ = s->x[i]; }
     for (int32_t i = 0; i < COORDINATES; i++) { *out++ = s->a[i].speed; }
-    for (int32_t i = 0; i < 4; i++) { *out++ = s->x[i]; }
+    for (int32_t i = 2; i < 4; i++) { *out++ = s->x[i]; }
     return below ? NULL : "the grapple swung above the horizontal, where this crane is none";
 }
