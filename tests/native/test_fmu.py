@@ -191,8 +191,17 @@ def test_switches_states_and_steps(units: dict[str, Path], tmp_path: Path) -> No
         slave.step(21, 3.0)
         about = (slave.get("slew.state"), slave.get("slew.reason"), slave.get("slew.command"))
         assert about == (State.TRIPPED, Reason.ENABLE_LOST, 0.0)
+        for name, value in (("left.enable", 1.0), ("slew.demand", 0.0), ("left.reset", 1.0)):
+            assert slave.get("slew.state") == State.TRIPPED
+            slave.set(name, value)
+            slave.step(slave.get("time") / TICK_S, 1.0)
+        assert slave.get("slew.state") == State.READY
+        slave.set("left.anti_sway_off", 1.0)
+        slave.set("slew.demand", 0.5)
+        slave.step(slave.get("time") / TICK_S, 1.0)
+        assert slave.get("slew.state") == State.BYPASS_ON
         slave.fmu.reset()
-        assert slave.get("slew.reason") == Reason.START
+        assert (slave.get("time"), slave.get("slew.reason")) == (0.0, Reason.START)
         assert slave.said == []
 
 
@@ -209,6 +218,24 @@ def test_a_wrong_value_is_refused(
     with running(units["controller"], tmp_path) as slave:
         with pytest.raises(fmpy.fmi1.FMICallException):
             slave.set(name, value)
+        assert slave.said == [text]
+
+
+@pytest.mark.parametrize(
+    ("tick", "length_s", "text"),
+    [
+        (1, 0.0, "communicationStepSize: expected more than 0 s"),
+        (0, TICK_S, "currentCommunicationPoint: expected the end of the last step"),
+        (2, TICK_S, "currentCommunicationPoint: expected the end of the last step"),
+    ],
+)
+def test_a_step_that_does_not_follow_is_refused(
+    units: dict[str, Path], tmp_path: Path, tick: int, length_s: float, text: str
+) -> None:
+    with running(units["plant"], tmp_path) as slave:
+        slave.step(0)
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            slave.step(tick, length_s)
         assert slave.said == [text]
 
 

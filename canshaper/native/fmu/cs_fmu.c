@@ -101,14 +101,18 @@ FMI3_Export status fmi3DoStep(void *instance, double now_s, double step_s, bool 
 {
     unit *u = instance;
     const double tick_s = (double)CS_UNIT_TICK_NS / 1e9;
-    const char *why = (step_s > 0.0) ? NULL : "communicationStepSize: expected more than 0 s";
+    const char *why = NULL;
     double end_s = now_s + step_s;
+    if (!(step_s > 0.0) || !isfinite(end_s)) { why = "communicationStepSize: expected more than 0 s"; }
+    if (!(fabs(now_s - u->value[0]) <= (SAME_TICK * tick_s))) {
+        why = "currentCommunicationPoint: expected the end of the last step";
+    }
     (void)no_return;
     while ((why == NULL) && ((u->start_s + ((double)u->ticks * tick_s)) < (end_s - (SAME_TICK * tick_s)))) {
         why = cs_unit_tick(u->state, u->ticks, u->value);
         u->ticks++;
     }
-    u->value[0] = end_s;
+    if (why == NULL) { u->value[0] = end_s; }
     *event = *ends = *early = false;
     *last_s = end_s;
     return (why == NULL) ? OK : wrong(u, why);
