@@ -41,7 +41,6 @@ def plant_unit(deployment: Deployment) -> Unit:
         speeds.append(Variable(f"sway.{one}_rate", f"Rate of sway.{one}", "rad/s"))
     own, steps = "cs_unit_plant.c", steps_of(deployment.config.tick_ms)
     valves = ", ".join(_row(valve_numbers(crane, one).values()) for one in TIP_AXES)
-    step = f".steps = {steps['steps']}, .step_s = R({steps['step_s'].hex()})"
     return Unit(
         "plant",
         f"Simulated crane of {deployment.path.name}: valves to swing",
@@ -53,7 +52,9 @@ def plant_unit(deployment: Deployment) -> Unit:
         },
         f"""\
 #define R(x) (x)
-#define CS_UNIT_DRIVE {{.valve = {{{valves}}}, {step}}}
+#define CS_UNIT_CRANE {{{valves}}}
+#define CS_UNIT_STEP_S {steps["step_s"].hex()}
+#define CS_UNIT_STEPS {steps["steps"]}
 #define CS_UNIT_GRAPPLE {_row(grapple_numbers(crane.grapple))}
 """,
     )

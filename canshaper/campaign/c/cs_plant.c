@@ -20,13 +20,6 @@ typedef struct {
     int32_t axis, zero, step, full;
 } plant_valve;
 typedef struct { double l1, l2, m1, m2, c5, c6, g; } plant_grapple;
-typedef struct { double time_s; plant_grapple grapple; } plant_load;
-typedef struct {
-    plant_valve valve[COORDINATES];
-    double sway[4], step_s;
-    int64_t tick_ms;
-    int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
-} plant_drive;
 
 typedef struct {
     const plant_valve *p;
@@ -192,28 +185,31 @@ static void swing(const plant_grapple *q, double *x, double h, const tip_motion 
 
 typedef struct {
     actuator a[COORDINATES];
-    double decay[COORDINATES], x[4];
+    double decay[COORDINATES], x[4], step_s;
+    int32_t steps; /* of a tick */
 } crane_state;
 
-static void crane_begin(crane_state *s, const plant_drive *d)
+static void crane_begin(crane_state *s, const plant_valve *valve, const double *sway, double step_s, int32_t steps)
 {
-    memset(s->a, 0, sizeof(s->a));
-    memcpy(s->x, d->sway, sizeof(s->x));
+    memset(s, 0, sizeof(*s));
+    memcpy(s->x, sway, sizeof(s->x));
+    s->step_s = step_s;
+    s->steps = steps;
     for (int32_t i = 0; i < COORDINATES; i++) {
-        s->a[i].p = &d->valve[i];
-        s->a[i].position = d->valve[i].start;
-        s->decay[i] = exp(-(0.5 * d->step_s) / d->valve[i].lag);
+        s->a[i].p = &valve[i];
+        s->a[i].position = valve[i].start;
+        s->decay[i] = exp(-(0.5 * step_s) / valve[i].lag);
     }
 }
 
-/* One tick with the commands that the valves have. Returns whether the grapple is below the horizontal. */
-static bool crane_tick(crane_state *s, const plant_drive *d, const plant_grapple *q)
+/* One tick with the commands that the valves have. Returns whether the grapple is above the horizontal. */
+static bool crane_tick(crane_state *s, const plant_grapple *q)
 {
     actuator *a = s->a;
-    for (int32_t n = 0; n < d->steps; n++) {
+    for (int32_t n = 0; n < s->steps; n++) {
         tip_motion t[3];
         t[0] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, 0.0, a[SLEW].speed, 0.0, 0.0};
-        for (int32_t i = 0; i < COORDINATES; i++) { advance(&a[i], d->step_s, s->decay[i]); }
+        for (int32_t i = 0; i < COORDINATES; i++) { advance(&a[i], s->step_s, s->decay[i]); }
         t[0].radius_acc = a[NEAR_FAR].start_acc;
         t[0].slew_acc = a[SLEW].start_acc;
         t[0].height_acc = a[LIFT].start_acc;
@@ -221,13 +217,21 @@ static bool crane_tick(crane_state *s, const plant_drive *d, const plant_grapple
                             a[SLEW].middle_speed, a[SLEW].middle_acc, a[LIFT].middle_acc};
         t[2] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, a[NEAR_FAR].end_acc,
                             a[SLEW].speed, a[SLEW].end_acc, a[LIFT].end_acc};
-        swing(q, s->x, d->step_s, t);
+        swing(q, s->x, s->step_s, t);
     }
-    return !((fabs(s->x[0]) > HORIZONTAL) || (fabs(s->x[1]) > HORIZONTAL));
+    return (fabs(s->x[0]) > HORIZONTAL) || (fabs(s->x[1]) > HORIZONTAL);
 }
 
 #ifndef CS_CRANE_ALONE
 #include "cs_internal.h"
+
+typedef struct { double time_s; plant_grapple grapple; } plant_load;
+typedef struct {
+    plant_valve valve[COORDINATES];
+    double sway[4], step_s;
+    int64_t tick_ms;
+    int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
+} plant_drive;
 
 /* A valve decodes for itself: what the DBC says of the bits. */
 static int64_t number_in(const cs_field *f, const uint8_t *data)
@@ -288,10 +292,10 @@ int32_t cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_l
     const double *x = crane.x;
     const plant_grapple *q = empty;
     int32_t next = 0, driven = 0;
-    bool below = true;
+    bool over = false;
     cs_init(&s, &cs_tables);
-    crane_begin(&crane, d);
-    for (int32_t k = 0; (k < d->ticks) && below; k++) {
+    crane_begin(&crane, d->valve, d->sway, d->step_s, d->steps);
+    for (int32_t k = 0; (k < d->ticks) && !over; k++) {
         int64_t ms = k * d->tick_ms, now = ms * 1000000;
         while ((next < d->loads_n) && ((double)ms >= (1000.0 * load[next].time_s))) { q = &load[next++].grapple; }
         if ((k > 0) && d->radius) { send_radius(&s, a[NEAR_FAR].position, now); }
@@ -305,7 +309,7 @@ int32_t cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_l
             out[((7 + i) * d->ticks) + k] = command;
             set_command(&a[i], command);
         }
-        below = crane_tick(&crane, d, q);
+        over = crane_tick(&crane, q);
         double row[7] = {a[SLEW].position, a[NEAR_FAR].position, a[SLEW].speed, a[NEAR_FAR].speed, a[LIFT].speed, x[0], x[1]};
         for (int32_t i = 0; i < 7; i++) { out[(i * d->ticks) + k] = row[i]; }
         driven = k + 1;
