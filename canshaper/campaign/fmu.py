@@ -1,8 +1,9 @@
 """The simulated crane in C as a co-simulation unit, for another's controller or operator."""
 
 from collections.abc import Iterable
+from pathlib import Path
 
-from canshaper.campaign.native import PLANT, grapple_numbers, is_simple, steps_of, valve_numbers
+from canshaper.campaign.native import grapple_numbers, is_simple, steps_of, valve_numbers
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.fmu import Unit, Variable
@@ -11,6 +12,7 @@ from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW, TIP_AXES
 from canshaper_sim.cranes import cranes
 from canshaper_sim.parameters import changed_parameters
 
+FILES = Path(__file__).with_name("c")
 _POSES = {
     SLEW: ("angle", "Slew angle, counter-clockwise from above", "rad"),
     NEAR_FAR: ("radius", "Distance of the tip from the slew axis", "m"),
@@ -27,8 +29,7 @@ def plant_unit(deployment: Deployment) -> Unit:
     crane, axes = changed_parameters([], deployment), deployment.by_coordinate
     moves_tip = not {*deployment.coordinates.values()} - {*TIP_AXES}
     if not (moves_tip and is_simple(crane)) or len(cranes(deployment)) > 1:
-        text = "expected one crane whose valves move the tip, on level ground, with a pump that"
-        text += " has enough, for a unit of the plant: the C has no more"
+        text = "expected one crane moved by its tip, on level ground, with oil enough, in a unit"
         raise ConfigError([deployment.source.problem(("crane",), text)])
     names = [axes.get(one, one) for one in TIP_AXES]
     outputs, speeds = list[Variable](), list[Variable]()
@@ -47,8 +48,8 @@ def plant_unit(deployment: Deployment) -> Unit:
         [Variable(f"{one}.command", "Of the valve, a part of its full one", "1") for one in names],
         [*outputs, *speeds],
         {
-            "cs_crane.h": PLANT.read_text(encoding="utf-8"),
-            own: PLANT.with_name(own).read_text(encoding="utf-8"),
+            "cs_crane.h": (FILES / "cs_plant.c").read_text(encoding="utf-8"),
+            own: (FILES / own).read_text(encoding="utf-8"),
         },
         f"""\
 #define R(x) (x)

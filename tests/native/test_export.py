@@ -176,7 +176,7 @@ def test_a_stop_over_a_way_that_is_not_stated_is_refused(tmp_path: Path) -> None
             "--fmu: expected controller or plant, without --float",
         ),
         ("forwarder-sensor.yaml", ("--fmu", "controller"), "axes.slew.sway_sensor: expected none"),
-        ("forwarder-joints.yaml", ("--fmu", "plant"), "crane: expected one crane whose valves"),
+        ("forwarder-joints.yaml", ("--fmu", "plant"), "crane: expected one crane moved by its tip"),
     ],
 )
 def test_a_unit_that_c_has_no_part_for_is_refused(
