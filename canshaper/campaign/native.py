@@ -78,14 +78,16 @@ class NativeCrane:
     Args:
         deployment: the machine.
         plant: the C of the crane.
+        keeps: what is compiled, for the next time.
 
     Raises:
         ConfigError: the C has no part for something of the deployment.
         NativeError: it cannot be compiled here, or its arithmetic is another one.
     """
 
-    def __init__(self, deployment: Deployment, plant: Path = PLANT) -> None:
-        library = NativeLibrary(deployment, str(plant), cache=_cache_folder())
+    def __init__(self, deployment: Deployment, plant: Path = PLANT, *, keeps: bool = True) -> None:
+        cache = _cache_folder() if keeps else None
+        library = NativeLibrary(deployment, str(plant), cache=cache)
         self._c, self._deployment = library.c, deployment
         self._buses = library.buses
         _check_functions(self._c)

@@ -59,7 +59,7 @@ class Source:
 
     def load(self) -> Deployment:
         """Load the deployment, once in a process."""
-        return _loaded(self.path, self.files)
+        return loaded(self.path, self.files)
 
     def native(self) -> NativeCrane | ConfigError | None:
         """Controller and crane in C, once in a process; why not, or None without ``engine``.
@@ -82,8 +82,8 @@ class Source:
 
 
 @cache
-def _loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deployment:
-    """The deployment, from where it lies or, in a worker elsewhere, from what was sent."""
+def loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deployment:
+    """The deployment, once in a process: from where it lies, or elsewhere from what was sent."""
     try:
         if all(Path(path).read_bytes() == data for path, data in files):
             return load_deployment(Path(source_path))
@@ -101,7 +101,7 @@ def _loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deploymen
 @cache
 def _native(source_path: str, files: tuple[tuple[str, bytes], ...]) -> NativeCrane | ConfigError:
     try:
-        return NativeCrane(_loaded(source_path, files))
+        return NativeCrane(loaded(source_path, files))
     except ConfigError as error:
         return error
 

@@ -249,7 +249,7 @@ def tables(summary: Summary) -> Iterator[Table]:
         if quantiles:
             drawn = new_table(f"{title}: {count} drives", *_SHOWN)
             for measure, one in quantiles.items():
-                drawn.add_row(measure, *(_cell(one[name]) for name in _SHOWN))
+                drawn.add_row(measure, *(bounded(one[name]) for name in _SHOWN))
             yield drawn
     if explained := summary.influences[FIRST]:
         drawn = new_table(f"what drives {FIRST}", "explains", "trend")
@@ -293,7 +293,8 @@ def lines(summary: Summary) -> Iterator[str]:
         verdict = "kept" if one.kept else "NOT SHOWN"
         if one.quantile.low is not None and one.quantile.low > one.limit:
             verdict = "EXCEEDED"
-        yield f"accept.{one.key}: {_cell(one.quantile)}, expected at most {one.limit:g}: {verdict}"
+        found = bounded(one.quantile)
+        yield f"accept.{one.key}: {found}, expected at most {one.limit:g}: {verdict}"
 
 
 def difference_table(differences: Mapping[str, Difference]) -> Table:
@@ -304,12 +305,13 @@ def difference_table(differences: Mapping[str, Difference]) -> Table:
             measure,
             f"{one.first['p99'].value:.2f}",
             f"{one.second['p99'].value:.2f}",
-            _cell(one.median),
+            bounded(one.median),
             f"{100 * one.better:.0f} %",
         )
     return drawn
 
 
-def _cell(one: Quantile) -> str:
+def bounded(one: Quantile) -> str:
+    """A quantile with its bounds."""
     low, high = ("?" if bound is None else f"{bound:.3g}" for bound in (one.low, one.high))
     return f"{one.value:.3g} ({low}..{high})"

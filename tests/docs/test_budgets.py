@@ -27,7 +27,7 @@ BUDGET = {
     "docs/api.md": 150,
     "docs/architecture.md": 310,
     "docs/calibration.md": 420,
-    "docs/campaign.md": 1035,
+    "docs/campaign.md": 1135,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 790,
@@ -67,11 +67,11 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (65_928, "a new ability takes the room of an old one"),
-    "tests": (100_496, "one level for each behaviour"),
+    "canshaper": (66_330, "a new ability takes the room of an old one"),
+    "tests": (100_622, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (356, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (358, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:
