@@ -151,6 +151,17 @@ class RobustDesign:
         lasts_s = self.task.lasts * self.shaper.duration_s
         return round(lasts_s + 0.1, 1) if self.bound.config.limits.tail_s < lasts_s else None
 
+    @property
+    def reversal_s(self) -> float | None:
+        """Reversal that its second mode needs, where that of the file cuts the response off.
+
+        What makes good for a cut knows the first mode alone.
+        """
+        limits = self.bound.config.limits.output_limits()
+        needed_s = self.shaper.duration_s + limits.maximum / limits.fall_per_s
+        enough = limits.allow_reverse or limits.reversal_s >= needed_s
+        return None if enough or not self.task.second else math.ceil(10.0 * needed_s) / 10.0
+
 
 def design_robust(
     deployment: Deployment,
@@ -272,6 +283,9 @@ def _second(text: str | None, task: RobustTask) -> SecondMode | None:
     """Return the second mode of the option --second."""
     if text is None:
         return None
+    if task.bound.rope:
+        text = "its period does not go with the rope's; for one length, write sway without length"
+        raise UsageError(f"--second: expected an axis that follows no rope: {text}")
     try:
         period_s, damping_ratio, range_pct = (float(word) for word in text.split(","))
     except ValueError:

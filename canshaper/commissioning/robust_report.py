@@ -50,6 +50,11 @@ def _print_consequences(deployment: Deployment, one: RobustDesign, console: Cons
             f"tail_s is {tail_s:g} s: it ends the run-on early; give {axis} at least"
             f" tail_s: {one.needed_s:.1f}"
         )
+    if one.reversal_s is not None:
+        console.print(
+            "A reversal cuts the response off and makes the second mode swing; what lets it end:"
+            f" reversal: brake_shaped, reversal_s: {one.reversal_s:.1f}"
+        )
     console.print(consequences(deployment, axis, one.chosen, one.needed_s))
 
 

@@ -110,6 +110,10 @@ def check_rope(lookup: Lookup, place: Place, axis: AxisSection) -> None:
     for key in ("gain_schedule", "profiles", "sway_sensor"):
         if getattr(axis, key):
             add(at, f"expected no {key} with it: sway and filter follow the length alone")
+    design = axis.filter.design()
+    if design and design.second:
+        text = "expected none with sway.length: its period does not go with the rope's"
+        add((*place, "filter", "designed_for", "second"), text)
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:

@@ -19,12 +19,11 @@ from typing import TYPE_CHECKING
 from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import BRIDGE, HOIST, TROLLEY
 from canshaper_sim.ranges import check_ranges
+from canshaper_sim.sling import PARTS, SlingParameters, SlungLoad, Vector, dot, plus
 from canshaper_sim.valve import ValveParameters
 
 if TYPE_CHECKING:
     from canshaper_sim.grapple import Sway
-
-Vector = tuple[float, float, float]
 
 # name -> (lowest, highest) value that still describes an overhead crane.
 _ALLOWED = {
@@ -82,6 +81,7 @@ class OverheadParameters(RopeParameters):
     trolley_full_speed_m_s: float = 1.0
     runway_m: float = 100.0  # it begins in the middle of both
     span_m: float = 60.0
+    sling: SlingParameters = field(default_factory=SlingParameters)
 
     def __post_init__(self) -> None:
         self.check("overhead", _ALLOWED)
@@ -100,6 +100,7 @@ class OverheadParameters(RopeParameters):
                 HOIST: self.winch(ends),
             },
             self,
+            self.sling,
         )
 
 
@@ -109,23 +110,36 @@ class OverheadBoom:
     Args:
         axes: actuators of the three axes; the hoist's position is the height below the trolley.
         parameters: of the crane.
+        sling: what the load hangs from below the hook.
 
     Attributes:
-        load: the load from the trolley: along the runway, along the bridge, upwards, m.
+        load: the load from the trolley: along the runway, along the bridge, upwards, m. With a
+            sling this is the hook.
         rate: its velocity, from the trolley's, m/s.
+        slung: the load on the sling.
     """
 
-    def __init__(self, axes: dict[str, Actuator], parameters: RopeParameters) -> None:
+    def __init__(
+        self,
+        axes: dict[str, Actuator],
+        parameters: RopeParameters,
+        sling: SlingParameters | None = None,
+    ) -> None:
         self.axes = axes
         self._p = parameters
+        self._sling = sling if sling and sling.length_m else None
         self.load: Vector = (0.0, 0.0, axes[HOIST].position)
         self.rate: Vector = (0.0, 0.0, 0.0)
+        self.slung: SlungLoad | None = None
 
     def swing(self, sway: "Sway") -> None:
         """Let the load hang with these angles: theta5 along the runway, theta6 along the bridge."""
         along, across = math.tan(sway.theta5_rad), math.tan(sway.theta6_rad)
         down = self.rope_m / math.sqrt(1.0 + along * along + across * across)
         self.load = (down * along, down * across, -down)
+        if self._sling:
+            p = self._p
+            self.slung = SlungLoad(self._sling, p.damping_ratio, p.g_m_s2, self.load)
 
     @property
     def rope_m(self) -> float:
@@ -162,6 +176,26 @@ class OverheadBoom:
 
     def advance(self, step_s: float) -> None:
         """Move on by step_s seconds."""
+        if not (slung := self.slung):
+            self._move(step_s)
+            return
+        part_s = step_s / PARTS
+        for _ in range(PARTS):  # half a pull, both on their ways, half a pull
+            self._pull(slung, 0.5 * part_s)
+            self._move(part_s)
+            slung.position = plus(slung.position, part_s, slung.rate)
+            self._pull(slung, 0.5 * part_s)
+
+    def _pull(self, slung: SlungLoad, part_s: float) -> None:
+        """Let the sling pull at the hook for part_s seconds; along the rope that takes it."""
+        bridge, trolley, _ = self.axes.values()
+        hook = plus((bridge.position, trolley.position, 0.0), 1.0, self.load)
+        rate = plus((bridge.speed, trolley.speed, 0.0), 1.0, self.rate)
+        change = slung.pull(part_s, hook, rate)
+        r = self.load
+        self.rate = plus(plus(self.rate, 1.0, change), -dot(r, change) / dot(r, r), r)
+
+    def _move(self, step_s: float) -> None:
         bridge, trolley, _ = self.axes.values()
         for axis in (bridge, trolley):
             axis.advance(step_s)
@@ -185,18 +219,18 @@ class OverheadBoom:
         )
         r, v, half = self.load, self.rate, 0.5 * step_s
         a1 = self._acceleration(r, v, start, ropes[0])
-        r2, v2 = _plus(r, half, v), _plus(v, half, a1)
+        r2, v2 = plus(r, half, v), plus(v, half, a1)
         a2 = self._acceleration(r2, v2, middle, ropes[1])
-        r3, v3 = _plus(r, half, v2), _plus(v, half, a2)
+        r3, v3 = plus(r, half, v2), plus(v, half, a2)
         a3 = self._acceleration(r3, v3, middle, ropes[1])
-        r4, v4 = _plus(r, step_s, v3), _plus(v, step_s, a3)
+        r4, v4 = plus(r, step_s, v3), plus(v, step_s, a3)
         a4 = self._acceleration(r4, v4, end, ropes[2])
         sixth = step_s / 6.0
-        r = _plus(_plus(_plus(_plus(r, sixth, v), 2 * sixth, v2), 2 * sixth, v3), sixth, v4)
-        v = _plus(_plus(_plus(_plus(v, sixth, a1), 2 * sixth, a2), 2 * sixth, a3), sixth, a4)
+        r = plus(plus(plus(plus(r, sixth, v), 2 * sixth, v2), 2 * sixth, v3), sixth, v4)
+        v = plus(plus(plus(plus(v, sixth, a1), 2 * sixth, a2), 2 * sixth, a3), sixth, a4)
         length, change = -hoist.position, -hoist.speed
-        self.load = r = _plus((0.0, 0.0, 0.0), length / math.sqrt(_dot(r, r)), r)
-        self.rate = _plus(v, (change * length - _dot(r, v)) / length**2, r)
+        self.load = r = plus((0.0, 0.0, 0.0), length / math.sqrt(dot(r, r)), r)
+        self.rate = plus(v, (change * length - dot(r, v)) / length**2, r)
 
     def _acceleration(
         self, r: Vector, v: Vector, trolley: Vector, hoist: tuple[float, float, float]
@@ -211,18 +245,6 @@ class OverheadBoom:
         """
         length, change, change_2 = (-one for one in hoist)
         pull = (-trolley[0], -trolley[1], -trolley[2] - self._p.g_m_s2)
-        tension = (_dot(r, pull) + _dot(v, v) - change**2 - length * change_2) / length**2
+        tension = (dot(r, pull) + dot(v, v) - change**2 - length * change_2) / length**2
         damping = 2.0 * self._p.damping_ratio * math.sqrt(self._p.g_m_s2 / length)
-        return _plus(_plus(pull, damping * change / length - tension, r), -damping, v)
-
-
-def _plus(first: Vector, factor: float, second: Vector) -> Vector:
-    return (
-        first[0] + factor * second[0],
-        first[1] + factor * second[1],
-        first[2] + factor * second[2],
-    )
-
-
-def _dot(first: Vector, second: Vector) -> float:
-    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+        return plus(plus(pull, damping * change / length - tension, r), -damping, v)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from canshaper_sim.actuator import Actuator, EndParameters
 from canshaper_sim.axes import HOIST, LIFT, SLEW
 from canshaper_sim.grapple import TipMotion
-from canshaper_sim.overhead import OverheadBoom, RopeParameters, Vector, drive
+from canshaper_sim.overhead import OverheadBoom, RopeParameters, drive
+from canshaper_sim.sling import Vector
 from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.valve import ValveParameters
 

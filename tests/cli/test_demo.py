@@ -8,10 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = sorted((ROOT / "config").glob("*.yaml"))
-JOINTS = {"slew", "lift_cylinder", "knuckle", "extension"}
 
 
 def demo(out: Path, *arguments: str, code: int = 0) -> tuple[str, Any]:
@@ -26,10 +26,10 @@ def demo(out: Path, *arguments: str, code: int = 0) -> tuple[str, Any]:
 def test_every_shipped_deployment_drives_its_own_axes_together(file: Path, tmp_path: Path) -> None:
     text, report = demo(tmp_path, str(file))
     assert "residual sway" in text
-    names = JOINTS if "joints" in file.stem else {"slew", "near_far", "lift"}
+    names = load_deployment(file).coordinates.keys()
     assert {name for name, axis in report["axes"].items() if axis["raw"]["time_to_95_s"]} == names
     crane = report["crane"]
-    assert crane["raw"]["residual_deg"] > 15.0
+    assert crane["raw"]["residual_deg"] > (15.0 if "forwarder" in file.stem else 7.0)
     assert crane["residual_reduction_pct"] > 75.0
     assert (tmp_path / "demo.png").stat().st_size > 50_000
 

@@ -72,8 +72,9 @@ def robust(
     quicker and slower responses. It takes minutes, and a C compiler.
 
     With --second it leaves a second mode in peace too, such as that of grapple and rotator with
-    long logs, and prints what that costs and gains. The picture, with --picture or --report, has
-    impulses, step and residual over length next to those of the filter in the file.
+    long logs or of hook and load, and prints what that costs and gains. The picture, with --picture
+    or --report, has impulses, step and residual over length next to those of the filter in the
+    file.
 
     Examples:
 

@@ -292,9 +292,14 @@ def _simulated(
 ) -> dict[str, str]:
     """Signals of the simulated crane, where no others are named."""
     moves = deployment.coordinates if deployment else {one: one for one in SIMULATED}
-    there = {a: SIMULATED[m] for a, m in moves.items() if m in SIMULATED and axis in (None, a)}
-    sent = {signal.partition(".")[0] for signal in there.values()}
-    if not there or any(isinstance(messages.find(one), str) for one in sent):
+    there = {
+        a: signal
+        for a, m in moves.items()
+        if axis in (None, a)
+        and (signal := SIMULATED.get(m))
+        and not isinstance(messages.find(signal.partition(".")[0]), str)
+    }
+    if not there:
         text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
         raise UsageError(text)
     return there

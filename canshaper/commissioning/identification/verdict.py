@@ -2,14 +2,19 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from canshaper.commissioning.identification.decay import LARGEST_RAD, DecayFit, fit_decay
+from canshaper.commissioning.identification.decay import (
+    LARGEST_RAD,
+    DecayFit,
+    DecayProblem,
+    fit_decay,
+)
 from canshaper.commissioning.identification.driven import DrivenFit, fit_driven
 from canshaper.commissioning.identification.driven_data import driven_s
-from canshaper.commissioning.identification.segments import SETTLING_S, find_free
+from canshaper.commissioning.identification.segments import SETTLING_S, FreeSwings, find_free
 from canshaper.commissioning.identification.series import Series, Value
 from canshaper.commissioning.identification.swing import SAMPLES, clipped, mixed
 
@@ -21,6 +26,8 @@ WIDEST_PERIOD = 0.03
 WIDEST_RATIO, WIDEST_RATIO_ABS = 0.4, 0.01
 # Largest swing that the correction for amplitude holds for, rad.
 LARGE_RAD = math.radians(60.0)
+# Longest period of a second swing, part of the first one's.
+SECOND_PERIODS = 0.8
 # Part of the driven swing that the commands have to explain.
 LEAST_EXPLAINED = 0.8
 LEAST_EXPLAINED_ALONE = 0.9
@@ -79,6 +86,8 @@ def identify(
         finding.problems = _faults(finding)
         if finding.free:
             finding.notes += _doubts(finding.free, usable=finding.usable)
+            if finding.usable:
+                finding.notes += _second(finding.free, good)
     return finding
 
 
@@ -146,6 +155,40 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
         finding.notes.append("no full speed: the signal is no angle and no rate of one")
     elif fit.full_speed_m_s.relative < 0.3:
         finding.full_speed_m_s = fit.full_speed_m_s
+
+
+def _second(first: DecayFit, series: Sequence[Series]) -> list[str]:
+    """Note on a quicker swing in what the first one leaves of its own stretches."""
+    omega = 2.0 * math.pi / first.period_s.value
+    x = np.array([omega, omega * first.damping_ratio.value])
+    best: FreeSwings | None = None
+    for one in series:
+        time, left = [one.time_s[:0]], [one.value[:0]]
+        for fit in first.segments:
+            own, at = fit.segment, one.time_s - fit.segment.start_s
+            inside = (at >= 0.0) & (at <= own.time_s[-1])
+            if own.source == one.source and inside.any():
+                basis, _ = DecayProblem([own], [float(fit.envelope[0])]).basis(0, x, at[inside])
+                found, *_ = np.linalg.lstsq(basis, one.value[inside], rcond=None)
+                time.append(one.time_s[inside])
+                left.append(one.value[inside] - basis @ found)
+        swings = find_free(replace(one, time_s=np.concatenate(time), value=np.concatenate(left)))
+        if swings and (best is None or swings.worth > best.worth):
+            best = swings
+    if best is None or best.period_s > SECOND_PERIODS * first.period_s.value:
+        return []
+    second = fit_decay(best.segments, best.period_s, best.damping_ratio)
+    period, ratio = second.period_s, second.damping_ratio
+    vague = period.relative > WIDEST_PERIOD or ratio.half > max(
+        WIDEST_RATIO * ratio.value, WIDEST_RATIO_ABS
+    )
+    if vague or second.swings < LEAST_SWINGS:
+        return []
+    option = f"{period.value:.3f},{max(ratio.value, 0.0):.3f},20"
+    return [
+        f"a second swing of {period.value:.3f} s, such as of a hook with its load:"
+        f" canshaper robust --second {option} leaves it in peace"
+    ]
 
 
 def _doubts(fit: DecayFit, *, usable: bool) -> list[str]:

@@ -20,10 +20,10 @@ LENGTHS = 25
 FINE = 4 * LENGTHS + 1  # at which the result is measured
 MOST_RANGE_PCT = 60.0
 # A second mode: with more damping it has died away after a swing; a faster one hardly swings, as
-# the valve takes two thirds of its period to full speed, and has no room between two ticks; of a
-# slower one the first pays too much.
+# the valve takes two thirds of its period to full speed, and has no room between two ticks; for one
+# beyond 0.4 of its period the first pays up to an eighth, or a response that is longer by a third.
 _SECOND_DAMPING = 0.4
-_SECOND_RISES, _SECOND_TICKS, _SECOND_PERIODS = 1.5, 10, 0.4
+_SECOND_RISES, _SECOND_TICKS, _SECOND_PERIODS = 1.5, 10, 0.8
 _SHORTEST_S = 0.25  # the fastest mode that can be modelled, with the largest range
 
 

@@ -67,6 +67,7 @@ def test_two_degrees_in_noise(grapple: Grapple, direction: int, seed: int) -> No
     time, angle = swung(grapple, 2.0, direction)
     finding = identify("slew", "", [noisy(time, angle, seed, 0.15)])
     check(finding, truth(grapple, direction), period=0.01, ratio=0.2)
+    assert not any("second swing" in note for note in finding.notes)
 
 
 @pytest.mark.slow

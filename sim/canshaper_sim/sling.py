@@ -1,0 +1,109 @@
+"""A load on a sling below a hook: with the rope a double pendulum; it may stand on the ground.
+
+The load is a point in the world, drawn by the sling while that is taut, carried by the ground and
+held by its friction while it stands there. Sling and ground are springs per kg of load, as stiff as
+the steps allow: some 6 mm under the load at rest. A drive feels nothing of it.
+"""
+
+import math
+from dataclasses import dataclass
+
+from canshaper_sim.ranges import check_ranges
+
+Vector = tuple[float, float, float]
+
+PARTS = 4  # of a step: the spring of a sling with a light hook has a period of 35 ms
+_OMEGA_RAD_S, _DAMPING_RATIO = 40.0, 0.3  # of sling and ground, stretched and pressed
+_FRICTION = 0.5  # between load and ground
+_STICKS_M_S = 0.01  # below which friction falls
+_ALLOWED = {
+    "length_m": (0.0, 20.0),
+    "load_ratio": (0.05, 20.0),
+    "ground_m": (1.0, math.inf),
+    "off_m": (-5.0, 5.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SlingParameters:
+    """A sling from the hook to the load."""
+
+    length_m: float = 0.0  # 0: they swing as one
+    load_ratio: float = 1.0  # mass of the load, masses of the hook
+    ground_m: float = math.inf  # below the trolley
+    off_m: float = 0.0  # at the start the load stands so far from the hook, along the runway
+
+    def __post_init__(self) -> None:
+        check_ranges("sling", self, _ALLOWED)
+
+
+class SlungLoad:
+    """The load: where it is, and what the sling does to both of its ends.
+
+    Args:
+        parameters: of the sling.
+        damping_ratio: of a swing about the hook.
+        g_m_s2: gravity.
+        hook: where the hook hangs, from the trolley, m; the load below it in line with the rope.
+
+    Attributes:
+        position: along the runway, along the bridge, upwards, from where the trolley began, m.
+        rate: its velocity, m/s.
+    """
+
+    def __init__(
+        self, parameters: SlingParameters, damping_ratio: float, g_m_s2: float, hook: Vector
+    ) -> None:
+        self._p, self._g = parameters, g_m_s2
+        self._damping = 2.0 * damping_ratio * math.sqrt(g_m_s2 / parameters.length_m)
+        hangs_m = parameters.length_m + g_m_s2 / _OMEGA_RAD_S**2
+        x, y, z = plus(hook, hangs_m / math.sqrt(dot(hook, hook)), hook)
+        self.position: Vector = (x + parameters.off_m, y, max(z, -parameters.ground_m))
+        self.rate: Vector = (0.0, 0.0, 0.0)
+
+    def pull(self, part_s: float, hook: Vector, hook_rate: Vector) -> Vector:
+        """Change the load's rate by what acts for part_s seconds.
+
+        Args:
+            part_s: how long.
+            hook: position, as that of the load.
+            hook_rate: its rate, m/s.
+
+        Returns:
+            by how much the rate of the hook changes, were it free.
+        """
+        x, y, z = held = self._held(plus(hook, -1.0, self.position), hook_rate)
+        vx, vy, vz = self.rate
+        pressed = -self._p.ground_m - self.position[2]
+        if pressed >= 0.0:
+            carried = max(_OMEGA_RAD_S * (_OMEGA_RAD_S * pressed - 2.0 * vz), 0.0)
+            # Friction, never more than what stops the load.
+            drag = min(_FRICTION * carried / max(math.hypot(vx, vy), _STICKS_M_S), 1.0 / part_s)
+            x, y, z = x - drag * vx, y - drag * vy, z + carried
+        self.rate = plus(self.rate, part_s, (x, y, z - self._g))
+        return plus((0.0, 0.0, 0.0), -part_s * self._p.load_ratio, held)
+
+    def _held(self, up: Vector, hook_rate: Vector) -> Vector:
+        """Return the pull of the sling at the load, m/s^2; none while it is slack."""
+        apart = math.sqrt(dot(up, up))
+        stretch = apart - self._p.length_m
+        if stretch <= 0.0:
+            return (0.0, 0.0, 0.0)
+        rate = plus(hook_rate, -1.0, self.rate)
+        closing = 2.0 * _DAMPING_RATIO * dot(up, rate) / apart
+        spring = max(_OMEGA_RAD_S * (_OMEGA_RAD_S * stretch + closing), 0.0) / apart
+        return plus(plus((0.0, 0.0, 0.0), spring, up), self._damping, rate)
+
+
+def plus(first: Vector, factor: float, second: Vector) -> Vector:
+    """Return the first and so many times the second."""
+    return (
+        first[0] + factor * second[0],
+        first[1] + factor * second[1],
+        first[2] + factor * second[2],
+    )
+
+
+def dot(first: Vector, second: Vector) -> float:
+    """Return their product."""
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
