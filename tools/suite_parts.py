@@ -55,26 +55,40 @@ def no_lane() -> str | None:
     return done.stderr.strip().split("\n")[-1].removeprefix("lane: ") if done.returncode else None
 
 
-def no_chromium() -> str | None:
-    """Install Chromium where it is absent; return why there is none, if so."""
+def _no_program(tools: dict[str, str]) -> str | None:
+    """Install the Debian packages of absent programs; return why they cannot be had, if so."""
     try:
         with cache_lock():
-            install(missing({"chromium": "chromium"}))
+            install(missing(tools))
     except NoLane as error:
         return str(error)
     return None
 
 
+def no_chromium() -> str | None:
+    """Install Chromium where it is absent; return why there is none, if so."""
+    return _no_program({"chromium": "chromium"})
+
+
+def no_target() -> str | None:
+    """Install compiler and emulator of a Cortex-M; return why there are none, if so."""
+    tools = {"qemu-system-arm": "qemu-system-arm", "arm-none-eabi-gcc": "gcc-arm-none-eabi"}
+    if not NEWLIB.exists():  # the compiler's package only recommends it
+        tools["its C library"] = "libnewlib-arm-none-eabi"
+    return _no_program(tools)
+
+
 FOREIGN = BIN.parent / "foreign"
+NEWLIB = Path("/usr/lib/arm-none-eabi/newlib")
 
 
 def no_foreign() -> str | None:
-    """Install other readers of exported files apart; return why they cannot be had, if so.
+    """Install what reads exports of others' kinds apart; return why it cannot be had, if so.
 
     Wherever python-can finds asammdf, every start takes a third of a second more.
     """
-    names = ["asammdf", "foxglove-sdk"]
-    if FOREIGN.is_dir():
+    names = ["asammdf", "fmpy>=0.3.20", "foxglove-sdk"]
+    if (FOREIGN / "fmpy").is_dir():
         return None
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(FOREIGN), *names]
     done = subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, check=False)
@@ -152,18 +166,35 @@ def rows_of_more() -> list[list[Part]]:
     cover = [pytest(*SPREAD, few, "-m", "not slow", "--cov", "--cov-report=term", *gate)]
     core = [[sys.executable, "tools/mutation.py", f"-j{JOBS}", "core"]]
     service = [[sys.executable, "-m", "tests.lane.services", "-q"]]
-    slow = pytest(*SPREAD, "-m", "slow and not study", "--ignore=tests/proof")
+    slow = pytest(
+        *SPREAD,
+        "-m",
+        "slow and not study",
+        "--ignore=tests/proof",
+        "--ignore=tests/native/test_target.py",
+    )
     study = pytest(*SPREAD, "-m", "study")
     proof = pytest(*SPREAD, "tests/proof")
     apart = {"PYTHONPATH": str(FOREIGN)}
-    files = ("tests/recording/test_mcap.py", "tests/recording/test_mf4.py")
+    files = [
+        f"tests/{one}.py"
+        for one in ("recording/test_mcap", "recording/test_mf4", "native/test_fmu")
+    ]
     return [
         [Part("types", "mypy, import contracts", types)],
         [Part("coverage", "every line and branch of what decides whether a valve moves", cover)],
         [Part("mutation-core", "a test notices every small change of the core", core)],
         [Part("proof", "rules of the gate, for all numbers", [proof])],
         [Part("slow", "tests of a second and more", [slow])],
-        [Part("exports", "MCAP, MF4 by others", [pytest(*files)], no_foreign, apart)],
+        [
+            Part(
+                "target",
+                "self-test of an export on an emulated Cortex-M4F",
+                [pytest("tests/native/test_target.py")],
+                no_target,
+            )
+        ],
+        [Part("exports", "MCAP, MF4, FMI by others", [pytest(*files)], no_foreign, apart)],
         [
             Part(
                 "socketcan-all",

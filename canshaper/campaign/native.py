@@ -119,7 +119,7 @@ class NativeCrane:
     def has(self, setting: Setting) -> bool:
         """Whether the C has a part for all of the crane that was drawn."""
         parameters = setting.options["parameters"]
-        return parameters is not None and _simple(parameters)
+        return parameters is not None and is_simple(parameters)
 
     def frames(self, setting: Setting) -> Packed:
         """Joystick frames of a drive."""
@@ -155,22 +155,20 @@ class NativeCrane:
         counts, frames = packed
         ticks = len(counts)
         loads = [*options.get("loads", ())]
-        steps = math.ceil(tick_ms / 1000.0 / INTERNAL_STEP_S - 1e-9)
         drive = _Drive(
-            step_s=tick_ms / 1000.0 / steps,
+            **steps_of(tick_ms),
             tick_ms=tick_ms,
-            steps=steps,
             ticks=ticks,
             loads=len(loads),
             radius=self._sends_radius,
             sway=(*(options.get("sway") or (0.0,) * 4),),
             valve=tuple(
-                _valve(parameters, axis, wired)
+                _Valve(**valve_numbers(parameters, axis), **wired)
                 for axis, wired in zip(TIP_AXES, self._wiring, strict=True)
             ),
         )
-        empty = np.array(_grapple(parameters.grapple))
-        loaded = np.array([[at, *_grapple(one)] for at, one in loads])
+        empty = np.array(grapple_numbers(parameters.grapple))
+        loaded = np.array([[at, *grapple_numbers(one)] for at, one in loads])
         out = np.zeros((10, ticks))
         pointers = (array.ctypes.data_as(ctypes.c_void_p) for array in (empty, loaded))
         after = (array.ctypes.data_as(ctypes.c_void_p) for array in (counts, frames, out))
@@ -229,26 +227,33 @@ def _wiring(deployment: Deployment, axis: str | None) -> dict[str, int]:
     return {"axis": number, "zero": reader.zero, "step": reader.step, "full": reader.full}
 
 
-def _valve(parameters: CraneParameters, axis: str, wired: dict[str, int]) -> _Valve:
+def steps_of(tick_ms: int) -> dict[str, Any]:
+    """How a tick is divided for the crane."""
+    steps = math.ceil(tick_ms / 1000.0 / INTERNAL_STEP_S - 1e-9)
+    return {"step_s": tick_ms / 1000.0 / steps, "steps": steps}
+
+
+def valve_numbers(parameters: CraneParameters, axis: str) -> dict[str, float]:
+    """Return the valve of an axis, its full speed and its ends, in the order of the C."""
     number = TIP_AXES.index(axis)
     of = (("slew", "theta1_rad", "rad"), ("radius", "radius_m", "m"), ("height", "height_m", "m"))
     name, start, unit = of[number]
     valve: ValveParameters = getattr(parameters, axis)
-    return _Valve(
+    return {
         **{one: getattr(valve, one) for one in _VALVE},
-        full_speed=getattr(parameters, FULL_SPEEDS[axis]),
-        start=getattr(parameters, f"start_{start}"),
-        low=getattr(parameters, f"{name}_min_{unit}"),
-        high=getattr(parameters, f"{name}_max_{unit}"),
-        **wired,
-    )
+        "full_speed": getattr(parameters, FULL_SPEEDS[axis]),
+        "start": getattr(parameters, f"start_{start}"),
+        "low": getattr(parameters, f"{name}_min_{unit}"),
+        "high": getattr(parameters, f"{name}_max_{unit}"),
+    }
 
 
-def _grapple(grapple: Grapple) -> Sequence[float]:
+def grapple_numbers(grapple: Grapple) -> Sequence[float]:
+    """Return a grapple in the order of the C."""
     return [getattr(grapple, name) for name in _GRAPPLE]
 
 
-def _simple(p: CraneParameters) -> bool:
+def is_simple(p: CraneParameters) -> bool:
     """Whether the C has all that this crane does."""
     valves = [getattr(p, axis) for axis in TIP_AXES]
     compensated = not any(getattr(one, name) for one in valves for name in _UNCOMPENSATED)

@@ -1,16 +1,19 @@
 """``canshaper export``: the C of one machine, with a golden drive as its self-test."""
 
 import hashlib
+import json
 import shutil
 from pathlib import Path
 
 from canshaper.errors import ConfigError, UsageError
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.identity import program_sha256
 from canshaper.machine.stopping import rehearsed_valves, unstated
 from canshaper.native.golden import EVERY, TICKS, Golden, golden_drive, golden_source, in_float
 from canshaper.native.library import C_FILES
 from canshaper.native.source import sizes_source, tables_source
 from canshaper.native.tables import Numbers, tables
+from canshaper.shipped import version
 
 FLAGS = "-std=c99 -ffp-contract=off"
 LEFT_OUT = "status, identity and aim messages, feedback of the valves, numbers that may be changed"
@@ -58,6 +61,8 @@ every {every}th tick, have to be those that were computed here. Run it on the ta
 Numbers of the buses: {buses}. Left out, as no valve frame hangs on them: {left_out}.
 
 {identity}
+
+`sbom.cdx.json` has the hash of every file.
 """
 
 
@@ -78,11 +83,7 @@ def export(deployment: Deployment, out: Path, *, single: bool) -> list[str]:
         UsageError: the folder has files.
     """
     numbers = tables(deployment)
-    faults = [*unstated(deployment), *rehearsed_valves(deployment.config)]
-    if faults:
-        raise ConfigError([deployment.source.problem(*one) for one in faults])
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise UsageError(f"--out: expected a new or empty folder, got {out}")
+    check_exported(deployment, out)
     golden, precision = golden_drive(deployment), DOUBLE
     if single:
         golden, differ = in_float(deployment, golden)
@@ -100,7 +101,22 @@ def export(deployment: Deployment, out: Path, *, single: bool) -> list[str]:
     }
     for name, text in files.items():
         (out / name).write_text(text, encoding="utf-8")
+    (out / "sbom.cdx.json").write_text(_bill(deployment, out), encoding="utf-8")
     return [precision.replace("`", ""), f"make -C {out} && {out}/selftest"]
+
+
+def check_exported(deployment: Deployment, out: Path) -> None:
+    """Look whether a deployment may be exported into a folder.
+
+    Raises:
+        ConfigError: ``canshaper run`` would not begin.
+        UsageError: the folder has files.
+    """
+    faults = [*unstated(deployment), *rehearsed_valves(deployment.config)]
+    if faults:
+        raise ConfigError([deployment.source.problem(*one) for one in faults])
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise UsageError(f"--out: expected a new or empty folder, got {out}")
 
 
 def _readme(deployment: Deployment, numbers: Numbers, golden: Golden, precision: str) -> str:
@@ -109,7 +125,6 @@ def _readme(deployment: Deployment, numbers: Numbers, golden: Golden, precision:
         f"| {name} | {number} | {table['valve']} | {axis.valve_message.name} |"
         for number, ((name, axis), table) in enumerate(axes)
     ]
-    identity = [*deployment.identity.lines(), f"c=sha256:{_hash()}"]
     return README.format(
         name=deployment.path.name,
         ticks=TICKS,
@@ -120,13 +135,22 @@ def _readme(deployment: Deployment, numbers: Numbers, golden: Golden, precision:
         axes="\n".join(rows),
         buses=", ".join(f"{name} {k}" for k, name in enumerate(deployment.config.buses)),
         left_out=LEFT_OUT,
-        identity="\n".join(f"    {line}" for line in identity),
+        identity="\n".join(f"    {line}" for line in deployment.identity.lines()),
     )
 
 
-def _hash() -> str:
-    """SHA-256 of the C, which is the same for every machine."""
-    total = hashlib.sha256()
-    for path in sorted(C_FILES.rglob("*.[ch]")):
-        total.update(f"{path.relative_to(C_FILES).as_posix()}\n".encode() + path.read_bytes())
-    return total.hexdigest()
+def _bill(deployment: Deployment, out: Path) -> str:
+    """What a folder is made of, in CycloneDX 1.6: deployment, program, and every file of it."""
+    identity = deployment.identity
+    made_of = {deployment.path.name: identity.deployment, **identity.dbc}
+    for path in sorted(one for one in out.rglob("*") if one.is_file()):
+        made_of[path.relative_to(out).as_posix()] = hashlib.sha256(path.read_bytes()).hexdigest()
+
+    def component(kind: str, name: str, digest: str) -> dict[str, object]:
+        return {"type": kind, "name": name, "hashes": [{"alg": "SHA-256", "content": digest}]}
+
+    program = component("application", "canshaper", program_sha256()) | {"version": version()}
+    about = {"component": {"type": "library", "name": f"{deployment.path.name} as C99"}}
+    bill = {"bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1, "metadata": about}
+    components = [program, *(component("file", *one) for one in made_of.items())]
+    return json.dumps({**bill, "components": components}, indent=1) + "\n"

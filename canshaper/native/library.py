@@ -70,17 +70,23 @@ def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -
     (folder / "cs_tables.c").write_text(tables_source(numbers), encoding="ascii")
     library = folder / "canshaper.so"
     files = [*sources.glob("src/*.c"), sources / "test/cs_inspect.c", folder / "cs_tables.c"]
-    command = [*compiler(), *FLAGS, *more, "-shared", "-fPIC", f"-I{folder}", f"-I{sources}/src"]
+    compile_library(files, library, *more, f"-I{folder}", f"-I{sources}/src")
+    return library
+
+
+def compile_library(files: Iterable[Path], library: Path, *more: str) -> None:
+    """Compile C into a shared library; ``more``: flags besides the usual ones, and C files.
+
+    Raises:
+        NativeError: there is no compiler, or it fails.
+    """
+    command = [*compiler(), *FLAGS, *more, "-shared", "-fPIC", *map(str, files)]
     done = subprocess.run(
-        [*command, *map(str, files), "-o", str(library), "-lm"],
-        capture_output=True,
-        text=True,
-        check=False,
+        [*command, "-o", str(library), "-lm"], capture_output=True, text=True, check=False
     )
     if done.returncode:
         why = " ".join(done.stderr.split())[:500] or f"exit code {done.returncode}"
         raise NativeError(f"{command[0]} failed: {why}; CC may name another one")
-    return library
 
 
 def _content(numbers: Numbers, sources: Path, more: Iterable[str]) -> str:

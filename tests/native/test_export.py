@@ -1,17 +1,23 @@
 """``canshaper export``: what it writes is built by make and CMake, and tests itself."""
 
+import json
 import re
 import shutil
 import subprocess
+import zipfile
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.cli.common import EXIT_WRONG
+from canshaper.machine.identity import program_sha256
 from tests.native.judge import needs_compiler
-from tests.rigs.files import ROOT
+from tests.rigs.files import CONFIG, ROOT, read
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -118,8 +124,22 @@ def test_in_float_it_says_what_differs(tmp_path: Path) -> None:
 def test_the_readme_names_the_deployment_and_the_program(exported: Path) -> None:
     text = (exported / "README.md").read_text(encoding="utf-8")
     assert "| near_far | 1 | 1 | NearFarCommand |" in text
-    for name in ("digest=0x", "program=sha256:", "deployment=sha256:", "dbc=sha256:", "c=sha256:"):
+    for name in ("digest=0x", "program=sha256:", "deployment=sha256:", "dbc=sha256:"):
         assert f"\n    {name}" in text
+
+
+def test_the_bill_of_materials_has_every_file(exported: Path) -> None:
+    text = (exported / "sbom.cdx.json").read_text(encoding="utf-8")
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
+    hashes = {one["name"]: one["hashes"][0]["content"] for one in json.loads(text)["components"]}
+    identity = read(CONFIG / "forwarder-gff.yaml").identity
+    assert hashes.pop("canshaper") == program_sha256()
+    assert hashes.pop("forwarder-gff.yaml") == identity.deployment
+    assert [hashes.pop(name) for name in identity.dbc] == list(identity.dbc.values())
+    files = {one for one in exported.rglob("*") if one.is_file()} - {exported / "sbom.cdx.json"}
+    assert hashes == {
+        str(one.relative_to(exported)): sha256(one.read_bytes()).hexdigest() for one in files
+    }
 
 
 def test_a_folder_with_files_is_left_alone(tmp_path: Path) -> None:
@@ -145,3 +165,40 @@ def test_a_stop_over_a_way_that_is_not_stated_is_refused(tmp_path: Path) -> None
     code, text = run(str(tmp_path / "machine.yaml"), "--out", str(tmp_path / "axis"))
     assert code == EXIT_WRONG
     assert "axes.slew.limits.stop_distance_m: missing: to stop, the limits allow" in text
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "text"),
+    [
+        (
+            "forwarder.yaml",
+            ("--fmu", "plant", "--float"),
+            "--fmu: expected controller or plant, without --float",
+        ),
+        ("forwarder-sensor.yaml", ("--fmu", "controller"), "axes.slew.sway_sensor: expected none"),
+        ("forwarder-joints.yaml", ("--fmu", "plant"), "crane: expected one crane moved by its tip"),
+    ],
+)
+def test_a_unit_that_c_has_no_part_for_is_refused(
+    tmp_path: Path, file: str, options: tuple[str, ...], text: str
+) -> None:
+    code, said = run(file, "--out", str(tmp_path / "unit"), *options)
+    assert code == EXIT_WRONG
+    assert text in said
+    assert not (tmp_path / "unit").exists()
+
+
+def test_a_unit_without_a_compiler_has_its_sources(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "absent-cc")
+    code, said = run("forwarder.yaml", "--out", str(tmp_path / "unit"), "--fmu", "controller")
+    assert code == 0
+    assert "without a binary, its sources are to be compiled: CC: expected a C compiler" in said
+    with zipfile.ZipFile(tmp_path / "unit/controller.fmu") as archive:
+        names = archive.namelist()
+        built = archive.read("sources/buildDescription.xml").decode()
+    assert [one for one in names if one.startswith("binaries")] == []
+    assert {f"sources/{one}" for one in re.findall(r'SourceFile name="(.+?)"', built)} == {
+        one for one in names if one.endswith(".c")
+    }

@@ -51,6 +51,7 @@ def test_the_wheel_has_pages_manuals_and_licences(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     assert "canshaper/data/site/index.html" in names
     assert "canshaper/native/c/src/canshaper.h" in names
+    assert "canshaper/native/fmu/cs_fmu.c" in names
     manuals = {name.rpartition("/")[2] for name in names if "/share/man/man1/" in name}
     verbs = Verbs(name="canshaper").list_commands(None)
     assert manuals == {"canshaper.1", *(f"canshaper-{verb}.1" for verb in verbs)}

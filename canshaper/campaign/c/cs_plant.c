@@ -2,11 +2,12 @@
 
    The same operations in the same order as valve.py, actuator.py, tip_boom.py and grapple.py, so that a drive is equal
    to the last bit. What is not here (pump, cushions, carrier, wind, contact, log, joints, ropes) native.py does not
-   bring here. */
+   bring here. With CS_CRANE_ALONE it is the crane without the controller. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "cs_internal.h"
 
 enum { SLEW, NEAR_FAR, LIFT, COORDINATES };
 #define PENDING 256 /* changes of a command within the longest dead time, 0.2 s, of ticks of 1 ms */
@@ -19,13 +20,6 @@ typedef struct {
     int32_t axis, zero, step, full;
 } plant_valve;
 typedef struct { double l1, l2, m1, m2, c5, c6, g; } plant_grapple;
-typedef struct { double time_s; plant_grapple grapple; } plant_load;
-typedef struct {
-    plant_valve valve[COORDINATES];
-    double sway[4], step_s;
-    int64_t tick_ms;
-    int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
-} plant_drive;
 
 typedef struct {
     const plant_valve *p;
@@ -189,6 +183,56 @@ static void swing(const plant_grapple *q, double *x, double h, const tip_motion 
     }
 }
 
+typedef struct {
+    actuator a[COORDINATES];
+    double decay[COORDINATES], x[4], step_s;
+    int32_t steps; /* of a tick */
+} crane_state;
+
+static void crane_begin(crane_state *s, const plant_valve *valve, const double *sway, double step_s, int32_t steps)
+{
+    memset(s, 0, sizeof(*s));
+    memcpy(s->x, sway, sizeof(s->x));
+    s->step_s = step_s;
+    s->steps = steps;
+    for (int32_t i = 0; i < COORDINATES; i++) {
+        s->a[i].p = &valve[i];
+        s->a[i].position = valve[i].start;
+        s->decay[i] = exp(-(0.5 * step_s) / valve[i].lag);
+    }
+}
+
+/* One tick with the commands that the valves have. Returns whether the grapple is above the horizontal. */
+static bool crane_tick(crane_state *s, const plant_grapple *q)
+{
+    actuator *a = s->a;
+    for (int32_t n = 0; n < s->steps; n++) {
+        tip_motion t[3];
+        t[0] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, 0.0, a[SLEW].speed, 0.0, 0.0};
+        for (int32_t i = 0; i < COORDINATES; i++) { advance(&a[i], s->step_s, s->decay[i]); }
+        t[0].radius_acc = a[NEAR_FAR].start_acc;
+        t[0].slew_acc = a[SLEW].start_acc;
+        t[0].height_acc = a[LIFT].start_acc;
+        t[1] = (tip_motion){a[NEAR_FAR].middle_position, a[NEAR_FAR].middle_speed, a[NEAR_FAR].middle_acc,
+                            a[SLEW].middle_speed, a[SLEW].middle_acc, a[LIFT].middle_acc};
+        t[2] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, a[NEAR_FAR].end_acc,
+                            a[SLEW].speed, a[SLEW].end_acc, a[LIFT].end_acc};
+        swing(q, s->x, s->step_s, t);
+    }
+    return (fabs(s->x[0]) > HORIZONTAL) || (fabs(s->x[1]) > HORIZONTAL);
+}
+
+#ifndef CS_CRANE_ALONE
+#include "cs_internal.h"
+
+typedef struct { double time_s; plant_grapple grapple; } plant_load;
+typedef struct {
+    plant_valve valve[COORDINATES];
+    double sway[4], step_s;
+    int64_t tick_ms;
+    int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
+} plant_drive;
+
 /* A valve decodes for itself: what the DBC says of the bits. */
 static int64_t number_in(const cs_field *f, const uint8_t *data)
 {
@@ -243,19 +287,15 @@ int32_t cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_l
 {
     cs_controller s;
     cs_frame frames[CS_VALVES];
-    actuator a[COORDINATES];
-    double decay[COORDINATES], x[4], h = d->step_s;
+    crane_state crane;
+    actuator *a = crane.a;
+    const double *x = crane.x;
     const plant_grapple *q = empty;
-    int32_t next = 0;
+    int32_t next = 0, driven = 0;
+    bool over = false;
     cs_init(&s, &cs_tables);
-    memset(a, 0, sizeof(a));
-    memcpy(x, d->sway, sizeof(x));
-    for (int32_t i = 0; i < COORDINATES; i++) {
-        a[i].p = &d->valve[i];
-        a[i].position = d->valve[i].start;
-        decay[i] = exp(-(0.5 * h) / d->valve[i].lag);
-    }
-    for (int32_t k = 0; k < d->ticks; k++) {
+    crane_begin(&crane, d->valve, d->sway, d->step_s, d->steps);
+    for (int32_t k = 0; (k < d->ticks) && !over; k++) {
         int64_t ms = k * d->tick_ms, now = ms * 1000000;
         while ((next < d->loads_n) && ((double)ms >= (1000.0 * load[next].time_s))) { q = &load[next++].grapple; }
         if ((k > 0) && d->radius) { send_radius(&s, a[NEAR_FAR].position, now); }
@@ -269,24 +309,12 @@ int32_t cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_l
             out[((7 + i) * d->ticks) + k] = command;
             set_command(&a[i], command);
         }
-        for (int32_t n = 0; n < d->steps; n++) {
-            tip_motion t[3];
-            t[0] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, 0.0, a[SLEW].speed, 0.0, 0.0};
-            for (int32_t i = 0; i < COORDINATES; i++) { advance(&a[i], h, decay[i]); }
-            t[0].radius_acc = a[NEAR_FAR].start_acc;
-            t[0].slew_acc = a[SLEW].start_acc;
-            t[0].height_acc = a[LIFT].start_acc;
-            t[1] = (tip_motion){a[NEAR_FAR].middle_position, a[NEAR_FAR].middle_speed, a[NEAR_FAR].middle_acc,
-                                a[SLEW].middle_speed, a[SLEW].middle_acc, a[LIFT].middle_acc};
-            t[2] = (tip_motion){a[NEAR_FAR].position, a[NEAR_FAR].speed, a[NEAR_FAR].end_acc,
-                                a[SLEW].speed, a[SLEW].end_acc, a[LIFT].end_acc};
-            swing(q, x, h, t);
-        }
+        over = crane_tick(&crane, q);
         double row[7] = {a[SLEW].position, a[NEAR_FAR].position, a[SLEW].speed, a[NEAR_FAR].speed, a[LIFT].speed, x[0], x[1]};
         for (int32_t i = 0; i < 7; i++) { out[(i * d->ticks) + k] = row[i]; }
-        if ((fabs(x[0]) > HORIZONTAL) || (fabs(x[1]) > HORIZONTAL)) { return k + 1; }
+        driven = k + 1;
     }
-    return d->ticks;
+    return driven;
 }
 
 /* What the crane needs of the mathematics library, to be held against Python's. */
@@ -296,3 +324,4 @@ void cs_functions(double x, double *out)
     out[1] = cos(x);
     out[2] = exp(-fabs(x));
 }
+#endif

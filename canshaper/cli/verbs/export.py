@@ -1,10 +1,11 @@
-"""``canshaper export``: the tuned axes of a machine as C99."""
+"""``canshaper export``: the tuned axes of a machine as C99, or as a unit for co-simulation."""
 
 from pathlib import Path
 
 import typer
 
 from canshaper.cli.common import FILE, echo, loader
+from canshaper.errors import UsageError
 
 GROUP = "design"
 
@@ -13,6 +14,9 @@ def export(
     file: str = FILE,
     out: Path = typer.Option(..., "--out", metavar="DIR", help="A new or empty folder."),
     single: bool = typer.Option(False, "--float", help="In float; it needs a C compiler here."),
+    fmu: str | None = typer.Option(
+        None, "--fmu", help="controller or plant: as one FMI 3.0 co-simulation unit, in double."
+    ),
 ) -> None:
     """Write the axes and their motion as C99, for a controller without Python.
 
@@ -21,13 +25,28 @@ def export(
     is refused by its key. The folder has a golden drive as self-test, for the target too:
     make -C axis && axis/selftest.
 
+    With --fmu it is a unit for other simulators: the same C, or the simulated crane.
+
     Examples:
 
       canshaper export machine.yaml --out axis
 
       canshaper export machine.yaml --out axis --float
-    """
-    from canshaper.native.export import export as write
 
-    for line in write(loader(file)(), out, single=single):
+      canshaper export machine.yaml --out unit --fmu controller
+    """
+    if fmu is None:
+        from canshaper.native.export import export as write
+
+        lines = write(loader(file)(), out, single=single)
+    elif single or fmu not in ("controller", "plant"):
+        raise UsageError(f"--fmu: expected controller or plant, without --float, got {fmu}")
+    else:
+        from canshaper.campaign.fmu import plant_unit
+        from canshaper.native.fmu import controller_unit, write_fmu
+
+        unit_of = plant_unit if fmu == "plant" else controller_unit
+        deployment = loader(file)()
+        lines = [write_fmu(unit_of(deployment), deployment, out)]
+    for line in lines:
         echo(line)
