@@ -231,7 +231,7 @@ static void send_radius(cs_controller *s, double radius, int64_t now)
         double least = f->is_signed ? -ldexp(1.0, bits) : 0.0;
         double raw = fmin(fmax(rint((radius - m->radius.offset) / m->radius.scale), least), ldexp(1.0, bits) - 1.0);
         uint8_t data[CS_BYTES] = {0};
-        cs_field_write(f, data, (int64_t)raw);
+        cs_field_write(f, data, (int32_t)raw);
         cs_receive(s, &cs_tables, m->message.bus, m->message.id, m->message.extended, data, m->message.length, now);
     }
 }
