@@ -47,6 +47,7 @@ void cs_demand_add(cs_axis *a, const cs_axis_config *c, cs_real demand, bool dri
 void cs_demand_age(cs_axis *a, const cs_axis_config *c, int32_t ticks);
 void cs_allowed_range(const cs_axis *a, const cs_axis_config *c, cs_real *low, cs_real *high);
 cs_real cs_rate_limited(cs_real target, cs_real last, const cs_axis_config *c);
+cs_real cs_velocity(const cs_axis_config *c, cs_real command);
 void cs_on_grid(cs_output *out, const cs_axis_config *c, cs_real low, cs_real high);
 cs_real cs_small_stroke(cs_axis *a, const cs_axis_config *c, cs_real command, cs_real target, cs_real low, cs_real high);
 
