@@ -29,7 +29,7 @@ from canshaper_sim.strokes import Script
 from canshaper_sim.valve import ValveParameters
 from canshaper_sim.valve_frames import CommandReader
 
-PLANT = Path(__file__).with_name("c") / "cs_plant.c"
+SOURCES = Path(__file__).with_name("c")
 PROBES = 256  # of sine, cosine and exponential function, which libraries round differently
 _FRAME = np.dtype(
     [("id", "u4"), ("bus", "i4"), ("length", "i4"), ("extended", "?"), ("data", "u1", 8)],
@@ -90,7 +90,7 @@ class NativeCrane:
 
     Args:
         deployment: the machine.
-        plant: the C of the crane.
+        sources: folder of the C of crane and measures.
         keeps: what is compiled, for the next time.
 
     Raises:
@@ -98,9 +98,10 @@ class NativeCrane:
         NativeError: it cannot be compiled here, or its arithmetic is another one.
     """
 
-    def __init__(self, deployment: Deployment, plant: Path = PLANT, *, keeps: bool = True) -> None:
-        measures = PLANT.with_name("cs_measure.c")
-        files = (f"-I{PLANT.parent}", str(plant), str(measures))
+    def __init__(
+        self, deployment: Deployment, sources: Path = SOURCES, *, keeps: bool = True
+    ) -> None:
+        files = (f"-I{sources}", f"{sources}/cs_plant.c", f"{sources}/cs_measure.c")
         library = NativeLibrary(deployment, *files, cache=_cache_folder() if keeps else None)
         self._c, self._deployment = library.c, deployment
         self._buses = library.buses
