@@ -42,6 +42,14 @@ def test_it_is_so_in_a_long_drive_behind_the_gate(name: str) -> None:
     assert wrong == ""
 
 
+@pytest.mark.study
+@pytest.mark.parametrize("name", SHIPPED)
+def test_it_is_so_in_ten_million_ticks(name: str) -> None:
+    """Of all machines together; half an hour of a processor."""
+    c, ticks = NativeController(shipped(name)), -(-10_000_000 // len(SHIPPED))
+    assert difference(read(CONFIG / f"{name}.yaml"), c, "ten million", ticks)[0] == ""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VARIANTS)
 def test_the_c_is_the_controller_for_every_part(name: str, machine: Machine) -> None:
