@@ -12,27 +12,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-import numpy as np
-from numpy.typing import NDArray
-
-from canshaper.campaign.draw import Setting, draw_drive, driven_axes
-from canshaper.campaign.native import NativeCrane, Packed
+from canshaper.campaign.draw import Setting, draw_drive
+from canshaper.campaign.native import NativeCrane
 from canshaper.campaign.run import Source, loaded
 from canshaper.campaign.statistics import Quantile, quantile
 from canshaper.commissioning.robust import RobustDesign, design_robust
 from canshaper.config.filters import filter_of
 from canshaper.config.limits import Sway
-from canshaper.design.lockstep import driven_part
 from canshaper.design.parallel import Processes
 from canshaper.design.profiles import swinging_axis
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import OnProgress
-from canshaper.report.strokes import residual_window, rests
 from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.parameters import changed_parameters
-from canshaper_sim.recorder import dwell_s
-from canshaper_sim.recording import AxisTrace, Recording
 
 # Seeds of the drives that choose and of those that judge; a campaign begins with 0.
 CHOOSING = range(1_000_000, 1_000_400)
@@ -43,8 +36,6 @@ _WORST = 0.05
 _MIDDLES = (0.15, 0.3, 0.45)
 _RANGES = (0.1, 0.2, 0.3)
 _DURATIONS = (0.8, 0.9, 1.0, 1.1, 1.2)  # of the front, of the response that is asked for
-_Drive = tuple[Setting, Packed, NDArray[np.int64]]
-"""What is driven, its joystick frames, and the ticks in which swing is residual."""
 
 
 @dataclass(frozen=True)
@@ -229,46 +220,20 @@ def _left(source: Source, seeds: range, candidate: Candidate | None) -> list[flo
     deployment = source.load()
     if candidate:
         deployment = fitted(deployment, _designs(deployment, candidate))
-    native = NativeCrane(deployment, keeps=False)
-    left = []
-    for setting, packed, window in _drives(source.path, source.files, seeds):
-        columns, _ = native.drive(setting, packed)
-        across, along = np.degrees(columns[5]), np.degrees(columns[6])
-        swing = np.hypot(across, along)
-        over = len(swing) < len(packed[0])
-        left.append(float(np.max(swing if over else swing[window])))
-    return left
+    native, nominal = NativeCrane(deployment, keeps=False), changed_parameters([], deployment)
+    driven = (native.drive(one, nominal) for one in _drives(source.path, source.files, seeds))
+    left = (one["peak_deg" if over else "residual_deg"] for one, over in driven)
+    return [one for one in left if one is not None]
 
 
 @cache
-def _drives(path: str, files: tuple[tuple[str, bytes], ...], seeds: range) -> list[_Drive]:
+def _drives(path: str, files: tuple[tuple[str, bytes], ...], seeds: range) -> list[Setting]:
     """Drives without a fault of bus or sensor, drawn once in a process."""
     deployment = loaded(path, files)
-    native = NativeCrane(deployment)
-    nominal = changed_parameters([], deployment)
+    native, nominal = NativeCrane(deployment), changed_parameters([], deployment)
     drawn = [draw_drive(deployment, s, deployment.config.uncertainty, nominal) for s in seeds]
-    drives = []
-    for setting in drawn:
-        if not setting.fault and native.has(setting):
-            frames = native.frames(setting)
-            if len(window := _window(deployment, setting, frames)):
-                drives.append((setting, frames, window))
+    drives = [one for one in drawn if not one.fault and native.has(one)]
     if not drives:
         text = "expected drives that the C has all parts for, got none"
         raise DesignError(f"--fleet: uncertainty: {text}")
     return drives
-
-
-def _window(deployment: Deployment, setting: Setting, packed: Packed) -> NDArray[np.int64]:
-    """Ticks in which swing is residual, see ``crane_metrics``."""
-    driven = driven_part(deployment, driven_axes(deployment)[0])
-    tick_s = deployment.config.tick_ms / 1000.0
-    t_s = [k * tick_s for k in range(len(packed[0]))]
-    hands = {
-        name: [setting.script.command(name, one) for one in t_s] for name in driven.coordinates
-    }
-    axes = {name: AxisTrace(own, own, own, None) for name, own in hands.items()}
-    recording = Recording(t_s, axes, None, dwell_s(driven))
-    still = (rest for rest in rests(recording) if len(rest) > 1)
-    ticks = [k for rest in still for k in residual_window(t_s, rest, recording.dwell_s)]
-    return np.array(ticks, np.int64)

@@ -1,11 +1,11 @@
 """One drive of a campaign, measured while it is driven: no frame is recorded."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from canshaper.campaign.draw import Setting, draw_drive, driven_axes
-from canshaper.campaign.native import NativeCrane, Packed
+from canshaper.campaign.native import NativeCrane
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
 from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
@@ -13,7 +13,7 @@ from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
-from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, TIP_AXES, WITHOUT_SWAY, kind_of
+from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY, kind_of
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
@@ -73,12 +73,8 @@ def _row(
     native: NativeCrane | None = None,
 ) -> Row:
     """The row of a setting."""
-    frames = native.frames(setting) if native else None
-    drive = _Drive(deployment, setting, nominal, native, frames)
-    raw = None
-    if not setting.fault:
-        frames = native.switched_off(frames) if native and frames else None
-        raw = _Drive(deployment, setting, nominal, native, frames, bypass=True)
+    drive = _Drive(deployment, setting, nominal, native)
+    raw = None if setting.fault else _Drive(deployment, setting, nominal, native, bypass=True)
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,
@@ -109,17 +105,16 @@ class _Drive:
         setting: Setting,
         nominal: CraneParameters,
         native: NativeCrane | None = None,
-        frames: Packed | None = None,
         *,
         bypass: bool = False,
     ) -> None:
-        tracks = _Tracks(deployment, setting, nominal)
         self.refused = list[str]()
-        if native and frames:
-            self.swung_over = tracks.take(*native.drive(setting, frames))
+        if native:
+            self.measures, self.swung_over = native.drive(setting, nominal, bypass=bypass)
         else:
+            tracks = _Tracks(deployment, setting, nominal)
             self.swung_over = self._simulate(deployment, setting, tracks, bypass)
-        self.measures = tracks.measures(crane_only=bypass)
+            self.measures = tracks.measures(crane_only=bypass)
         if self.swung_over:
             self.measures["residual_deg"] = self.measures["peak_deg"]
             self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
@@ -164,16 +159,6 @@ class _Tracks:
         self._poses: list[tuple[float, float]] = []  # theta1, radius
         self._across: list[float] = []
         self._along: list[float] = []
-
-    def take(self, columns: Sequence[list[float]], t_s: list[float]) -> bool:
-        """Take what the C has driven, see ``NativeCrane.drive``; whether it swung over."""
-        theta1, radius_m, *of_axes, across, along = columns[:7]
-        self._t_s, self._poses = t_s, [*zip(theta1, radius_m, strict=True)]
-        self._across, self._along = [*map(math.degrees, across)], [*map(math.degrees, along)]
-        for name, moved in self._moves.items():
-            number = TIP_AXES.index(moved)
-            self._speeds[name], self._commands[name] = of_axes[number], columns[7 + number]
-        return max(abs(across[-1]), abs(along[-1])) > math.pi / 2.0
 
     def add(self, time_ms: int, plant: PlantNode) -> None:
         """Take the state of the crane after a tick."""

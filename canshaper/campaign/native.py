@@ -1,6 +1,6 @@
-"""Drives of a campaign in C: controller, valves, tip and grapple, equal to Python's to the bit.
+"""Drives of a campaign in C: joysticks, controller, crane and measures, equal to Python's.
 
-Draws, joystick frames and measures are Python's. What the C has no part for is left to Python,
+Draws are Python's, and frames that a bus disturbs. What the C has no part for is left to Python,
 drive by drive; the gate is Python's too, so that only Python's drives say whether it refuses.
 """
 
@@ -24,11 +24,12 @@ from canshaper_sim.crane import FULL_SPEEDS, INTERNAL_STEP_S, CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.joysticks import JoystickNode
+from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script
 from canshaper_sim.valve import ValveParameters
 from canshaper_sim.valve_frames import CommandReader
 
-PLANT = Path(__file__).with_name("c") / "cs_plant.c"
+SOURCES = Path(__file__).with_name("c")
 PROBES = 256  # of sine, cosine and exponential function, which libraries round differently
 _FRAME = np.dtype(
     [("id", "u4"), ("bus", "i4"), ("length", "i4"), ("extended", "?"), ("data", "u1", 8)],
@@ -44,6 +45,11 @@ _VALVE = [
     "rate_limit_1_s",
     "lag_s",
 ]
+_MEASURES = (
+    *("still_s", "residual_deg", "peak_deg", "run_on_s", "run_on_m"),
+    *("travel_error_s", "dip_pct"),
+)
+_COLUMNS = 15  # of what is measured
 _GRAPPLE = ("l1_m", "l2_m", "m1_kg", "m2_kg", "c5_n_m_s_rad", "c6_n_m_s_rad", "g_m_s2")
 # Of what the C has no part for: as it is by default.
 _ABSENT = ("boom", "contact", "log", "pump_flow", "ends")
@@ -51,25 +57,32 @@ _PLAIN = CraneParameters()
 _UNCOMPENSATED = ("load", "load_per_t")
 
 
-Packed = tuple[Any, Any]
-"""How many joystick frames come in each tick, and the frames, as arrays."""
-
-
 class _Valve(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_double) for name in (*_VALVE, "full_speed", "start", "low", "high")),
+        ("nominal", ctypes.c_double),
         *((name, ctypes.c_int32) for name in ("axis", "zero", "step", "full")),
     )
 
 
-class _Drive(ctypes.Structure):
-    _fields_ = (
-        ("valve", _Valve * len(TIP_AXES)),
-        ("sway", ctypes.c_double * 4),
-        ("step_s", ctypes.c_double),
-        ("tick_ms", ctypes.c_int64),
-        *((name, ctypes.c_int32) for name in ("steps", "ticks", "loads", "radius")),
-    )
+class _Joystick(ctypes.Structure):
+    _fields_ = (("cycle_ms", ctypes.c_int64), ("neutral", ctypes.c_uint8 * 8))
+
+
+def _drive_type(joysticks: int) -> type[ctypes.Structure]:
+    """``plant_drive``, with so many joysticks."""
+
+    class Drive(ctypes.Structure):
+        _fields_ = (
+            ("valve", _Valve * len(TIP_AXES)),
+            ("joystick", _Joystick * joysticks),
+            ("sway", ctypes.c_double * 4),
+            *((name, ctypes.c_double) for name in ("step_s", "dwell_s", "still_deg")),
+            ("tick_ms", ctypes.c_int64),
+            *((name, ctypes.c_int32) for name in ("steps", "ticks", "loads", "strokes", "radius")),
+        )
+
+    return Drive
 
 
 class NativeCrane:
@@ -77,7 +90,7 @@ class NativeCrane:
 
     Args:
         deployment: the machine.
-        plant: the C of the crane.
+        sources: folder of the C of crane and measures.
         keeps: what is compiled, for the next time.
 
     Raises:
@@ -85,9 +98,11 @@ class NativeCrane:
         NativeError: it cannot be compiled here, or its arithmetic is another one.
     """
 
-    def __init__(self, deployment: Deployment, plant: Path = PLANT, *, keeps: bool = True) -> None:
-        cache = _cache_folder() if keeps else None
-        library = NativeLibrary(deployment, str(plant), cache=cache)
+    def __init__(
+        self, deployment: Deployment, sources: Path = SOURCES, *, keeps: bool = True
+    ) -> None:
+        files = (f"-I{sources}", f"{sources}/cs_plant.c", f"{sources}/cs_measure.c")
+        library = NativeLibrary(deployment, *files, cache=_cache_folder() if keeps else None)
         self._c, self._deployment = library.c, deployment
         self._buses = library.buses
         _check_functions(self._c)
@@ -108,75 +123,81 @@ class NativeCrane:
         axes = deployment.by_coordinate
         self._wiring = [_wiring(deployment, axes.get(one)) for one in TIP_AXES]
 
-        # What the switch for anti-sway changes in the frames; nothing else there hangs on it.
         still = Script("still", (), 1.0)
-        hands = [JoystickNode(deployment, still, bypass=off) for off in (False, True)]
-        on, off = (self._packed(hand, 1)[1] for hand in hands)
-        self._switch = {
-            key: a ^ b for key, a, b in zip(on["id"], on["data"], off["data"], strict=True)
-        }
+        cycles_ms = [one.message.cycle_time or 20 for one in deployment.joysticks.values()]
+        self._drive = _drive_type(len(cycles_ms))
+        self._neutral = []  # anti-sway on, off
+        for off in (False, True):
+            first = self._packed(JoystickNode(deployment, still, bypass=off), 1)[1]["data"]
+            pairs = zip(cycles_ms, first.tolist(), strict=True)
+            self._neutral.append(tuple((cycle_ms, tuple(data)) for cycle_ms, data in pairs))
 
     def has(self, setting: Setting) -> bool:
         """Whether the C has a part for all of the crane that was drawn."""
         parameters = setting.options["parameters"]
         return parameters is not None and is_simple(parameters)
 
-    def frames(self, setting: Setting) -> Packed:
-        """Joystick frames of a drive."""
-        hands: Joysticks = JoystickNode(self._deployment, setting.script)
-        if disturb := setting.options.get("disturb"):
-            hands = disturb(hands)
-        tick_ms = self._deployment.config.tick_ms
-        return self._packed(hands, -(-round(setting.script.duration_s * 1000.0) // tick_ms))
-
-    def switched_off(self, frames: Packed) -> Packed:
-        """Return frames with anti-sway switched off; of joysticks that are not disturbed."""
-        counts, array = frames
-        array = array.copy()
-        for key, bits in self._switch.items():
-            array["data"][array["id"] == key] ^= bits
-        return counts, array
-
-    def drive(self, setting: Setting, packed: Packed) -> tuple[list[list[float]], list[float]]:
-        """Drive a setting.
+    def drive(
+        self, setting: Setting, nominal: CraneParameters, *, bypass: bool = False
+    ) -> tuple[dict[str, float | None], bool]:
+        """Drive a setting and measure it.
 
         Args:
             setting: what was drawn; see ``has``.
-            packed: the joystick frames.
+            nominal: the crane whose full speeds a deflection asks for.
+            bypass: anti-sway is switched off.
 
         Returns:
-            Columns of theta1, radius, speeds, theta5, theta6 and commands, the three coordinates in
-            the order of ``TIP_AXES``; and the times of the ticks that were driven, s. Fewer than
-            drawn: it swung over.
+            The measures, None for a missing one; and whether it swung over.
         """
         options, tick_ms = setting.options, self._deployment.config.tick_ms
-        parameters = options["parameters"]
+        parameters, script = options["parameters"], setting.script
         assert parameters
-        counts, frames = packed
-        ticks = len(counts)
         loads = [*options.get("loads", ())]
-        drive = _Drive(
+        strokes = [
+            (start_s, past_s, one.duration_s, one.ramp_s, one.level, number)
+            for number, axis in enumerate(self._deployment.axes)
+            for start_s, past_s, one in script.of_axis(axis)
+        ]
+        ticks = -(-round(script.duration_s * 1000.0) // tick_ms)
+        drive = self._drive(
+            joystick=self._neutral[bypass],
             **steps_of(tick_ms),
+            dwell_s=dwell_s(self._deployment),
+            still_deg=self._deployment.config.still_deg,
             tick_ms=tick_ms,
             ticks=ticks,
             loads=len(loads),
+            strokes=len(strokes),
             radius=self._sends_radius,
             sway=(*(options.get("sway") or (0.0,) * 4),),
             valve=tuple(
-                _Valve(**valve_numbers(parameters, axis), **wired)
+                _Valve(
+                    **valve_numbers(parameters, axis),
+                    nominal=getattr(nominal, FULL_SPEEDS[axis]),
+                    **wired,
+                )
                 for axis, wired in zip(TIP_AXES, self._wiring, strict=True)
             ),
         )
-        empty = np.array(grapple_numbers(parameters.grapple))
+        frames: list[Any] = [None, None]
+        if disturb := options.get("disturb"):
+            hands = disturb(JoystickNode(self._deployment, script, bypass=bypass))
+            frames = [*self._packed(hands, ticks)]
+        empty, measures = (
+            np.array(grapple_numbers(parameters.grapple)),
+            np.zeros(len(_MEASURES) + 1),
+        )
         loaded = np.array([[at, *grapple_numbers(one)] for at, one in loads])
-        out = np.zeros((10, ticks))
-        pointers = (array.ctypes.data_as(ctypes.c_void_p) for array in (empty, loaded))
-        after = (array.ctypes.data_as(ctypes.c_void_p) for array in (counts, frames, out))
-        driven = self._c.cs_drive(ctypes.byref(drive), *pointers, *after)
-        return out[:, :driven].tolist(), [k * tick_ms / 1000.0 for k in range(driven)]
+        arrays = [empty, loaded, np.array(strokes), *frames, np.empty((_COLUMNS, ticks)), measures]
+        at = (None if one is None else one.ctypes.data_as(ctypes.c_void_p) for one in arrays)
+        self._c.cs_drive(ctypes.byref(drive), *at)
+        *found, swung_over = measures.tolist()
+        named = zip(_MEASURES, found, strict=True)
+        return {name: None if math.isnan(one) else one for name, one in named}, bool(swung_over)
 
-    def _packed(self, hands: Joysticks, ticks: int) -> Packed:
-        """Joystick frames of some ticks."""
+    def _packed(self, hands: Joysticks, ticks: int) -> tuple[Any, Any]:
+        """How many joystick frames come in each tick, and the frames, as arrays."""
         tick_ms = self._deployment.config.tick_ms
         by_tick = [hands.frames_of_tick(k * tick_ms, tick_ms) for k in range(ticks)]
         flat: list[Frame] = [frame for frames in by_tick for frame in frames]

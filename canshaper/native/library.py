@@ -92,7 +92,8 @@ def compile_library(files: Iterable[Path], library: Path, *more: str) -> None:
 def _content(numbers: Numbers, sources: Path, more: Iterable[str]) -> str:
     """Hash of all that a library is made of."""
     version = subprocess.run([*compiler(), "--version"], capture_output=True, check=False).stdout
-    files = [*sorted(sources.rglob("*.[ch]")), *map(Path, (m for m in more if m.endswith(".c")))]
+    folders = [sources, *(Path(m).parent for m in more if m.endswith(".c"))]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.[ch]"))]
     text = f"{compiler()}{FLAGS}{more}{sizes_source(numbers)}{tables_source(numbers)}"
     parts = [version, text.encode(), *(path.read_bytes() for path in files)]
     return sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()

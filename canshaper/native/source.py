@@ -80,7 +80,7 @@ def _value(one: Any, name: str) -> str:
     if isinstance(one, dict):
         members = []
         for key, value in one.items():
-            if value not in (0, [], {}):
+            if value not in (0, [], {}) or str(value) == "-0.0":
                 text = f"{name}_{key}" if key in APART else _value(value, f"{name}_{key}")
                 members.append(f".{key} = {text}")
         return f"{{{', '.join(members)}}}"

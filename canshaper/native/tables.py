@@ -23,16 +23,17 @@ from canshaper.controller.runner import AxisControl
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
-from canshaper.shaping.states import Reason
 from canshaper.shaping.transfer import Off
 
 Numbers = dict[str, Any]
 """A struct of the tables, by the names of its members; of an absent member 0."""
+Refusals = Iterator[tuple[Place, str]]
 _PROTECTED = ("checksum", "e2e", "multiplexor", "source")
 NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
     (): ("switches", "hydraulics", "gateway", "emergency_stop", "load_state", "profile"),
@@ -55,7 +56,7 @@ KINDS: dict[type, str] = {
     SCurve: "CS_S_CURVE",
 }
 """Filters of the C, by their classes here."""
-MOST_BITS = 32  # of a number in a frame
+MOST_BITS = 24  # of a number in a frame: more is not exact in float
 NONE = -1
 UNLIMITED_TICKS = 2_000_000_000  # more than the C ever counts
 
@@ -73,7 +74,6 @@ def tables(deployment: Deployment) -> Numbers:
     buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
     axes = controller.axes
     last = {runner.valve.key: runner for runner in axes.values()}
-    valves = list(last)
     return {
         "tick_ns": deployment.config.tick_ms * 1_000_000,
         "joystick": [_joystick(deployment, name, buses) for name in joysticks],
@@ -81,7 +81,7 @@ def tables(deployment: Deployment) -> Numbers:
         "axis": [
             {
                 **_wiring(runner, deployment, joysticks),
-                "valve": valves.index(runner.valve.key),
+                "valve": [*last].index(runner.valve.key),
                 "sends": last[runner.valve.key] is runner,
                 **_filter(runner.axis),
                 **_limits(runner.axis),
@@ -95,7 +95,7 @@ def tables(deployment: Deployment) -> Numbers:
     }
 
 
-def _refused(deployment: Deployment, controller: Controller) -> Iterator[tuple[Place, str]]:
+def _refused(deployment: Deployment, controller: Controller) -> Refusals:
     """Yield what the C has no part for: where, and what was expected."""
     for pattern, keys in NOT_EXPORTED.items():
         for place, section in _sections((), deployment.config, pattern):
@@ -107,21 +107,21 @@ def _refused(deployment: Deployment, controller: Controller) -> Iterator[tuple[P
         config, place = joystick.config, ("joysticks", name)
         if len(joystick.conditions) != 1 or joystick.enable is None:
             yield (*place, "enable"), "expected one switch of its own message in an export"
-        read = [config.reset, config.anti_sway_off, joystick.enable]
+        read = [config.reset, config.anti_sway_off, joystick.enable, joystick.protection.counter]
         read += [one.name for one in joystick.velocities]
-        yield from _unreadable(place, joystick.message, filter(None, read))
+        yield from _unreadable(place, joystick.message, read)
     for name, axis in deployment.axes.items():
-        at = ("axes", name, "valve")
-        yield from _unreadable(at, axis.valve_message, [axis.config.valve.signal])
+        written = [axis.config.valve.signal, axis.valve.message.protection.counter]
+        yield from _unreadable(("axes", name, "valve"), axis.valve_message, written)
         shaper = controller.axes[name].axis._transfer._shaper
         inner = shaper._shaper if isinstance(shaper, LimitAware) else shaper
         if type(shaper) not in KINDS or type(inner) not in KINDS:
             text = f"expected a filter that C has, got {axis.config.filter.kind}"
             yield ("axes", name, "filter", "kind"), text
     for name, motion in deployment.motions.items():
-        if motion.radius:
-            place = ("motion", name, "radius")
-            yield from _unreadable(place, motion.radius.message, [motion.radius.signal.name])
+        if one := motion.radius:
+            read = [one.signal.name, one.protection.counter]
+            yield from _unreadable(("motion", name, "radius"), one.message, read)
 
 
 def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Place, Any]]:
@@ -136,14 +136,12 @@ def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Plac
                 yield from _sections((*place, name), one, rest)
 
 
-def _unreadable(
-    place: Place, message: Message, signals: Iterable[str]
-) -> Iterator[tuple[Place, str]]:
+def _unreadable(place: Place, message: Message, names: Iterable[str | None]) -> Refusals:
     """Yield why the C cannot read or write a message."""
     if is_j1939(message) or is_fd(message) or message.length > CLASSICAL_BYTES:
         text = "expected classical CAN without J1939 in an export"
         yield (*place, "message"), f"{text}, got {message.name}"
-    for name in signals:
+    for name in filter(None, names):
         signal = find_signal(message, name)
         if signal is None or signal.is_float or signal.length > MOST_BITS:
             text = f"expected a whole signal of up to {MOST_BITS} bits in an export, got {name}"
@@ -154,24 +152,20 @@ def _field(message: Message, name: str | None) -> Numbers:
     signal = find_signal(message, name) if name else None
     if signal is None:
         return {}
-    return {
-        "start": signal.start,
-        "length": signal.length,
-        "motorola": signal.byte_order == "big_endian",
-        "is_signed": signal.is_signed,
-    }
+    numbers = {n: getattr(signal, n) for n in ("start", "length", "is_signed")}
+    return {**numbers, "motorola": signal.byte_order == "big_endian"}
+
+
+def _key(key: MessageKey, length: int, buses: list[str]) -> Numbers:
+    return {"bus": buses.index(key[0]), "id": key[1], "extended": key[2], "length": length}
 
 
 def _message(bound: BoundInput, buses: list[str]) -> Numbers:
     """Return the members of ``cs_message_config``."""
     config, protection = bound.config, bound.protection
-    bus, can_id, extended = bound.key
     sequence = SequenceChecker(protection, config.alive_max_step, config.qualify)
     return {
-        "bus": buses.index(bus),
-        "length": bound.message.length,
-        "id": can_id,
-        "extended": extended,
+        **_key(bound.key, bound.message.length, buses),
         "counter": _field(bound.message, protection.counter),
         "counts": protection.counts,
         "max_step": sequence._max_step,
@@ -180,22 +174,17 @@ def _message(bound: BoundInput, buses: list[str]) -> Numbers:
     }
 
 
-def _codes(special: dict[Any, Reason]) -> Numbers:
-    codes = [{"code": int(code), "reason": int(reason)} for code, reason in special.items()]
-    return {"codes": codes, "codes_n": len(codes)}
+def _number(message: Message, one: VelocitySignal) -> Numbers:
+    """Return the members of ``cs_number_config``."""
+    codes = [{"code": int(code), "reason": int(reason)} for code, reason in one.special.items()]
+    numbers = {n: float(getattr(one, n)) for n in ("scale", "offset", "full", "low", "high")}
+    return {"field": _field(message, one.name), **numbers, "codes": codes, "codes_n": len(codes)}
 
 
 def _joystick(deployment: Deployment, name: str, buses: list[str]) -> Numbers:
     bound = deployment.joysticks[name]
     message, config = bound.message, bound.config
-    numbers = [
-        {
-            "field": _field(message, one.name),
-            **{n: float(getattr(one, n)) for n in ("scale", "offset", "full", "low", "high")},
-            **_codes(one.special),
-        }
-        for one in _velocities(deployment, name)
-    ]
+    numbers = [_number(message, one) for one in _velocities(deployment, name).values()]
     return {
         "message": _message(bound, buses),
         "enable": _field(message, bound.enable),
@@ -207,21 +196,17 @@ def _joystick(deployment: Deployment, name: str, buses: list[str]) -> Numbers:
     }
 
 
-def _velocities(deployment: Deployment, joystick: str) -> list[VelocitySignal]:
+def _velocities(deployment: Deployment, joystick: str) -> dict[str, VelocitySignal]:
     """The numbers of a joystick, each once though several axes may read it."""
-    by_name = {one.name: one for one in deployment.joysticks[joystick].velocities}
-    return [one for one in by_name.values() if isinstance(one, VelocitySignal)]
+    every = deployment.joysticks[joystick].velocities
+    return {one.name: one for one in every if isinstance(one, VelocitySignal)}
 
 
 def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
     sent = runner.bound.valve.message
-    bus, can_id, extended = sent.key
     data = sent.fields.layout.encode(dict(sent.start))
     return {
-        "bus": buses.index(bus),
-        "length": len(data),
-        "id": can_id,
-        "extended": extended,
+        **_key(sent.key, len(data), buses),
         "start": [*data],
         "counter": _field(sent.fields.message, sent.protection.counter),
         "counts": sent.protection.counts,
@@ -231,10 +216,9 @@ def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
 def _wiring(runner: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
     """From which joystick an axis gets its demand, and where its setpoint goes."""
     bound, command, valve = runner.bound, runner.bound.config.command, runner.bound.valve
-    numbers = [one.name for one in _velocities(deployment, command.joystick)]
     return {
         "joystick": joysticks.index(command.joystick),
-        "number": numbers.index(command.signal),
+        "number": [*_velocities(deployment, command.joystick)].index(command.signal),
         "period_ticks": runner.period_ticks,
         "setpoint": _field(bound.valve_message, bound.config.valve.signal),
         "zero": valve._zero,
@@ -265,11 +249,9 @@ def _filter(axis: ShapedAxis) -> Numbers:
 def _limits(axis: ShapedAxis) -> Numbers:
     """Limits of an axis, and what a motion may add to it."""
     stage, limits = axis._stage, axis._stage.limits
-    rise, fall = stage._rates
     numbers: Numbers = {
         "neutral_band": axis._neutral_band,
-        "rise": rise,
-        "fall": fall,
+        **dict(zip(("rise", "fall"), stage._rates, strict=True)),
         "steps": stage._grid_steps,
         "tail": stage.tail,
         "reversal": min(stage._reversal, UNLIMITED_TICKS),
@@ -308,15 +290,9 @@ def _motion(
         ],
     }
     if radius := bound.radius:
-        low, high = radius.signal.minimum, radius.signal.maximum
+        signal, codes = radius.signal, special_codes(radius.signal)
+        ends = signal.minimum or 0.0, signal.maximum or 0.0
+        one = VelocitySignal(signal.name, signal.scale, signal.offset, 1.0, codes, *ends)
         numbers |= {"measured": True, "message": _message(radius, buses)}
-        numbers["radius"] = {
-            "field": _field(radius.message, radius.signal.name),
-            "scale": float(radius.signal.scale),
-            "offset": float(radius.signal.offset),
-            "full": 1.0,
-            "low": float(low or 0.0),
-            "high": float(high or 0.0),
-            **_codes(special_codes(radius.signal)),
-        }
+        numbers["radius"] = _number(radius.message, one)
     return numbers

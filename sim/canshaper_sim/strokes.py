@@ -104,6 +104,10 @@ class Script:
         moved = tuple(replace(s, axis=axes[s.axis]) for s in self.strokes if s.axis in axes)
         return Script(self.name, moved, self.duration_s)
 
+    def of_axis(self, axis: str) -> tuple[tuple[float, float, Stroke], ...]:
+        """The strokes of an axis in order of time, each with when it begins and is over."""
+        return self._by_axis.get(axis, ())
+
     def command(self, axis: str, time_s: float) -> float:
         """Joystick value -1 .. 1 of one axis; neutral for an axis the script does not move."""
         strokes = self._by_axis.get(axis)

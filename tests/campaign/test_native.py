@@ -1,5 +1,6 @@
 """Drives in C: the rows of Python, or none."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from typer.testing import CliRunner
 from canshaper.campaign import measure, run
 from canshaper.campaign.draw import draw_drive
 from canshaper.campaign.measure import Row, measured_drive
-from canshaper.campaign.native import PLANT, NativeCrane
+from canshaper.campaign.native import SOURCES, NativeCrane
 from canshaper.campaign.run import Source, drive_all
 from canshaper.cli.app import app
 from canshaper.config.uncertainty import Uncertainty
@@ -32,13 +33,13 @@ def same(one: Row, other: Row) -> bool:
     return {**one, "engine": ""} == {**other, "engine": ""}
 
 
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drives of 6 s."""
+def short(monkeypatch: pytest.MonkeyPatch, duration_s: float = 6.0) -> None:
+    """Drives whose strokes end in 4 s."""
 
     def drawn(*arguments: object) -> object:
         setting = draw_drive(*arguments)  # type: ignore[arg-type]
         strokes = tuple(one for one in setting.script.strokes if one.end_s < 4.0)
-        return replace(setting, script=Script("short", strokes, 6.0))
+        return replace(setting, script=Script("short", strokes, duration_s))
 
     monkeypatch.setattr(measure, "draw_drive", drawn)
 
@@ -71,29 +72,45 @@ def test_many_rows_are_those_of_python(name: str, ranges: Uncertainty) -> None:
         assert same(row, measured_drive(deployment, seed, ranges))
 
 
+def planted(folder: Path, file: str, old: str, new: str) -> Path:
+    """The C with a mistake."""
+    shutil.copytree(SOURCES, sources := folder / "c")
+    text = (sources / file).read_text(encoding="utf-8")
+    assert text.count(old) == 1, old
+    (sources / file).write_text(text.replace(old, new), encoding="utf-8")
+    return sources
+
+
+PLANTED = {
+    "acceleration": ("cs_plant.c", "0.25 * ((((6.0", "0.25000000001 * ((((6.0"),
+    "Coriolis": ("cs_plant.c", "2.0 * s6", "2.1 * s6"),
+    "stroke": ("cs_plant.c", "release / one->ramp", "release / 0.2"),
+    "code": ("cs_plant.c", "rint((value - c->offset)", "floor((value - c->offset)"),
+    "rest": ("cs_measure.c", "(fabs(joystick) <= 0.02)", "(fabs(joystick) <= 0.2)"),
+    "dwell": ("cs_measure.c", "from + d->dwell_s", "from + 2.0 * d->dwell_s"),
+    "travel": ("cs_measure.c", "fabs(way - asked)", "fabs(way)"),
+    "dip": ("cs_measure.c", "- (held_most - held)", "+ 0 * (held_most - held)"),
+    "crossing": ("cs_measure.c", "at += share", "at += 0 * share"),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "planted", [("0.25 * ((((6.0", "0.25000000001 * ((((6.0"), ("2.0 * s6", "2.1 * s6")]
-)
+@pytest.mark.parametrize("name", PLANTED)
 def test_a_difference_is_refused_with_its_seed(
-    planted: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    short(monkeypatch)
-    text = PLANT.read_text(encoding="utf-8")
-    plant = tmp_path / "cs_plant.c"
-    plant.write_text(text.replace(*planted), encoding="utf-8")
-    native = NativeCrane(ROBUST, plant)
-    with pytest.raises(CampaignError, match="drive 50: expected the same"):
-        measured_drive(ROBUST, 50, Uncertainty(), native=native)
+    short(monkeypatch, 10.0)
+    native = NativeCrane(ROBUST, planted(tmp_path, *PLANTED[name]))
+    with pytest.raises(CampaignError, match=r"drive \d+: expected the same"):
+        for seed in (50, 100, 150, 200):
+            measured_drive(ROBUST, seed, Uncertainty(), native=native)
 
 
 @pytest.mark.slow
 def test_other_mathematics_are_refused(tmp_path: Path) -> None:
-    plant = tmp_path / "cs_plant.c"
-    text = PLANT.read_text(encoding="utf-8")
-    plant.write_text(text.replace("out[2] = exp(", "out[2] = expf("), encoding="utf-8")
+    sources = planted(tmp_path, "cs_plant.c", "out[2] = exp(", "out[2] = expf(")
     with pytest.raises(NativeError, match="expected sin, cos and exp as Python's"):
-        NativeCrane(ROBUST, plant)
+        NativeCrane(ROBUST, sources)
 
 
 def test_native_without_a_compiler_is_refused_in_one_line(

@@ -1,5 +1,6 @@
 """The C computes as the controller does: frames and inner states equal to the last bit."""
 
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -41,6 +42,14 @@ def test_it_is_so_in_a_long_drive_behind_the_gate(name: str) -> None:
     assert wrong == ""
 
 
+@pytest.mark.study
+@pytest.mark.parametrize("name", SHIPPED)
+def test_it_is_so_in_ten_million_ticks(name: str) -> None:
+    """Of all machines together; half an hour of a processor."""
+    c, ticks = NativeController(shipped(name)), -(-10_000_000 // len(SHIPPED))
+    assert difference(read(CONFIG / f"{name}.yaml"), c, "ten million", ticks)[0] == ""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VARIANTS)
 def test_the_c_is_the_controller_for_every_part(name: str, machine: Machine) -> None:
@@ -67,14 +76,26 @@ def test_a_build_that_contracts_is_refused() -> None:
         NativeLibrary(read(CONFIG / "forwarder.yaml"), "-mfma", "-ffp-contract=fast")
 
 
-@pytest.mark.parametrize("flag", ["-ffast-math", "-funsafe-math-optimizations"])
-def test_a_build_with_quick_arithmetic_is_refused(flag: str) -> None:
+FLUSHED = """
+__attribute__((constructor)) static void flush(void)
+{ __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040u); }
+"""
+
+
+@pytest.mark.parametrize("more", ["-ffast-math", "-funsafe-math-optimizations", FLUSHED])
+def test_a_build_with_quick_arithmetic_is_refused(more: str, tmp_path: Path) -> None:
+    """By its flags, or by a target that rounds small numbers to 0."""
     needs_compiler()
+    if more is FLUSHED:
+        if platform.machine() != "x86_64":
+            pytest.skip("expected x86-64, got another processor")
+        (tmp_path / "flushed.c").write_text(FLUSHED, encoding="ascii")
+        more = str(tmp_path / "flushed.c")
     # In a process of its own: once loaded, it rounds subnormal numbers to 0 everywhere.
     code = f"""
 from canshaper.native.library import NativeLibrary
 from tests.rigs.files import CONFIG, read
-NativeLibrary(read(CONFIG / "forwarder.yaml"), {flag!r})"""
+NativeLibrary(read(CONFIG / "forwarder.yaml"), {more!r})"""
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
     )

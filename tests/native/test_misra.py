@@ -23,5 +23,6 @@ def test_the_findings_are_those_of_the_page(tmp_path: Path) -> None:
     command = ["cppcheck", *options, f"-I{C_FILES}/src", *map(str, sources)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     found = set(re.findall(r"\[(?:misra-c2012-)?(.+?)\]$", done.stderr, re.MULTILINE))
-    page = (ROOT / "docs/export.md").read_text(encoding="utf-8").partition("MISRA C:2012")[2]
+    text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+    page = text.partition("MISRA C:2012")[2].partition("By eye")[0]
     assert found == set(re.findall(r"\b\d+\.\d+\b", page))

@@ -84,6 +84,13 @@ def test_what_is_refused_is_named_with_its_line(machine: Machine) -> None:
     assert problems(machine) == [f":{line + 1}: {text}"]
 
 
+def test_a_counter_with_more_values_than_c_counts_is_refused(machine: Machine) -> None:
+    """Of 2^32 values nothing would be left: none of its frames would be checked."""
+    machine.in_dbc(" SG_ AliveCounter : 56|8@1+", " SG_ AliveCounter : 38|26@1+")
+    text = "expected a whole signal of up to 24 bits in an export, got AliveCounter"
+    assert problems(machine)[0].endswith(text)
+
+
 class Other(Fir):
     pass
 
@@ -108,6 +115,12 @@ def test_the_numbers_are_exact() -> None:
     assert f"{{R({taps[0].hex()}), R({taps[1].hex()})" in source
     assert ".run_on = HUGE_VAL" in source  # of lift, which no distance bounds
     assert "#define CS_TAPS 91\n#define CS_WINDOW 111\n" in sizes_source(found)
+
+
+def test_the_sign_of_a_zero_is_kept() -> None:
+    found = tables(read(CONFIG / "forwarder.yaml"))
+    found["axis"][0]["deadband"] = -0.0
+    assert ".deadband = R(-0x0.0p+0)" in tables_source(found)
 
 
 def test_no_line_of_the_source_is_code() -> None:

@@ -1,22 +1,30 @@
-/* The simulated crane of sim/canshaper_sim around the controller: valves, a tip that is moved directly, a grapple.
+/* The simulated crane of sim/canshaper_sim around the controller: joysticks, valves, a tip that is moved directly, a
+   grapple.
 
-   The same operations in the same order as valve.py, actuator.py, tip_boom.py and grapple.py, so that a drive is equal
-   to the last bit. What is not here (pump, cushions, carrier, wind, contact, log, joints, ropes) native.py does not
-   bring here. With CS_CRANE_ALONE it is the crane without the controller. */
+   The same operations in the same order as strokes.py, hand.py, valve.py, actuator.py, tip_boom.py and grapple.py, so
+   that a drive is equal to the last bit. What is not here (pump, cushions, carrier, wind, contact, log, joints, ropes)
+   native.py does not bring here. With CS_CRANE_ALONE it is the crane by itself. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
+#ifdef CS_CRANE_ALONE
 enum { SLEW, NEAR_FAR, LIFT, COORDINATES };
+#else
+#include "cs_internal.h"
+#include "cs_measure.h"
+#endif
+
 #define PENDING 256 /* changes of a command within the longest dead time, 0.2 s, of ticks of 1 ms */
 #define SAME_TIME_S 1e-9
-#define HORIZONTAL 0x1.921fb54442d18p+0 /* pi / 2 */
+#define PI 0x1.921fb54442d18p+1
 
 /* As `_VALVE` of native.py has them; axis CS_NONE: no valve moves this coordinate. */
 typedef struct {
-    double dead_time, deadband, negative_more, hysteresis, negative_gain, flow_limit, rate, lag, full_speed, start, low, high;
+    double dead_time, deadband, negative_more, hysteresis, negative_gain, flow_limit, rate, lag, full_speed, start, low,
+        high, nominal;
     int32_t axis, zero, step, full;
 } plant_valve;
 typedef struct { double l1, l2, m1, m2, c5, c6, g; } plant_grapple;
@@ -219,18 +227,19 @@ static bool crane_tick(crane_state *s, const plant_grapple *q)
                             a[SLEW].speed, a[SLEW].end_acc, a[LIFT].end_acc};
         swing(q, s->x, s->step_s, t);
     }
-    return (fabs(s->x[0]) > HORIZONTAL) || (fabs(s->x[1]) > HORIZONTAL);
+    return (fabs(s->x[0]) > (PI / 2.0)) || (fabs(s->x[1]) > (PI / 2.0));
 }
 
 #ifndef CS_CRANE_ALONE
-#include "cs_internal.h"
-
 typedef struct { double time_s; plant_grapple grapple; } plant_load;
+typedef struct { double start, past, duration, ramp, level, axis; } plant_stroke; /* in order of time */
+typedef struct { int64_t cycle_ms; uint8_t neutral[CS_BYTES]; } plant_joystick;
 typedef struct {
     plant_valve valve[COORDINATES];
-    double sway[4], step_s;
+    plant_joystick joystick[CS_JOYSTICKS];
+    double sway[4], step_s, dwell_s, still_deg;
     int64_t tick_ms;
-    int32_t steps, ticks, loads_n, radius; /* radius: the crane sends it */
+    int32_t steps, ticks, loads_n, strokes_n, radius; /* radius: the crane sends it */
 } plant_drive;
 
 /* A valve decodes for itself: what the DBC says of the bits. */
@@ -265,56 +274,114 @@ static double command_in(const plant_valve *p, const cs_frame *out, int32_t fram
     return held;
 }
 
+/* Joystick value of an axis. */
+static double joystick_at(const plant_drive *d, const plant_stroke *strokes, int32_t axis, double time_s)
+{
+    double value = 0.0;
+    for (int32_t i = 0; i < d->strokes_n; i++) {
+        const plant_stroke *one = &strokes[i];
+        double press = time_s - one->start, release = press - one->duration;
+        if (((int32_t)one->axis != axis) || (press < 0.0) || (time_s > one->past) || (release >= one->ramp)) {
+            continue;
+        }
+        if (release > 0.0) { value += one->level * (1.0 - (release / one->ramp)); }
+        else if (press < one->ramp) { value += (one->level * press) / one->ramp; }
+        else { value += one->level; }
+    }
+    return fmin(fmax(value, -1.0), 1.0);
+}
+
+/* Raw value nearest to a physical one, within the bits of a field. */
+static int32_t raw_of(const cs_number_config *c, double value)
+{
+    int32_t bits = c->field.length - (c->field.is_signed ? 1 : 0);
+    double least = c->field.is_signed ? -ldexp(1.0, bits) : 0.0;
+    return (int32_t)fmin(fmax(rint((value - c->offset) / c->scale), least), ldexp(1.0, bits) - 1.0);
+}
+
+/* Send the joystick frames that are due since the last tick; sent: how many each joystick has sent. */
+static void send_joysticks(cs_controller *s, const plant_drive *d, const plant_stroke *strokes, int64_t now_ms,
+                           int32_t *sent)
+{
+    for (int64_t ms = (now_ms < d->tick_ms) ? 0 : (now_ms - d->tick_ms + 1); ms <= now_ms; ms++) {
+        for (int32_t i = 0; i < cs_tables.joysticks_n; i++) {
+            const cs_joystick_config *j = &cs_tables.joystick[i];
+            const cs_message_config *m = &j->message;
+            uint8_t data[CS_BYTES];
+            if ((ms % d->joystick[i].cycle_ms) != 0) { continue; }
+            memcpy(data, d->joystick[i].neutral, sizeof(data));
+            for (int32_t k = 0; k < cs_tables.axes_n; k++) {
+                const cs_number_config *n = &j->number[cs_tables.axis[k].number];
+                if (cs_tables.axis[k].joystick != i) { continue; }
+                cs_field_write(&n->field, data, raw_of(n, n->full * joystick_at(d, strokes, k, (double)ms / 1000.0)));
+            }
+            sent[i] = (m->counts > 0) ? ((sent[i] + 1) % m->counts) : 0;
+            cs_field_write(&m->counter, data, sent[i]);
+            cs_receive(s, &cs_tables, m->bus, m->id, m->extended, data, m->length, now_ms * 1000000);
+        }
+    }
+}
+
 /* The crane measures the radius of its tip and sends it, as the controller receives it. */
 static void send_radius(cs_controller *s, double radius, int64_t now)
 {
     for (int32_t i = 0; i < cs_tables.motions_n; i++) {
         const cs_motion_config *m = &cs_tables.motion[i];
-        const cs_field *f = &m->radius.field;
-        int32_t bits = f->length - (f->is_signed ? 1 : 0);
-        double least = f->is_signed ? -ldexp(1.0, bits) : 0.0;
-        double raw = fmin(fmax(rint((radius - m->radius.offset) / m->radius.scale), least), ldexp(1.0, bits) - 1.0);
         uint8_t data[CS_BYTES] = {0};
-        cs_field_write(f, data, (int64_t)raw);
+        cs_field_write(&m->radius.field, data, raw_of(&m->radius, radius));
         cs_receive(s, &cs_tables, m->message.bus, m->message.id, m->message.extended, data, m->message.length, now);
     }
 }
 
-/* Drive; counts: joystick frames before each tick. out, a column of d->ticks each: theta1, radius, three speeds, theta5,
-   theta6, three commands. Returns how many ticks were driven: a grapple above the horizontal ends it. */
-int32_t cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load *load, const int32_t *counts,
-                 const cs_frame *in, double *out)
+/* Drive and measure. counts, in: joystick frames before each tick; NULL: those that the strokes give. work: COLUMNS of
+   d->ticks each. A grapple above the horizontal ends the drive. */
+void cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load *load, const plant_stroke *strokes,
+              const int32_t *counts, const cs_frame *in, double *work, double *measures)
 {
     cs_controller s;
     cs_frame frames[CS_VALVES];
     crane_state crane;
     actuator *a = crane.a;
     const double *x = crane.x;
+    double held[COORDINATES] = {0.0};
+    double *out[COLUMNS];
     const plant_grapple *q = empty;
-    int32_t next = 0, driven = 0;
+    int32_t next = 0, n = 0, sent_by[CS_JOYSTICKS] = {0};
     bool over = false;
     cs_init(&s, &cs_tables);
     crane_begin(&crane, d->valve, d->sway, d->step_s, d->steps);
-    for (int32_t k = 0; (k < d->ticks) && !over; k++) {
+    for (int32_t i = 0; i < COLUMNS; i++) { out[i] = &work[i * d->ticks]; }
+    for (int32_t k = 0; (k < d->ticks) && !over; k++, n++) {
         int64_t ms = k * d->tick_ms, now = ms * 1000000;
         while ((next < d->loads_n) && ((double)ms >= (1000.0 * load[next].time_s))) { q = &load[next++].grapple; }
         if ((k > 0) && d->radius) { send_radius(&s, a[NEAR_FAR].position, now); }
-        for (int32_t j = 0; j < counts[k]; j++, in++) {
+        if (counts == NULL) { send_joysticks(&s, d, strokes, ms, sent_by); }
+        for (int32_t j = 0; (counts != NULL) && (j < counts[k]); j++, in++) {
             cs_receive(&s, &cs_tables, in->bus, in->id, in->extended, in->data, in->length, now);
         }
         int32_t sent = cs_tick(&s, &cs_tables, now, 0, frames);
         for (int32_t i = 0; i < COORDINATES; i++) {
-            double held = out[((7 + i) * d->ticks) + ((k > 0) ? (k - 1) : 0)];
-            double command = (d->valve[i].axis == CS_NONE) ? 0.0 : command_in(&d->valve[i], frames, sent, held);
-            out[((7 + i) * d->ticks) + k] = command;
-            set_command(&a[i], command);
+            if (d->valve[i].axis != CS_NONE) { held[i] = command_in(&d->valve[i], frames, sent, held[i]); }
+            set_command(&a[i], held[i]);
         }
         over = crane_tick(&crane, q);
-        double row[7] = {a[SLEW].position, a[NEAR_FAR].position, a[SLEW].speed, a[NEAR_FAR].speed, a[LIFT].speed, x[0], x[1]};
-        for (int32_t i = 0; i < 7; i++) { out[(i * d->ticks) + k] = row[i]; }
-        driven = k + 1;
+        out[FASTEST][k] = 0.0;
+        for (int32_t i = 0; i < COORDINATES; i++) {
+            int32_t axis = d->valve[i].axis;
+            out[JOYSTICK + i][k] = (axis == CS_NONE) ? 0.0 : joystick_at(d, strokes, axis, (double)ms / 1000.0);
+            out[SENT + i][k] = (axis == CS_NONE) ? 0.0 : cs_velocity(&cs_tables.axis[axis], held[i]);
+            out[SPEED + i][k] = (axis == CS_NONE) ? 0.0 : (a[i].speed / d->valve[i].nominal);
+            out[FASTEST][k] = fmax(out[FASTEST][k], fabs(out[SPEED + i][k]));
+        }
+        out[TIP_X][k] = a[NEAR_FAR].position * cos(a[SLEW].position);
+        out[TIP_Y][k] = a[NEAR_FAR].position * sin(a[SLEW].position);
+        out[SWING][k] = cs_hypot(x[0] * (180.0 / PI), x[1] * (180.0 / PI));
+        out[ONE][k] = 1.0;
     }
-    return driven;
+    const drive_look look = {{d->valve[SLEW].axis, d->valve[NEAR_FAR].axis, d->valve[LIFT].axis},
+                             d->tick_ms, d->dwell_s, d->still_deg};
+    cs_measure(&look, out, n, measures);
+    measures[SWUNG_OVER] = over ? 1.0 : 0.0;
 }
 
 /* What the crane needs of the mathematics library, to be held against Python's. */

@@ -141,7 +141,7 @@ static bool run(cs_controller *s, const cs_config *c, int32_t axis, int64_t now_
     cs_input in = input_of(s, c, axis, now_ns, late);
     int32_t old = a->state;
     cs_axis_act(a, ac, &in);
-    cs_field_write(&ac->setpoint, v->data, (int64_t)ac->zero + ((int64_t)ac->sign * a->out.steps));
+    cs_field_write(&ac->setpoint, v->data, ac->zero + (ac->sign * a->out.steps));
     if (ac->sends) { /* the last axis of its valve's message */
         if (vc->counts > 0) {
             v->count = (v->count + 1) % vc->counts;

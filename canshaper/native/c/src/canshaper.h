@@ -60,7 +60,7 @@ enum { CS_OFF, CS_FIR, CS_ROBUST, CS_GFF, CS_FIRST_ORDER, CS_S_CURVE };
 /* Where a number stands in a frame, as a DBC file counts: start is the lowest bit, in Motorola order the highest one.
    No field: length 0. */
 typedef struct { int32_t start, length; bool motorola, is_signed; } cs_field;
-typedef struct { int64_t code; int32_t reason; } cs_code; /* a code that is no measurement */
+typedef struct { int32_t code, reason; } cs_code; /* a code that is no measurement */
 
 /* A message that is received. counts: values of its alive counter, 0 for none. */
 typedef struct {

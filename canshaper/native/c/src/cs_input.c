@@ -9,14 +9,14 @@ static int32_t next_bit(const cs_field *f, int32_t bit)
     return f->motorola ? motorola : (bit + 1);
 }
 
-/* Raw value of a field of up to 32 bits; 0 where there is none. */
-static int64_t field_read(const cs_field *f, const uint8_t *data)
+/* Raw value of a field of up to 24 bits; 0 where there is none. */
+static int32_t field_read(const cs_field *f, const uint8_t *data)
 {
-    int64_t value = 0;
-    int64_t weight = 1;
+    int32_t value = 0;
+    int32_t weight = 1;
     int32_t bit = f->start;
     for (int32_t i = 0; i < f->length; i++) {
-        int64_t one = ((data[bit / 8] & (1u << (uint32_t)(bit % 8))) != 0u) ? 1 : 0;
+        int32_t one = ((data[bit / 8] & (1u << (uint32_t)(bit % 8))) != 0u) ? 1 : 0;
         value = f->motorola ? ((value * 2) + one) : (value + (weight * one));
         weight *= 2;
         bit = next_bit(f, bit);
@@ -24,9 +24,9 @@ static int64_t field_read(const cs_field *f, const uint8_t *data)
     return (f->is_signed && (value >= (weight / 2))) ? (value - weight) : value;
 }
 
-void cs_field_write(const cs_field *f, uint8_t *data, int64_t value)
+void cs_field_write(const cs_field *f, uint8_t *data, int32_t value)
 {
-    uint32_t raw = (uint32_t)((uint64_t)value & 0xFFFFFFFFu);
+    uint32_t raw = (uint32_t)value;
     int32_t bit = f->start;
     for (int32_t i = 0; i < f->length; i++) {
         uint32_t from = (uint32_t)(f->motorola ? ((f->length - 1) - i) : i);
@@ -42,7 +42,8 @@ void cs_field_write(const cs_field *f, uint8_t *data, int64_t value)
 
 bool cs_fresh(int64_t since_ns, int64_t now_ns, int64_t timeout_ns)
 {
-    return (since_ns != CS_NEVER) && ((now_ns - since_ns) <= timeout_ns);
+    int64_t oldest = (now_ns > timeout_ns) ? (now_ns - timeout_ns) : (CS_NEVER + 1); /* no time overflows */
+    return since_ns >= oldest;
 }
 
 void cs_message_init(cs_message *m) { *m = (cs_message){CS_NEVER, CS_NEVER, CS_NEVER, CS_NONE, 0, true, false}; }
@@ -62,7 +63,7 @@ static void requalify(cs_message *m)
 /* Whether the counter of a frame follows the last one; after silence any other one does. */
 static bool in_sequence(cs_message *m, const cs_message_config *c, const uint8_t *data)
 {
-    int32_t count = (int32_t)field_read(&c->counter, data);
+    int32_t count = field_read(&c->counter, data);
     int32_t step = (m->last == CS_NONE) ? 1 : (((count - m->last) + c->counts) % c->counts);
     bool jump = (step > c->max_step) && !m->resynced;
     bool ok = (step != 0) && !jump; /* repeated: no news */
@@ -79,7 +80,8 @@ static bool accepts(cs_message *m, const cs_message_config *c, const uint8_t *da
         m->resynced = true;
         requalify(m);
     }
-    bool ok = (c->counts == 0) || in_sequence(m, c, data);
+    bool ok = true;
+    if (c->counts > 0) { ok = in_sequence(m, c, data); }
     if (ok && !m->qualified) {
         m->good++;
         m->qualified = m->good >= c->qualify;
@@ -94,7 +96,7 @@ static bool accepts(cs_message *m, const cs_message_config *c, const uint8_t *da
 /* Value of a number; why it is no measurement, or CS_NONE. */
 static int32_t number_read(const cs_number_config *c, const uint8_t *data, cs_real *value)
 {
-    int64_t code = field_read(&c->field, data);
+    int32_t code = field_read(&c->field, data);
     int32_t why = CS_NONE;
     for (int32_t i = 0; i < c->codes_n; i++) {
         if (code == c->codes[i].code) { why = c->codes[i].reason; }
@@ -139,7 +141,7 @@ static void take_numbers(cs_joystick *j, const cs_joystick_config *c, const uint
 void cs_joystick_receive(cs_joystick *j, const cs_joystick_config *c, const uint8_t *data, int64_t now_ns)
 {
     bool accepted = accepts(&j->message, &c->message, data, now_ns);
-    int32_t enable = (int32_t)field_read(&c->enable, data);
+    int32_t enable = field_read(&c->enable, data);
     if (enable == 0) {
         j->releases++;
         j->released = true;
@@ -148,8 +150,8 @@ void cs_joystick_receive(cs_joystick *j, const cs_joystick_config *c, const uint
     if (accepted) {
         j->released = enable == 0;
         j->enable = enable;
-        j->reset = (int32_t)field_read(&c->reset, data);
-        j->off = (int32_t)field_read(&c->off, data);
+        j->reset = field_read(&c->reset, data);
+        j->off = field_read(&c->off, data);
         take_numbers(j, c, data, now_ns);
     }
 }

@@ -11,11 +11,13 @@
 #define CS_FUNCTION(name) name##f
 #define CS_INFINITY HUGE_VALF
 #define CS_DIGITS 24
+#define CS_LEAST FLT_MIN
 #define CS_SPLIT 4097 /* 2^12 + 1 */
 #else
 #define CS_FUNCTION(name) name
 #define CS_INFINITY HUGE_VAL
 #define CS_DIGITS 53
+#define CS_LEAST DBL_MIN
 #define CS_SPLIT 134217729 /* 2^27 + 1 */
 #endif
 #define CS_ABS(x) (CS_FUNCTION(fabs)(x))
@@ -45,6 +47,7 @@ void cs_demand_add(cs_axis *a, const cs_axis_config *c, cs_real demand, bool dri
 void cs_demand_age(cs_axis *a, const cs_axis_config *c, int32_t ticks);
 void cs_allowed_range(const cs_axis *a, const cs_axis_config *c, cs_real *low, cs_real *high);
 cs_real cs_rate_limited(cs_real target, cs_real last, const cs_axis_config *c);
+cs_real cs_velocity(const cs_axis_config *c, cs_real command);
 void cs_on_grid(cs_output *out, const cs_axis_config *c, cs_real low, cs_real high);
 cs_real cs_small_stroke(cs_axis *a, const cs_axis_config *c, cs_real command, cs_real target, cs_real low, cs_real high);
 
@@ -63,7 +66,7 @@ void cs_axis_advance(cs_axis *a, const cs_axis_config *c);
 void cs_axis_hold(cs_axis *a, const cs_axis_config *c, int32_t ticks);
 
 /* cs_input.c */
-void cs_field_write(const cs_field *f, uint8_t *data, int64_t value);
+void cs_field_write(const cs_field *f, uint8_t *data, int32_t value);
 bool cs_fresh(int64_t since_ns, int64_t now_ns, int64_t timeout_ns);
 void cs_message_init(cs_message *m);
 bool cs_message_is(const cs_message_config *c, int32_t bus, uint32_t id, bool extended, int32_t length);

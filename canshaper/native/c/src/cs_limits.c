@@ -126,10 +126,9 @@ static cs_real command_of(const cs_axis_config *c, cs_real velocity)
     return out;
 }
 
-/* Velocity that so many steps of the frame give. */
-static cs_real velocity_of(const cs_axis_config *c, int32_t steps)
+/* Velocity that a command gives. */
+cs_real cs_velocity(const cs_axis_config *c, cs_real command)
 {
-    cs_real command = CS_R(steps) / CS_R(c->steps);
     cs_real out = 0; /* within the dead band */
     if (c->curve_n > 0) { out = by_curve(command, c->curve_command, c->curve_speed, c->curve_n); }
     else if (CS_ABS(command) > c->deadband) {
@@ -142,10 +141,10 @@ static cs_real velocity_of(const cs_axis_config *c, int32_t steps)
 void cs_on_grid(cs_output *out, const cs_axis_config *c, cs_real low, cs_real high)
 {
     int32_t steps = (int32_t)CS_FUNCTION(rint)(command_of(c, out->ramp) * CS_R(c->steps));
-    cs_real setpoint = velocity_of(c, steps);
+    cs_real setpoint = cs_velocity(c, CS_R(steps) / CS_R(c->steps));
     while ((steps != 0) && !((low <= setpoint) && (setpoint <= high))) {
         steps += (steps > 0) ? -1 : 1;
-        setpoint = velocity_of(c, steps);
+        setpoint = cs_velocity(c, CS_R(steps) / CS_R(c->steps));
     }
     out->steps = (setpoint == 0) ? 0 : steps;
     out->setpoint = (setpoint == 0) ? CS_R(0) : setpoint; /* never -0 */

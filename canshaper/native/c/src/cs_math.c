@@ -62,10 +62,16 @@ cs_real cs_sum_of_products(const cs_real *taps, const cs_real *history, int32_t 
             cs_real small = swap ? x : parts[j];
             x = large + small;
             small -= x - large;
-            if (small != 0) { parts[kept++] = small; }
+            if (small != 0) {
+                parts[kept] = small;
+                kept++;
+            }
         }
         parts_n = kept;
-        if ((x != 0) && (parts_n < PARTS)) { parts[parts_n++] = x; }
+        if ((x != 0) && (parts_n < PARTS)) {
+            parts[parts_n] = x;
+            parts_n++;
+        }
     }
     return rounded(parts, parts_n);
 }

@@ -63,7 +63,7 @@ static void add(const member *m, cs_real target, cs_real weight)
 static void rest(cs_motion *m, const cs_motion_config *c, bool over)
 {
     m->has_radius = false;
-    for (int32_t i = 0; (i == SLEW) || ((i == NEAR_FAR) && (c->near_far != CS_NONE)); i++) {
+    for (int32_t i = 0; i < ((c->near_far == CS_NONE) ? 1 : 2); i++) {
         m->moving[i].added = 0;
         m->moving[i].reached = 0;
         m->moving[i].joins = !over;

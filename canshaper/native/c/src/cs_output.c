@@ -115,7 +115,7 @@ bool cs_output_drive(cs_axis *a, const cs_axis_config *c, cs_real demand, cs_rea
     cs_real total = own;
     out->path = path;
     if ((path != 0) || (out->own_ramp != out->ramp) || (out->dropped_at != 0)) {
-        ok = ok && both_ramps(a, c, demand, own, no_run_on, &low, &high, &total);
+        if (ok) { ok = both_ramps(a, c, demand, own, no_run_on, &low, &high, &total); }
     } else {
         out->ramp = cs_rate_limited(own, out->ramp, c);
         out->own_ramp = out->ramp;
