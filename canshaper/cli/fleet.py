@@ -144,7 +144,8 @@ def identified(
     path: Path,
 ) -> list[Row]:
     """Identify period and damping in a log; return a row for each axis."""
-    from canshaper.commissioning.identification.data import logged, messages_of, signals_named
+    from canshaper.commissioning.identification.canlog import messages_of
+    from canshaper.commissioning.identification.data import logged, signals_named
 
     deployment = loader(file)() if file else None
     findings = logged(

@@ -9,7 +9,7 @@ import signal
 import socket
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -240,6 +240,18 @@ class CraneSession:
     crane: Crane | None = None
     shaped: bool = True
     here: "InProcessCrane | None" = None
+
+    def exchange(self, time_ms: int, held: Held, now_s: float, passed_ms: int) -> None:
+        """Take what waits on the buses; where the page drives it, move its joysticks."""
+        frames: list[Frame] = []
+        for port in self.ports.values():
+            frames += port.frames()
+        switched = held if self.shaped else replace(held, anti_sway=False)
+        if self.here:
+            frames = self.here.frames(switched, passed_ms)
+        for frame in frames + self.move_joysticks(time_ms, switched):
+            self.view.receive(frame, now_s)
+        self.view.check(now_s)
 
     def move_joysticks(self, time_ms: int, held: Held) -> list[Frame]:
         """Send the frames of the joysticks that are due, where the page drives it; those frames."""

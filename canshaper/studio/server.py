@@ -30,8 +30,7 @@ from canshaper.studio.client import MOST_BYTES, TRY_AGAIN_LATER, Client
 from canshaper.studio.commission import Commission
 from canshaper.studio.sliders import RANGES
 from canshaper.studio.stage import MACHINE, RAW, Stage
-from canshaper.studio.swing import residuals
-from canshaper.studio.view import sway_of
+from canshaper.studio.swing import residuals, sway_of
 from canshaper_sim.axes import OVERHEAD, kind_of
 from canshaper_sim.crane import CraneParameters
 

@@ -4,12 +4,11 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from canshaper.codec.frame import Frame
 from canshaper.commissioning import control_client as client
+from canshaper.commissioning.doctor.processes import before_the_rest
 from canshaper.design.lockstep import driven_part
 from canshaper.design.processes import Transport, on_transport
 from canshaper.errors import ControlError
@@ -21,7 +20,6 @@ from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.numbers import LiveNumbers
 from canshaper.studio.preference import AS_IN_FILE, PREFERENCE, Preference, offered
 from canshaper.studio.sliders import Number, sliders, values
-from canshaper.studio.sources import before_the_rest
 from canshaper.studio.view import CraneView
 from canshaper.studio.words import Events, said
 from canshaper_sim.hand import Hand, Held
@@ -73,9 +71,8 @@ class Stage:
             BusError: a bus cannot be opened.
         """
         if control:
-            path = self.deployment.path
             report = lambda text: self.events.add(MACHINE, text, "warn")  # noqa: E731
-            self.numbers = LiveNumbers(path, control, report)
+            self.numbers = LiveNumbers(self.deployment.path, control, report)
         self.cranes[MACHINE] = CraneSession(self._view(MACHINE), open_ports(self.deployment))
 
     def drive(
@@ -98,8 +95,6 @@ class Stage:
         """
         self._seat()
         for name, transport in zip((SHAPED, RAW), transports, strict=False):
-            deployment = on_transport(self.deployment, transport)
-            view = self._view(name)
             crane = Crane(
                 name,
                 self.deployment.path,
@@ -111,7 +106,8 @@ class Stage:
             )
             hand = Hand(self.deployment)
             self._cycle_ms = hand.cycle_ms
-            seen = CraneSession(view, open_ports(deployment), hand, crane, shaped=name == SHAPED)
+            ports = open_ports(on_transport(self.deployment, transport))
+            seen = CraneSession(self._view(name), ports, hand, crane, shaped=name == SHAPED)
             self.cranes[name] = seen
             if name == SHAPED:
                 self._control = crane.control
@@ -257,7 +253,8 @@ class Stage:
         before_the_rest()
         try:
             run_at_deadlines(self._cycle_ms * MS, self._tick)
-            self._rest()
+            for seen in self.cranes.values():  # the last thing on the buses: neutral, enable off
+                seen.move_joysticks(0, Held())
         except Exception as error:
             self._error = error
             self._failed()
@@ -279,7 +276,7 @@ class Stage:
             held = self.cab.held(now_s) if self.cab else Held()
             driver = self.cab.driver if self.cab else None
             for seen in self.cranes.values():
-                self._exchange(seen, held, now_s, passed_ms)
+                seen.exchange(self._time_ms, held, now_s, passed_ms)
         if self._driver not in (None, driver):
             # The daemon's answer may take longer than a tick.
             self._resets = [one for one in self._resets if one.is_alive()]
@@ -289,32 +286,12 @@ class Stage:
         for seen in self.cranes.values():
             if seen.crane:
                 seen.crane.check(now_s)
-                late = seen.crane.late_us()
-                if late is not None:
+                if (late := seen.crane.late_us()) is not None:
                     seen.view.report_lateness(late)
                 if seen.shaped and seen.crane.starts != self._starts:
                     self._starts = seen.crane.starts
                     self.positions |= dict.fromkeys(self.sliders, 1.0)  # it has those of the file
         return not self._stop.is_set()
-
-    def _exchange(self, seen: CraneSession, held: Held, now_s: float, passed_ms: int) -> None:
-        """Take what waits on the buses of a crane; where the page drives it, move its joysticks."""
-        frames: list[Frame] = []
-        for port in seen.ports.values():
-            frames += port.frames()
-        switched = held if seen.shaped else replace(held, anti_sway=False)
-        if seen.here:
-            frames = seen.here.frames(switched, passed_ms)
-        for frame in frames + seen.move_joysticks(self._time_ms, switched):
-            seen.view.receive(frame, now_s)
-        seen.view.check(now_s)
-
-    def _rest(self) -> None:
-        """The last thing on the buses: joysticks in neutral, enable off."""
-        for seen in self.cranes.values():
-            seen.move_joysticks(0, Held())
-
-    # -- parts ---------------------------------------------------------------------------------
 
     def _view(self, name: str) -> CraneView:
         return CraneView(self.deployment, self._reporter(name))

@@ -10,9 +10,25 @@ from canshaper.config.limits import Sway
 from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.valves import BoundAxis
+from canshaper_sim.axes import BRIDGE, EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW, TROLLEY
 
+ACROSS, ALONG = "across", "along"
+_SWAY_OF = {
+    SLEW: ACROSS,
+    NEAR_FAR: ALONG,
+    LIFT_CYLINDER: ALONG,
+    KNUCKLE: ALONG,
+    EXTENSION: ALONG,
+    BRIDGE: ACROSS,
+    TROLLEY: ALONG,
+}
 LEAST_SWING_S = 1.0
 """Shortest time over which the largest sway counts as the swing."""
+
+
+def sway_of(coordinates: Mapping[str, str]) -> dict[str, str]:
+    """Which swing an axis excites, by its name: across boom or bridge, or along it."""
+    return {axis: _SWAY_OF[moved] for axis, moved in coordinates.items() if moved in _SWAY_OF}
 
 
 class Swing:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from cantools.database.can import Message
@@ -14,32 +15,16 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
-from canshaper.studio.axis_view import AxisView, rounded
-from canshaper.studio.sources import Sources
-from canshaper.studio.swing import Swing
+from canshaper.studio.seen import AxisView, Sources, rounded
+from canshaper.studio.swing import ACROSS, ALONG, Swing, sway_of
 from canshaper.studio.words import fault_words, reason_words, said, state_level, state_words
-from canshaper_sim.axes import BRIDGE, EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW, TROLLEY
+from canshaper_sim.axes import BRIDGE, SLEW, TROLLEY
 
 SILENT_S = 0.5
 """A daemon or a crane that has sent nothing for so long is shown as silent."""
 
-ACROSS, ALONG = "across", "along"
-_SWAY_OF = {
-    SLEW: ACROSS,
-    NEAR_FAR: ALONG,
-    LIFT_CYLINDER: ALONG,
-    KNUCKLE: ALONG,
-    EXTENSION: ALONG,
-    BRIDGE: ACROSS,
-    TROLLEY: ALONG,
-}
 # Of a model: it lags behind the tip, and across the boom and below a trolley that is negative.
 _BEHIND = (SLEW, BRIDGE, TROLLEY)
-
-
-def sway_of(coordinates: Mapping[str, str]) -> dict[str, str]:
-    """Which swing an axis excites, by its name: across boom or bridge, or along it."""
-    return {axis: _SWAY_OF[moved] for axis, moved in coordinates.items() if moved in _SWAY_OF}
 
 
 Report = Callable[[str, str], None]
@@ -97,10 +82,10 @@ class CraneView:
             if motion.aim and motion.config.aim:
                 self._on(motion.aim.message.key, self._aim, motion.aim, motion.config.aim.message)
         for message_name, handler in (
-            ("GrappleSway", self._sway),
+            ("GrappleSway", partial(self._sway, "SwayPerpendicular", "SwayParallel")),
             ("TipPosition", self._position),
             ("JointPosition", self._joints),
-            ("LoadSway", self._load),
+            ("LoadSway", partial(self._sway, "SwayBridge", "SwayTrolley")),
             ("CranePosition", self._trolley),
         ):
             message = self._message(message_name)
@@ -241,7 +226,7 @@ class CraneView:
 
     def _valve(self, name: str, data: bytes, now_s: float) -> None:
         axis = self._deployment.axes[name]
-        raw = _raw(axis.valve_message, data)
+        raw: Any = axis.valve_message.decode(data, decode_choices=False, scaling=False)
         command = (axis.valve.read(raw) or 0) / axis.valve.steps
         self.axes[name].opening = command
         self.axes[name].valve = axis.config.limits.output_limits().velocity(command)
@@ -285,13 +270,9 @@ class CraneView:
             if values["AimKnown"] and self.pose:
                 self.aim = self.pose[0] + values["AimSlew"], self.pose[1] + values["AimReach"]
 
-    def _sway(self, message: Message, data: bytes, now_s: float) -> None:
+    def _sway(self, across: str, along: str, message: Message, data: bytes, now_s: float) -> None:
         values: Any = message.decode(data)
-        self._sway_at((float(values["SwayPerpendicular"]), float(values["SwayParallel"])), now_s)
-
-    def _load(self, message: Message, data: bytes, now_s: float) -> None:
-        values: Any = message.decode(data)
-        self._sway_at((float(values["SwayBridge"]), float(values["SwayTrolley"])), now_s)
+        self._sway_at((float(values[across]), float(values[along])), now_s)
 
     def _sway_at(self, sway_deg: tuple[float, float], now_s: float) -> None:
         self.sway_deg = sway_deg
@@ -317,7 +298,3 @@ class CraneView:
 
 def _source_of(joystick: BoundJoystick) -> str:
     return f"joystick {joystick.name}"
-
-
-def _raw(message: Message, data: bytes) -> Any:
-    return message.decode(data, decode_choices=False, scaling=False)

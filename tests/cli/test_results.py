@@ -16,9 +16,8 @@ from canshaper import __version__
 from canshaper.cli.app import app
 from canshaper.cli.results import Results
 from canshaper.commissioning.calibration.fit import Calibration, Direction
-from canshaper.commissioning.calibration.plot import in_file
 from canshaper.commissioning.doctor.measure import Run
-from canshaper.commissioning.doctor.plot import figure as doctor_figure
+from canshaper.commissioning.plots import in_file, of_runs, of_valve
 from canshaper.config.limits import Limits
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
@@ -163,15 +162,13 @@ def test_the_curve_of_the_file_is_the_one_that_the_controller_uses() -> None:
 
 
 def test_picture_of_a_calibration_has_both_curves_and_where_the_valve_opens() -> None:
-    from canshaper.commissioning.calibration.plot import figure
-
     one = Direction(0.08, ((0.2, 0.1), (0.4, 0.3)), 0.01, 1.0)
     limits, measured = Limits().output_limits(), Calibration(one, one)
-    panel = figure("slew", limits, measured, 40.0).axes[0]
+    panel = of_valve("slew", limits, measured, 40.0).axes[0]
     known = {"file", "measured", "driven"}
     assert known | {"not measured"} == set(panel.get_legend_handles_labels()[1])
     assert "opens at 8.0 %" in [text.get_text() for text in panel.texts]
-    whole = figure("slew", limits, measured, 100.0).axes[0]
+    whole = of_valve("slew", limits, measured, 100.0).axes[0]
     assert known == set(whole.get_legend_handles_labels()[1])
 
 
@@ -179,7 +176,7 @@ def test_picture_of_a_doctor_has_the_limit_in_its_place() -> None:
     """Between the bins that end before the tick and those after it."""
     late = [30_000] * 90 + [40_000_000] * 10
     run = Run(late, [], [], [], 10, [], [], {}, None, None)
-    panel = doctor_figure({"idle": run}, 20).axes[0]
+    panel = of_runs({"idle": run}, 20).axes[0]
     bins = [label.get_text() for label in panel.get_xticklabels()]
     limit = panel.lines[0].get_xdata()[0]
     assert bins.index("20 ms") < limit < bins.index("50 ms")

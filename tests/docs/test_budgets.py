@@ -36,7 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2245,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
-    "docs/export.md": 480,
+    "docs/export.md": 516,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
@@ -67,11 +67,11 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (66_346, "a new ability takes the room of an old one"),
-    "tests": (101_073, "one level for each behaviour"),
+    "canshaper": (66_293, "a new ability takes the room of an old one"),
+    "tests": (101_070, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (357, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (354, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

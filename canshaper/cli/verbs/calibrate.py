@@ -152,7 +152,7 @@ def _valve(
     results.print("\n".join(curve_lines(deployment, axis, result, top_pct)), soft_wrap=True)
 
     def figure() -> "Figure":
-        from canshaper.commissioning.calibration.plot import figure as of_valve
+        from canshaper.commissioning.plots import of_valve
 
         return of_valve(axis, deployment.axes[axis].config.limits.output_limits(), result, top_pct)
 

@@ -89,7 +89,7 @@ def doctor(
     print_report(deployment, seconds, runs, findings, results)
 
     def figure() -> "Figure":
-        from canshaper.commissioning.doctor.plot import figure as of_runs
+        from canshaper.commissioning.plots import of_runs
 
         return of_runs(runs, deployment.config.tick_ms)
 

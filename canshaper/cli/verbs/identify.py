@@ -112,11 +112,11 @@ def identify(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.fleet import check_only_folders, identified
     from canshaper.cli.results import Results
+    from canshaper.commissioning.identification.canlog import messages_of
     from canshaper.commissioning.identification.data import (
         axis_named,
         logged,
         measured_in,
-        messages_of,
         pump_in,
         signals_named,
         timed_by_hand,

@@ -107,7 +107,7 @@ def sensor(
     if any(finding.fit for finding in findings):
 
         def figure() -> "Figure":
-            from canshaper.commissioning.sensor.plot import figure as of_sensors
+            from canshaper.commissioning.plots import of_sensors
 
             return of_sensors(findings)
 

@@ -214,9 +214,9 @@ def serve(
     stage: "Stage | None" = None,
 ) -> None:
     """Serve a page until Ctrl-C; ``make`` gets who may see it."""
+    from canshaper.commissioning.doctor.processes import before_the_rest
     from canshaper.studio.access import Access, qr_code, reachable
     from canshaper.studio.server import address, listening, server
-    from canshaper.studio.sources import before_the_rest
 
     try:
         one = stack.enter_context(listening(host, port))

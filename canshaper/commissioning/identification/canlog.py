@@ -16,11 +16,12 @@ from canshaper.codec.signals import find_signal, special_codes
 from canshaper.commissioning.identification.commands import Commands, Samples
 from canshaper.commissioning.identification.series import Kind, Series, Unit, ordered, unit_of
 from canshaper.commissioning.identification.table import is_table
-from canshaper.errors import CutOffError, IdentificationError, LogError
+from canshaper.errors import ConfigError, CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
-from canshaper.machine.database import Messages
+from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogFile, read_log
+from canshaper.shipped import data_directory
 
 
 @dataclass
@@ -254,3 +255,14 @@ def _is_virtual(channel: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def messages_of(files: Sequence[Path], deployment: Deployment | None) -> Messages:
+    """Messages that name the signals."""
+    if not files and deployment:
+        return deployment.messages
+    paths = files or [data_directory() / "dbc" / "forwarder.dbc"]
+    loaded = [load_dbc(path, ()) for path in paths]
+    if problems := [fault for _, faults in loaded for fault in faults]:
+        raise ConfigError(problems)
+    return Messages([one for one, _ in loaded if one])

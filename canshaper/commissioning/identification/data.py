@@ -16,11 +16,10 @@ from canshaper.commissioning.identification.series import Array, Series, Value, 
 from canshaper.commissioning.identification.table import Table, is_table, read_table
 from canshaper.commissioning.identification.verdict import Finding, identify
 from canshaper.edit.edit import written_by
-from canshaper.errors import ConfigError, IdentificationError, UsageError
-from canshaper.machine.database import Messages, load_dbc
+from canshaper.errors import IdentificationError, UsageError
+from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import OnProgress
-from canshaper.shipped import data_directory
 
 # Width of the ellipse that is swung, part of its length, from which on it is reported.
 ROUND = 0.3
@@ -197,20 +196,6 @@ def signals_named(pairs: Sequence[str], deployment: Deployment | None) -> dict[s
     return signals
 
 
-def messages_of(files: Sequence[Path], deployment: Deployment | None) -> Messages:
-    """Messages that name the signals."""
-    if not files and deployment:
-        return deployment.messages
-    loaded, problems = [], []
-    for path in files or [data_directory() / "dbc" / "forwarder.dbc"]:
-        one, faults = load_dbc(path, ())
-        problems += faults
-        loaded += [one] if one else []
-    if problems:
-        raise ConfigError(problems)
-    return Messages(loaded)
-
-
 def logged(
     logs: Sequence[str],
     signals: dict[str, str],
@@ -224,8 +209,9 @@ def logged(
 ) -> list[Finding]:
     """Return the findings of logs, by axis and label."""
     if not logs:
-        text = "expected a log or a stopwatch, got neither"
-        raise UsageError(f"{text}; see canshaper identify --help")
+        raise UsageError(
+            "expected a log or a stopwatch, got neither; see canshaper identify --help"
+        )
     series: dict[tuple[str, str], list[Series]] = {}
     for label, path in map(_labelled, logs):
         report = partial(on_progress, what=path.name)

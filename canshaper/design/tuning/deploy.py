@@ -8,14 +8,8 @@ from typing import Any
 from rich.table import Table
 
 from canshaper.config.filters import Filter, filter_of
-from canshaper.design.tuning.evaluate import (
-    Evaluation,
-    Machine,
-    ShaperFor,
-    evaluate,
-    gff,
-    longest_tail_s,
-)
+from canshaper.design.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, gff
+from canshaper.design.tuning.formulation import longest_tail_s
 from canshaper.design.tuning.optimal import FLAT, Tuning
 from canshaper.report.console import new_table
 from canshaper.shaping.shapers.gff import denominator_from_poles, poles_from_denominator

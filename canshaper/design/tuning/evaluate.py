@@ -13,7 +13,7 @@ from itertools import accumulate
 from typing import Self
 
 from canshaper.config.filters import Filter
-from canshaper.design.tuning.formulation import SETTLED, at_length
+from canshaper.design.tuning.formulation import SETTLED, at_length, gain_at
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
@@ -126,11 +126,6 @@ class Traces:
     sent: tuple[float, ...]
     swing: tuple[float, ...]
     swing_raw: tuple[float, ...]
-
-
-def longest_tail_s(mode: SwayMode) -> float:
-    """Longest tail that is looked at for a swing: two periods, 5 s or more, 12 s as in a file."""
-    return min(max(5.0, math.ceil(2.0 * mode.period_s)), 12.0)
 
 
 def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
@@ -301,14 +296,3 @@ def _modal(
         c = free * c + forced * (held - speed)
         speed = held + (speed - held) * slow
     return result
-
-
-def gain_at(mode: SwayMode, tick_s: float, y: Sequence[float]) -> float:
-    """|H(e^(pT))| from the step response: sum of its increments times e^(-pT k), over its end."""
-    turn, at = cmath.exp(-mode.pole * tick_s), 1.0 + 0j
-    total, before = 0j, 0.0
-    for value in y:
-        total += (value - before) * at
-        before = value
-        at *= turn
-    return abs(total) / abs(y[-1])

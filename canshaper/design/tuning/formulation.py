@@ -7,7 +7,9 @@ for a unit step on the joystick, k = 0 ... N-1, y_(-1) = 0, so that the first ju
 are fractions of full speed; u_max cancels, because the cost grows with its square.
 """
 
+import cmath
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
@@ -207,3 +209,19 @@ def at_length(mode: SwayMode, factor: float) -> SwayMode:
     return SwayMode(
         mode.omega_rad_s / math.sqrt(factor), min(0.95, mode.damping_ratio * factor**-1.5)
     )
+
+
+def longest_tail_s(mode: SwayMode) -> float:
+    """Longest tail that is looked at for a swing: two periods, 5 s or more, 12 s as in a file."""
+    return min(max(5.0, math.ceil(2.0 * mode.period_s)), 12.0)
+
+
+def gain_at(mode: SwayMode, tick_s: float, y: Sequence[float]) -> float:
+    """|H(e^(pT))| from the step response: sum of its increments times e^(-pT k), over its end."""
+    turn, at = cmath.exp(-mode.pole * tick_s), 1.0 + 0j
+    total, before = 0j, 0.0
+    for value in y:
+        total += (value - before) * at
+        before = value
+        at *= turn
+    return abs(total) / abs(y[-1])

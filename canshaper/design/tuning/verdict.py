@@ -12,14 +12,8 @@ from typing import Any, Self
 from canshaper.config.filters import Filter
 from canshaper.config.limits import Sway
 from canshaper.config.source import Place
-from canshaper.design.tuning.evaluate import (
-    Machine,
-    ShaperFor,
-    evaluate,
-    longest_tail_s,
-    shaper_of,
-)
-from canshaper.design.tuning.formulation import MOST_DAMPED
+from canshaper.design.tuning.evaluate import Machine, ShaperFor, evaluate, shaper_of
+from canshaper.design.tuning.formulation import MOST_DAMPED, longest_tail_s
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import every_filter
 from canshaper.machine.stopping import output_limits, when

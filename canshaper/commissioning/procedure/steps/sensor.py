@@ -3,11 +3,11 @@
 from functools import partial
 from pathlib import Path
 
+from canshaper.commissioning.plots import of_sensors
 from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.sensor.finding import DRIVE_IT, Finding, examine
 from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
-from canshaper.commissioning.sensor.plot import figure
 from canshaper.commissioning.sensor.report import heading, table, write_sensors
 from canshaper.machine.deployment import Deployment
 
@@ -34,7 +34,7 @@ def run(context: Context) -> Outcome:
         outcome.sheet.print(*(f"  note: {note}" for note in finding.notes))
         outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
     if any(finding.fit for finding in findings):
-        outcome.figures[""] = partial(figure, findings)
+        outcome.figures[""] = partial(of_sensors, findings)
     given = None if bench.simulated else log
     outcome.edit = partial(_write, findings=findings, log=given)
     return outcome

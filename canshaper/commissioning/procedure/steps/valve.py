@@ -4,7 +4,6 @@ from functools import partial
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration
-from canshaper.commissioning.calibration.plot import figure
 from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, usual_top
 from canshaper.commissioning.calibration.write import (
     SIMULATED,
@@ -12,6 +11,7 @@ from canshaper.commissioning.calibration.write import (
     speed_signal,
     write_curve,
 )
+from canshaper.commissioning.plots import of_valve
 from canshaper.commissioning.procedure.bench import Bench
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging, swings
@@ -57,7 +57,7 @@ def run(context: Context) -> Outcome:
             "delay_pct": round(100.0 * result.positive.delay, 2),
         }
         limits = deployment.axes[name].config.limits.output_limits()
-        outcome.figures[name] = partial(figure, name, limits, result, top_pct)
+        outcome.figures[name] = partial(of_valve, name, limits, result, top_pct)
     if left:
         text = f"{', '.join(left)}: nothing on a bus shows the speed, so the valve is not measured"
         outcome.sheet.print(f"NOTE: {text}; put deadband_pct of its data sheet into the file")

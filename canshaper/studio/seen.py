@@ -1,17 +1,49 @@
-"""How often each source on the buses sends, and how old its last frame is. No clock."""
+"""What the frames on the buses say of an axis and of each source, for the page. No clock."""
 
-import contextlib
-import os
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
-from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY
+from canshaper.studio.words import reason_words, state_level, state_words
 
 WINDOW_S = 1.0
 """Frames are counted over the last second."""
 MOST_FRAMES = 2000
 """Frames of a source that are counted in it."""
+
+
+@dataclass
+class AxisView:
+    """State of an axis; fractions of full, degrees.
+
+    ``opening`` is what the valve frame says, ``valve`` the speed that it means.
+    """
+
+    joystick: float | None = None
+    opening: float = 0.0
+    valve: float | None = None
+    state: int | None = None
+    reason: int | None = None
+    predicted_deg: float | None = None
+    profile: str | None = None
+
+    def values(self) -> dict[str, Any]:
+        """Everything for the page."""
+        return {
+            "joystick": rounded(self.joystick),
+            "valve": rounded(self.valve),
+            "predicted": rounded(self.predicted_deg, 2),
+            "state": None if self.state is None else state_words(self.state),
+            "level": state_level(self.state),
+            "reason": None if self.reason is None else reason_words(self.reason),
+            "profile": self.profile,
+        }
+
+
+def rounded(value: float | None, digits: int = 4) -> float | None:
+    """A number as short as the page needs it."""
+    return None if value is None else round(value, digits)
 
 
 class Sources:
@@ -46,14 +78,3 @@ class Sources:
                 "age_s": None if age_s is None else round(age_s, 2),
             }
         return values
-
-
-def before_the_rest() -> None:
-    """Let this thread come after the daemon and before all else, where that is permitted.
-
-    A browser that draws without a graphics card takes every processor, and joysticks that are late
-    are a fault. What is started from here does not inherit it.
-    """
-    with contextlib.suppress(OSError, AttributeError):  # only Linux has it
-        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(JOYSTICKS_PRIORITY))
