@@ -31,7 +31,7 @@ from canshaper.studio.commission import Commission
 from canshaper.studio.sliders import RANGES
 from canshaper.studio.stage import MACHINE, RAW, Stage
 from canshaper.studio.swing import residuals, sway_of
-from canshaper_sim.axes import OVERHEAD, kind_of
+from canshaper_sim.axes import LUFFING, OVERHEAD, TOWER, kind_of
 from canshaper_sim.crane import CraneParameters
 
 # From the first byte, or from the end of the last answer, to the end of a request.
@@ -231,14 +231,22 @@ def drawn_of(parameters: CraneParameters, coordinates: Mapping[str, str]) -> dic
     """Return what a page draws: how long the links are, which swing each axis excites.
 
     Of an overhead crane ``hall`` says how long runway, bridge and rope are; of others it is None.
+    The boom of another crane with a rope is ``straight``; that of a tower crane is its jib.
     """
-    grapple, own = parameters.grapple, parameters.overhead
+    grapple, own, kind = parameters.grapple, parameters.overhead, kind_of(coordinates.values())
+    boom, tower, luffing = parameters.joints.boom._asdict(), parameters.tower, parameters.luffing
+    if kind == TOWER:
+        jib = {"jib_m": tower.radius_max_m, "pillar_m": tower.jib_m, "straight": True}
+        boom |= {**jib, "main_boom_m": tower.radius_max_m, "outer_boom_m": 0.0}
+    elif kind == LUFFING:
+        boom |= {"pillar_m": luffing.pillar_m, "main_boom_m": luffing.boom_m, "straight": True}
+        boom["outer_boom_m"] = luffing.extension_max_m
     hall = {"runway": own.runway_m, "span": own.span_m, "rope": own.rope_max_m}
     return {
         "sway_of": sway_of(coordinates),
-        "boom": parameters.joints.boom._asdict(),
+        "boom": boom,
         "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
-        "hall": hall if kind_of(coordinates.values()) == OVERHEAD else None,
+        "hall": hall if kind == OVERHEAD else None,
     }
 
 

@@ -50,6 +50,7 @@ class CraneView:
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
         self.trolley: tuple[float, ...] | None = None  # along runway, bridge and rope, m
+        self.rope_m: float | None = None  # from the tip to the load
         self.aim: tuple[float, float] | None = None  # slewed, degrees, and radius, m
         self.simulated = False
         self.missed = 0
@@ -87,6 +88,7 @@ class CraneView:
             ("JointPosition", self._joints),
             ("LoadSway", partial(self._sway, "SwayBridge", "SwayTrolley")),
             ("CranePosition", self._trolley),
+            ("HookPosition", self._hook),
         ):
             message = self._message(message_name)
             if message is not None:
@@ -182,6 +184,7 @@ class CraneView:
             "pose": self.pose,
             "joints": self.joints,
             "trolley": self.trolley,
+            "rope": self.rope_m,
             "aim": self.aim if self.daemon_there(now_s) else None,
             "sway": self.sway_deg or self._predicted(),
             "measured": self.sway_deg is not None and not self.simulated,
@@ -289,6 +292,10 @@ class CraneView:
         values: Any = message.decode(data)
         self.trolley = tuple(float(values[n]) for n in ("Bridge", "Trolley", "RopeLength"))
         self._crane_s = now_s
+
+    def _hook(self, message: Message, data: bytes, _now_s: float) -> None:
+        values: Any = message.decode(data)
+        self.rope_m = float(values["RopeLength"])
 
     def _joints(self, message: Message, data: bytes, now_s: float) -> None:
         values: Any = message.decode(data)

@@ -23,6 +23,15 @@ def test_check_finds_nothing() -> None:
     assert "WARNING" not in said
 
 
+def test_the_first_file_takes_a_hoist_for_an_axis_that_makes_nothing_swing(tmp_path: Path) -> None:
+    answers, file = tmp_path / "answers.txt", tmp_path / "own.yaml"
+    answers.write_text("")
+    dbc = str(FILE.parents[1] / "dbc" / "bridge-crane.dbc")
+    run("init", str(file), "--dbc", dbc, "--answers", str(answers))
+    hoist = file.read_text().partition("\n  hoist:\n")[2].split("\n\n")[0]
+    assert "filter: { kind: off }" in hoist
+
+
 @pytest.mark.slow
 def test_demo_shows_what_the_filters_do(tmp_path: Path) -> None:
     run("demo", str(FILE), "--lockstep", "--out", str(tmp_path))

@@ -125,6 +125,41 @@ def test_no_grapple_leaves_the_picture(
     assert max(halves) < 1.0
 
 
+# The same from the side: how far the tip is from the load in the picture's own metres.
+HANGS_M = """async ([hello, shown]) => {
+    const { SideView } = await import("/static/side_view.js");
+    const canvas = document.createElement("canvas");
+    canvas.style.cssText = "position: fixed; inset: 0 auto auto 0; width: 600px; height: 340px";
+    document.body.append(canvas);
+    const view = new SideView(canvas, hello);
+    view.add(shown);
+    view.draw();
+    canvas.remove();
+    return Object.values(shown.cranes).map((crane) => {
+        const { tip, grapple } = view.points(crane);
+        return [tip[0] <= view.reach, tip[1] <= view.height, tip[1] - grapple[1]];
+    });
+}"""
+
+
+@pytest.mark.parametrize(
+    ("file", "hangs_m"),
+    [("tower-crane", 30.0), ("telehandler", 8.0), ("bridge-crane", 8.0), ("multicopter", 5.0)],
+)
+def test_a_crane_with_a_rope_is_drawn_in_both_views(
+    own: Callable[..., Studio], tab: Callable[..., Page], file: str, hangs_m: float
+) -> None:
+    studio = own(file=f"config/{file}.yaml", groups=())
+    page = tab(studio)
+    expect(page.locator("#nopose")).to_be_hidden()
+    with studio.page() as other:
+        shown = other.until(lambda s: all(crane["measured"] for crane in s["cranes"].values()))
+    assert max(page.evaluate(GRAPPLES_SEEN, [other.hello, shown])) < 1.0
+    for inside, below, hangs in page.evaluate(HANGS_M, [other.hello, shown]):
+        assert inside and below
+        assert hangs == pytest.approx(hangs_m, abs=0.02)
+
+
 def test_the_hint_covers_no_words_of_a_view(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:

@@ -12,11 +12,13 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.shaping.states import Reason, State
+from canshaper.studio.server import drawn_of
 from canshaper.studio.view import SILENT_S, CraneView
 from canshaper.studio.words import FAULTS, fault_words, reason_words, state_words
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.hand import Hand, Held
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
@@ -79,6 +81,21 @@ def test_a_bridge_crane_has_a_trolley_and_a_load() -> None:
     assert shown["sway"] == pytest.approx((2.0, -1.0), abs=0.01)
     assert shown["trolley"] == (0.0, 0.0, 8.0)
     assert shown["measured"] and shown["crane"] and shown["pose"] is None
+
+
+@pytest.mark.parametrize(("name", "rope_m"), [("tower-crane", 30.0), ("telehandler", 8.0)])
+def test_a_crane_with_a_rope_at_its_tip_is_drawn_with_what_it_says(
+    name: str, rope_m: float
+) -> None:
+    watched = Watched(name)
+    shown = watched.receive(PlantNode(watched.deployment).feedback())
+    drawn = drawn_of(changed_parameters([], watched.deployment), watched.deployment.coordinates)
+    assert shown["rope"] == pytest.approx(rope_m, abs=0.01)
+    boom, (_, radius_m, height_m) = drawn["boom"], shown["pose"]
+    assert boom["straight"] and drawn["hall"] is None
+    assert radius_m <= boom["main_boom_m"] + boom["outer_boom_m"]
+    if name == "tower-crane":
+        assert height_m == pytest.approx(boom["pillar_m"], abs=0.01)
 
 
 @pytest.mark.parametrize("name", [*FILES, "two-cranes"])

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     )
 
 # By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
-CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)
+CALM = re.compile(r"lift|hoist|rotat|turn|grip|open|close", re.IGNORECASE)
 SLEW = re.compile(r"slew|swing|swivel", re.IGNORECASE)
 NEAR_FAR = re.compile(r"near|far|radial|reach|crowd", re.IGNORECASE)
 SENSOR_CYCLES = 4  # of a sensor's message in its timeout

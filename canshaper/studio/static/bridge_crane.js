@@ -9,8 +9,8 @@ const MIDDLE_M = 2; // of the bridge, from where forwarders stand
 
 export class BridgeCrane extends Crane {
   build({ hall }) {
-    this.scale = TOP_M / (hall.rope + FREE_M);
-    const [runway, half] = [hall.runway * this.scale, (hall.span * this.scale) / 2];
+    this.size = TOP_M / (hall.rope + FREE_M);
+    const [runway, half] = [hall.runway * this.size, (hall.span * this.size) / 2];
     const box = (x, y, z, material, group) => {
       const mesh = new THREE.Mesh(new THREE.BoxGeometry(x, y, z), material);
       group.add(mesh);
@@ -35,7 +35,7 @@ export class BridgeCrane extends Crane {
   at({ trolley, sway }) {
     const { tip, load } = ropePoints(trolley, sway);
     return [tip, load].map(([runway, bridge, up]) => new THREE.Vector3(
-      MIDDLE_M + bridge * this.scale, -runway * this.scale, TOP_M + up * this.scale));
+      MIDDLE_M + bridge * this.size, -runway * this.size, TOP_M + up * this.size));
   }
 
   pose(_hello, crane) {

@@ -1,10 +1,11 @@
 // One crane in three dimensions: its parts, its name, and where they are. z is up, as in the model.
 import * as THREE from "/static/vendor/three.js";
-import { boomPoints, grapplePoints } from "/static/geometry.js";
+import { boomPoints, hungPoints, tallest } from "/static/geometry.js";
 import { text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
 const TRAIL = 90;
+const TALL_M = 6.4; // of the picture: a taller crane is drawn smaller
 const LABEL_M = 0.9; // height of the letters' box
 const UP = new THREE.Vector3(0, 0, 1);
 const DOWN = new THREE.Vector3(0, 0, -1);
@@ -17,7 +18,9 @@ export class Crane {
     this.title = title;
     this.color = color;
     this.ghostly = false;
+    this.scale = hello.hall ? 1 : Math.min(1, TALL_M / tallest(hello.boom));
     this.group = new THREE.Group();
+    this.group.scale.setScalar(this.scale);
     this.steel = new THREE.MeshLambertMaterial();
     this.dark = new THREE.MeshLambertMaterial();
     this.tool = new THREE.MeshLambertMaterial();
@@ -33,9 +36,10 @@ export class Crane {
     this.slew.add(this.plumb);
     this.shade = new THREE.Mesh(new THREE.CircleGeometry(0.42, 20), new THREE.MeshBasicMaterial({ color: 0, transparent: true, opacity: 0.28 }));
     this.shade.position.z = 0.01;
+    this.shade.scale.setScalar(1 / this.scale);
     this.group.add(this.shade);
     this.label = new THREE.Sprite(new THREE.SpriteMaterial({ depthTest: false, transparent: true, fog: false }));
-    this.label.position.set(-1.6, 0, 1.3); // at its foot, where nothing of it moves
+    this.label.position.set(-1.6, 0, 1.3).divideScalar(this.scale); // at its foot, where nothing of it moves
     this.label.renderOrder = 1;
     this.group.add(this.label);
     this.path = new Float32Array(TRAIL * 3);
@@ -50,12 +54,14 @@ export class Crane {
     this.group.add(this.aim);
   }
 
-  /** Its parts: here a forwarder's. */
+  /** Its parts: of a forwarder, or of a crane with a rope; as thick in the picture, whatever its size. */
   build(hello) {
-    this.carrier();
-    const pillar = new THREE.Mesh(new THREE.CylinderGeometry(0.2, 0.3, hello.boom.pillar_m - 0.75, 16), this.steel);
+    const { boom } = hello;
+    if (!boom.jib_m) this.carrier(!boom.straight);
+    const thick = boom.straight ? 1 / this.scale : 1;
+    const pillar = new THREE.Mesh(new THREE.CylinderGeometry(0.2 * thick, 0.3 * thick, boom.pillar_m - 0.75, 16), this.steel);
     pillar.rotation.x = Math.PI / 2;
-    pillar.position.z = 0.75 + (hello.boom.pillar_m - 0.75) / 2;
+    pillar.position.z = 0.75 + (boom.pillar_m - 0.75) / 2;
     this.slew.add(pillar);
     this.main = this.beam(0.3, 0.24, this.steel);
     this.outer = this.beam(0.25, 0.2, this.steel);
@@ -67,12 +73,12 @@ export class Crane {
       return mesh;
     });
     this.link = this.beam(0.05, 0.05, this.dark);
-    this.grapple = this.buildGrapple();
+    this.grapple = boom.straight ? this.buildLoad() : this.buildGrapple();
     this.slew.add(this.grapple);
   }
 
   /** The forwarder it stands on, and a few logs. */
-  carrier() {
+  carrier(logs) {
     const add = (geometry, material, x, y, z) => {
       const mesh = new THREE.Mesh(geometry, material);
       mesh.position.set(x, y, z);
@@ -83,16 +89,26 @@ export class Crane {
     for (const x of [-2.5, 0.7]) {
       for (const y of [-0.72, 0.72]) add(new THREE.CylinderGeometry(0.52, 0.52, 0.42, 20), this.dark, x, y, 0.52);
     }
-    for (const [i, [x, y]] of [[5.6, -1.2], [5.9, -0.85], [5.75, -1.02]].entries()) {
+    for (const [i, [x, y]] of (logs ? [[5.6, -1.2], [5.9, -0.85], [5.75, -1.02]] : []).entries()) {
       const log = add(new THREE.CylinderGeometry(0.17, 0.19, 3.2, 10), this.wood, x, y, i === 2 ? 0.47 : 0.18);
       log.rotation.z = Math.PI / 2 - 0.06;
     }
   }
 
   beam(width, height, material) {
-    const mesh = new THREE.Mesh(new THREE.BoxGeometry(1, width, height), material);
+    const mesh = new THREE.Mesh(new THREE.BoxGeometry(1, width / this.scale, height / this.scale), material);
     this.slew.add(mesh);
     return mesh;
+  }
+
+  /** A load on a hook, hanging along -z. */
+  buildLoad() {
+    const group = new THREE.Group();
+    const load = new THREE.Mesh(new THREE.BoxGeometry(0.5, 0.5, 0.4), this.tool);
+    load.position.z = -0.2;
+    group.add(load);
+    group.scale.setScalar(1 / this.scale);
+    return group;
   }
 
   buildGrapple() {
@@ -150,7 +166,7 @@ export class Crane {
     this.label.material.map = new THREE.CanvasTexture(canvas);
     this.label.material.map.colorSpace = "srgb";
     this.label.material.needsUpdate = true;
-    this.label.scale.set(4 * LABEL_M, LABEL_M, 1);
+    this.label.scale.set(4 * LABEL_M, LABEL_M, 1).divideScalar(this.scale);
   }
 
   /** See-through, and behind the other one, for two cranes in one place. */
@@ -188,13 +204,15 @@ export class Crane {
     this.joints[0].position.copy(at(points.start));
     this.joints[1].position.copy(at(points.elbow));
     const tip = at(points.tip);
-    const hung = grapplePoints(hello.grapple, crane.sway);
+    const hung = hungPoints(hello, crane);
     const joint = tip.clone().add(new THREE.Vector3(...hung.joint));
-    this.hang(tip, joint, tip.clone().add(new THREE.Vector3(...hung.grapple)));
+    const end = tip.clone().add(new THREE.Vector3(...hung.grapple));
+    if (crane.rope) this.hang(tip, end, end.clone().multiplyScalar(2).sub(tip));
+    else this.hang(tip, joint, end);
     this.aim.visible = Boolean(crane.aim);
     if (crane.aim) {
       const [angle, radius] = [crane.aim[0] * RAD, crane.aim[1]];
-      const down = grapplePoints(hello.grapple).grapple[2];
+      const down = hungPoints(hello, { rope: crane.rope }).grapple[2];
       this.aim.position.set(radius * Math.cos(angle), radius * Math.sin(angle), tip.z + down);
     }
   }
@@ -229,7 +247,7 @@ export class Crane {
     if (!pose || !crane.sway) return;
     const tip = boomPoints(hello.boom, pose, crane.joints).tip;
     this.mark(new THREE.Vector3(tip[0], 0, tip[1])
-      .add(new THREE.Vector3(...grapplePoints(hello.grapple, crane.sway).grapple))
+      .add(new THREE.Vector3(...hungPoints(hello, crane).grapple))
       .applyAxisAngle(UP, pose[0] * RAD));
   }
 

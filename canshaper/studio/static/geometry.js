@@ -4,9 +4,19 @@
 const RAD = Math.PI / 180;
 const COMFORT = 0.94; // of the reach: a straight arm is hardly ever driven
 
+/** Height of the highest point that a boom is drawn at, m. */
+export function tallest(boom) {
+  if (boom.jib_m) return boom.pillar_m;
+  return boom.pillar_m + boom.main_boom_m + (boom.straight ? boom.outer_boom_m : 0);
+}
+
+/** Length of a counter jib, m; 0 for a crane without one. */
+export const counterJib = (boom) => 0.25 * (boom.jib_m ?? 0);
+
 /** Pivots of the boom as [radius, height]: lift joint, knuckle, telescope, tip. */
 export function boomPoints(boom, pose, joints) {
   const start = [boom.pillar_offset_m, boom.pillar_m];
+  if (boom.straight) return fromTip(boom, start, [pose[1], pose[2]]);
   if (joints) {
     const [lift, knuckle] = [joints[0] * RAD, joints[1] * RAD];
     return fromJoints(boom, start, lift, knuckle, joints[2]);
@@ -22,6 +32,16 @@ export function boomPoints(boom, pose, joints) {
   return fromJoints({ ...boom, knuckle_offset_m: 0 }, start, lift, -fold, outer - boom.outer_boom_m);
 }
 
+/** A jib with a trolley and a counter jib, or a straight boom whose telescope goes to its tip. */
+function fromTip(boom, start, tip) {
+  if (boom.jib_m) {
+    return { start, elbow: [boom.jib_m, start[1]], base: start, end: [-counterJib(boom), start[1]], tip };
+  }
+  const part = Math.min(1, boom.main_boom_m / Math.hypot(tip[0] - start[0], tip[1] - start[1]));
+  const elbow = start.map((from, k) => from + part * (tip[k] - from));
+  return { start, elbow, base: elbow, end: elbow, tip };
+}
+
 function fromJoints(boom, start, lift, knuckle, extension) {
   const turn = lift + knuckle;
   const [s, c] = [Math.sin(turn), Math.cos(turn)];
@@ -29,6 +49,11 @@ function fromJoints(boom, start, lift, knuckle, extension) {
   const base = [elbow[0] + boom.knuckle_offset_m * s, elbow[1] - boom.knuckle_offset_m * c];
   const along = (length) => [base[0] + length * c, base[1] + length * s];
   return { start, elbow, base, end: along(boom.outer_boom_m), tip: along(boom.outer_boom_m + extension) };
+}
+
+/** What hangs from the tip of a crane: a load on its rope, or a grapple. */
+export function hungPoints(hello, { rope, sway }) {
+  return grapplePoints(rope ? { l1: 0, l2: rope } : hello.grapple, sway);
 }
 
 /** Link joint and grapple relative to the tip, as [outwards, in slew direction, upwards]. */

@@ -1,6 +1,6 @@
 // The cranes from above, on one scale: the way of tip and grapple, and how far the grapple gets past
 // a tip that stands.
-import { boomPoints, grapplePoints, ropePoints } from "/static/geometry.js";
+import { boomPoints, hungPoints, ropePoints } from "/static/geometry.js";
 import { nameOf, text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
@@ -12,7 +12,8 @@ const FREE_M = 0.8; // around what is drawn
 const DRAW_MS = 50;
 
 /** Tip and grapple from above, [x, y]; the boom that has not slewed lies along x. */
-export function fromAbove(hello, { pose, joints, trolley, sway, aim }) {
+export function fromAbove(hello, crane) {
+  const { pose, joints, trolley, sway, aim } = crane;
   if (trolley) {
     const { tip, load } = ropePoints(trolley, sway);
     return { tip: tip.slice(0, 2), grapple: sway ? load.slice(0, 2) : null, aim: null };
@@ -20,7 +21,7 @@ export function fromAbove(hello, { pose, joints, trolley, sway, aim }) {
   const [s, c] = [Math.sin(pose[0] * RAD), Math.cos(pose[0] * RAD)];
   const at = (out, side) => [out * c - side * s, out * s + side * c];
   const radius = boomPoints(hello.boom, pose, joints).tip[0];
-  const [out, side] = grapplePoints(hello.grapple, sway).grapple;
+  const [out, side] = hungPoints(hello, crane).grapple;
   return { tip: at(radius, 0), grapple: sway ? at(radius + out, side) : null, aim: aimAt(aim) };
 }
 

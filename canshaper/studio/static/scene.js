@@ -34,9 +34,9 @@ export class Scene {
     this.camera = new THREE.PerspectiveCamera(FIELD_DEG, 1, 0.1, 120);
     // Two stand side by side; of more the eye is farther away.
     const far = Math.max(1, 0.4 + 0.3 * hello.cranes.length);
-    this.camera.position.set(...(hello.hall ? [-14, 3, 5] : [-10.2, 7.6, 4.4])).multiplyScalar(far);
+    this.camera.position.set(...(hello.hall || hello.boom.straight ? [-14, 3, 5] : [-10.2, 7.6, 4.4])).multiplyScalar(far);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
-    this.controls.target.set(1.4, hello.hall ? 3.2 : 1.55, 0);
+    this.controls.target.set(1.4, hello.hall || hello.boom.straight ? 3.2 : 1.55, 0);
     this.controls.maxPolarAngle = 1.52;
     this.controls.minDistance = 4;
     this.controls.maxDistance = 45;

@@ -1,5 +1,5 @@
 // The cranes from the side, in two dimensions: where there is no WebGL.
-import { boomPoints, grapplePoints } from "/static/geometry.js";
+import { boomPoints, counterJib, hungPoints, ropePoints, tallest } from "/static/geometry.js";
 import { nameOf, text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
@@ -18,9 +18,11 @@ export class SideView {
     this.pen = canvas.getContext("2d");
     this.overlay = false;
     this.trails = Object.fromEntries(hello.cranes.map((name) => [name, []]));
-    const { boom, grapple } = hello;
+    const { boom, grapple, hall } = hello;
+    this.behind = BEHIND_M + counterJib(boom);
     this.reach = boom.main_boom_m + boom.outer_boom_m + TELESCOPE_M + FREE_M;
-    this.height = boom.pillar_m + boom.main_boom_m + FREE_M + grapple.l1;
+    this.height = tallest(boom) + FREE_M + grapple.l1;
+    if (hall) [this.behind, this.reach, this.height] = [0, hall.runway, hall.rope + 2 * FREE_M];
     this.paint();
   }
 
@@ -43,16 +45,22 @@ export class SideView {
     this.shown = shown;
     for (const [name, crane] of Object.entries(shown.cranes)) {
       const trail = this.trails[name];
-      if (!crane.pose || !crane.sway) continue;
+      if (!(crane.pose || crane.trolley) || !crane.sway) continue;
       trail.push(this.points(crane).grapple);
       if (trail.length > TRAIL) trail.shift();
     }
   }
 
-  /** Pivots and grapple as [radius, height]. */
+  /** Pivots and grapple as [radius, height]; of a bridge crane along its runway, above the ground. */
   points(crane) {
+    const { hall } = this.hello;
+    if (hall) {
+      const { tip, load } = ropePoints(crane.trolley, crane.sway);
+      const [hook, grapple] = [tip, load].map(([along, , up]) => [along + hall.runway / 2, hall.rope + FREE_M + up]);
+      return { tip: hook, joint: grapple, grapple };
+    }
     const points = boomPoints(this.hello.boom, crane.pose, crane.joints);
-    const hung = grapplePoints(this.hello.grapple, crane.sway);
+    const hung = hungPoints(this.hello, crane);
     const at = ([out, , up]) => [points.tip[0] + out, points.tip[1] + up];
     return { ...points, joint: at(hung.joint), grapple: at(hung.grapple) };
   }
@@ -68,13 +76,13 @@ export class SideView {
     pen.fillRect(0, 0, w, h);
     const { cranes } = this.hello;
     const part = this.overlay ? w : w / cranes.length;
-    const scale = Math.min(part / (this.reach + BEHIND_M), h / (this.height + FREE_M));
+    const scale = Math.min(part / (this.reach + this.behind), h / (this.height + FREE_M));
     const ground = h - FREE_M * scale;
     pen.fillStyle = colors.ground;
     pen.fillRect(0, ground, w, h - ground);
     cranes.forEach((name, i) => {
       const left = this.overlay ? 0 : i * part;
-      const at = ([radius, height]) => [left + (radius + BEHIND_M) * scale, ground - height * scale];
+      const at = ([radius, height]) => [left + (radius + this.behind) * scale, ground - height * scale];
       this.drawCrane(name, this.shown?.cranes[name], at, i, left);
     });
   }
@@ -88,20 +96,25 @@ export class SideView {
     pen.fillText(nameOf("crane", name), left + 12, 22 + (this.overlay ? 20 * number : 0));
     pen.font = "13px system-ui, sans-serif";
     pen.fillStyle = colors.text;
-    if (!crane?.pose) {
+    const { hall, boom } = this.hello;
+    if (!(hall ? crane?.trolley : crane?.pose)) {
       pen.fillText(text("nopose.crane"), left + 12, 62);
       return;
     }
-    const angle = text("page.slewed", { deg: (((crane.pose[0] + 540) % 360) - 180).toFixed(0) });
-    const across = crane.sway ? `, ${text("page.across", { deg: crane.sway[0].toFixed(1) })}` : "";
+    const angle = hall ? "" : `${text("page.slewed", { deg: (((crane.pose[0] + 540) % 360) - 180).toFixed(0) })}, `;
+    const across = crane.sway ? text("page.across", { deg: crane.sway[hall ? 1 : 0].toFixed(1) }) : "";
     if (!this.overlay) {
       pen.fillText(angle + across, left + 12, 42);
       if (!crane.measured) pen.fillText(text(crane.simulated ? "page.simulated" : "page.modelled"), left + 12, 62);
     }
     const points = this.points(crane);
-    this.line([[0, 0], [0, this.hello.boom.pillar_m], points.start].map(at), color, BOOM_PX + 2);
-    this.line([points.start, points.elbow, points.base, points.end].map(at), color, BOOM_PX);
-    this.line([points.end, points.tip].map(at), color, BOOM_PX - 2);
+    if (hall) {
+      this.line([[0, points.tip[1]], [hall.runway, points.tip[1]]].map(at), colors.quiet, BOOM_PX - 2);
+    } else {
+      this.line([[0, 0], [0, boom.pillar_m], points.start].map(at), color, BOOM_PX + 2);
+      this.line([points.start, points.elbow, points.base, points.end].map(at), color, BOOM_PX);
+      this.line([points.end, points.tip].map(at), color, BOOM_PX - 2);
+    }
     this.line([points.tip, [points.tip[0], 0]].map(at), colors.quiet, 1, [4, 4]);
     this.line(this.trails[name].map(at), color, 1.5);
     if (!crane.sway) return;
