@@ -42,7 +42,7 @@ BUDGET = {
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
-    "docs/machines.md": 975,
+    "docs/machines.md": 980,
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
@@ -68,7 +68,7 @@ LINES = {
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
     "canshaper": (66_308, "a new ability takes the room of an old one"),
-    "tests": (101_232, "one level for each behaviour"),
+    "tests": (101_236, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (354, "one that only hands on is joined to its reader")}

@@ -13,14 +13,16 @@ from websockets.sync.client import connect
 from tests.faults.shipped import NAMES
 from tests.studio.conftest import Studio
 from tests.studio.page import WAIT_S
-from tests.studio.shown import pose, valves
+from tests.studio.shown import valves
 
 # Their cranes are in the page's process: each crane has one multicast group.
 SEVERAL_BUSES = ("gateway-forwarder", "two-cranes", "pvedcc-forwarder")
 
 
-def flat(poses: list[Any]) -> list[float]:
-    return [number for one in poses for number in one]
+def where(crane: dict[str, Any]) -> list[float]:
+    """Tip and rope of a crane; a tower's height stays."""
+    numbers = [*(crane["trolley"] or crane["pose"])[:3]]
+    return [*numbers[:2], crane["rope"]] if crane["rope"] else numbers
 
 
 def test_it_shows_both_cranes(shared: Studio) -> None:
@@ -199,17 +201,19 @@ def test_every_shipped_machine_is_driven_with_all_its_axes(
     groups = () if name in SEVERAL_BUSES else None
     with own(file=f"{name}.yaml", groups=groups).page() as page:
         page.drive()
-        before = pose(page.shown)
+        before = {n: where(crane) for n, crane in page.shown["cranes"].items()}
 
         def moving(shown: dict[str, Any]) -> bool:
             cranes = shown["cranes"].items()
-            slew = {n: crane["axes"]["slew"]["state"] for n, crane in cranes}
+            first = {n: next(iter(crane["axes"].values()))["state"] for n, crane in cranes}
+            moved = [
+                sum(abs(a - b) > 0.02 for a, b in zip(where(crane), before[n], strict=True))
+                for n, crane in cranes
+            ]
             return (
-                slew == {"shaped": "moving, shaped", "raw": "moving, unshaped"}
+                first == {"shaped": "moving, shaped", "raw": "moving, unshaped"}
                 and all(min(valves(shown, n)) > 0.1 for n, _ in cranes)
-                and all(
-                    abs(a - b) > 0.02 for a, b in zip(flat(pose(shown)), flat(before), strict=True)
-                )
+                and min(moved) >= min(3, len(shown["cranes"]["raw"]["axes"]))
             )
 
         page.hold(0.3, moving, "all axes of both cranes in motion")
