@@ -1,4 +1,4 @@
-"""What other programs may use: complete, documented, lazy, and every example of it runs."""
+"""The interface for other programs: complete, documented, lazy, and every example of it runs."""
 
 import ast
 import doctest

@@ -26,7 +26,7 @@ COUNT = int(os.environ.get("CANSHAPER_BOXES", "3"))
 
 
 def kept(name: str, seed: int) -> list[tuple[bytes, bytes]]:
-    """What the daemon has recorded in a sequence."""
+    """Recording of the daemon in a sequence."""
     made: list[Kept] = []
 
     def make(folder: Path | None) -> Kept:

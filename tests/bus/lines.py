@@ -32,7 +32,7 @@ class SerialLine:
         self.text = b""
 
     def read(self) -> bytes:
-        """What came, until nothing more comes; all of it so far."""
+        """Read until nothing more comes; return all of it so far."""
         while select.select([self._ours], [], [], 0.05)[0]:
             self.text += os.read(self._ours, 65536)
         return self.text

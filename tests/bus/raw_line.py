@@ -127,11 +127,11 @@ class Line:
         self.far[SENT_BACK].send(data[:size])
 
     def received(self) -> list[Frame]:
-        """What the port hands out in a tick."""
+        """Frames that the port hands out in a tick."""
         return [*self.port.frames(), *self.port.background()]
 
     def sent(self) -> list[bytes]:
-        """What went out since the last call."""
+        """Frames that left since the last call."""
         frames = []
         while True:
             try:

@@ -69,7 +69,7 @@ def test_a_steady_wall_clock_gives_the_arrival_to_the_nanosecond(clocks: Clocks)
 
 
 def test_a_stamp_outside_of_the_time_between_two_reads_is_none(clocks: Clocks) -> None:
-    """What no clock can have been: before the port was seen empty, or after the read began."""
+    """No clock gives it: before the port was seen empty, or after the read began."""
     arrivals = Arrivals()
     clocks.now_ns += TICK_NS
     arrivals.begin()

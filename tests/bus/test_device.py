@@ -66,7 +66,7 @@ def test_no_such_interface(here: FakeDevices, name: str) -> None:
 
 
 def test_a_name_that_changes_hands_while_it_is_read(here: FakeDevices) -> None:
-    """What was read may be of both devices."""
+    """Values that were read may be of both devices."""
     file = here.root / "sys/class/net/can0/ifindex"
 
     def query(index: int) -> tuple[str | None, int | None]:

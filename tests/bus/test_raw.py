@@ -151,7 +151,7 @@ def test_what_overflows_of_ids_that_no_one_knows_is_no_fault() -> None:
 
 
 def test_confirmations_may_be_among_the_frames_that_were_lost() -> None:
-    """What was under way is not waited for any more, or a valve would be cut off."""
+    """Frames under way are not waited for any more, or a valve would be cut off."""
     faults, port = overflowing(SENT_BACK)
     assert faults == [FrameFault.FRAMES_LOST]
     assert port._unconfirmed == {}

@@ -1,4 +1,4 @@
-"""What a campaign draws, and what it measures of a drive."""
+"""Draws of a campaign, and its measures of a drive."""
 
 import math
 from pathlib import Path

@@ -49,7 +49,7 @@ def test_bus_options(two_buses: Path) -> None:
 
 
 def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path) -> None:
-    """What a file says of sharing is not said of another interface."""
+    """Sharing in a file holds for its own interface alone."""
     text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     bus = "{ interface: socketcan, channel: vcan0, bitrate: 250000 }"
     shared = tmp_path / "machine.yaml"

@@ -1,4 +1,4 @@
-"""What the command line imports, and what it does without the desk tools."""
+"""Modules that the command line imports, and its verbs without the desk tools."""
 
 import subprocess
 import sys

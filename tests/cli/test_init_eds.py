@@ -115,7 +115,7 @@ class Machine:
 
 
 def readable(file: Path) -> str:
-    """The same file as canopen takes it: no empty numbers in DeviceInfo."""
+    """Return an EDS as canopen takes it: no empty numbers in DeviceInfo."""
     copy = file.with_name(f"plain-{file.name}.eds")
     copy.write_bytes(file.read_bytes().replace(b"VendorNumber=", b"VendorNumber=0"))
     return str(copy)

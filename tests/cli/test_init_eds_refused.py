@@ -1,4 +1,4 @@
-"""What ``canshaper init --eds`` refuses, in one line each and with nothing written."""
+"""EDS files that ``canshaper init --eds`` refuses, in one line each and with nothing written."""
 
 from pathlib import Path
 

@@ -30,7 +30,7 @@ FULL = {"slew": 0.5, "near_far": 1.0}  # rad/s, m/s
 
 @dataclass(frozen=True)
 class TwinCrane:
-    """What the twin is made of.
+    """Masses, lengths and dampings of the twin.
 
     Attributes:
         radius_m: of the tip at the start.

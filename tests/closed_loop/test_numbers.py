@@ -1,4 +1,4 @@
-"""What the shipped deployment promises, on the nonlinear crane with real valves, in lock-step."""
+"""Promises of the shipped deployment, on the nonlinear crane with real valves, in lock-step."""
 
 import cmath
 import math

@@ -56,7 +56,7 @@ def nothing(_time_s: float) -> Iterator[Frame]:
 
 @dataclass(frozen=True)
 class Left:
-    """What a drive left of swing along the boom, degrees, and what was thought of the sensor."""
+    """Swing along the boom that a drive left, degrees, and trust in its sensor."""
 
     swing_deg: float
     trust: list[str]

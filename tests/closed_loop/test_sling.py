@@ -57,7 +57,7 @@ def robust(file: Path, *words: str) -> tuple[int, str]:
 def left_deg(
     deployment: Deployment, name: str, omegas: list[float], *, bypass: bool = False
 ) -> list[float]:
-    """What is left of each mode, degrees of the hook, when the tail is over."""
+    """Swing left in each mode, degrees of the hook, when the tail is over."""
     strokes = DRIVES[name]
     end_s = max(one.end_s for one in strokes) + 7.0
     recording = drive(deployment, Script(name, strokes, end_s + LOOK_S), bypass=bypass)

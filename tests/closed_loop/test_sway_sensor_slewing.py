@@ -70,7 +70,7 @@ SLEWS = {
 def along_boom_deg(
     deployment: Deployment, slew: tuple[Stroke, ...], length_pct: float, seed: int = 1
 ) -> float:
-    """What slewing leaves along the boom, where no one touches the joystick."""
+    """Swing along the boom that slewing leaves, where no one touches the joystick."""
     crane = CraneParameters()
     grapple = crane.grapple.longer(length_pct)
     sensor = replace(crane.sway_sensor, seed=seed)

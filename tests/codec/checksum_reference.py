@@ -25,7 +25,7 @@ PLACES = {4: "48|4@1+", 8: "48|8@1+", 16: "40|16@1+"}
 
 
 def with_checksum(kind: str, bits: int, can_id: int, data: bytes) -> bytes:
-    """The same frame of JoystickLeft with its checksum."""
+    """Return the frame of JoystickLeft with its checksum."""
     start = int(PLACES[bits].partition("|")[0])
     word = int.from_bytes(data, "little") & ~((1 << bits) - 1 << start)
     clear = word.to_bytes(len(data), "little")

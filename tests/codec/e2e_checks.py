@@ -1,4 +1,4 @@
-"""What the tests of AUTOSAR E2E share."""
+"""Checks that the tests of AUTOSAR E2E share."""
 
 from hypothesis import strategies as st
 

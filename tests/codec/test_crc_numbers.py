@@ -37,7 +37,7 @@ CATALOGUE = {
 
 @pytest.fixture(autouse=True)
 def _as_before() -> Iterator[None]:
-    """What a test adds to the table goes with it."""
+    """Take entries of a test out of the table with it."""
     before = dict(CHECKSUMS)
     yield
     CHECKSUMS.clear()

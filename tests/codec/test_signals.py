@@ -1,4 +1,4 @@
-"""What a DBC says of a signal: its range, its names of values, its start value."""
+"""Range, names of values and start value that a DBC gives a signal."""
 
 import cantools
 import pytest

@@ -30,7 +30,7 @@ DESIGNED = {"period_s": 2.356, "damping_ratio": 0.038}
 
 
 class Measured:
-    """What a measurement has found, as far as it is written."""
+    """Values of a measurement, as far as they are written."""
 
     axis = "near_far"
     sway = SWAY
@@ -135,7 +135,7 @@ def check(file: Path, old: bytes, new: bytes) -> bool:
 
 
 def written(writer: Writer, deployment: Deployment) -> tuple[bytes, bytes]:
-    """What stands there before and after it; the file is as it was again."""
+    """Return the content before and after a write; the file is as it was again."""
     old = deployment.path.read_bytes()
     writer(deployment)
     new = deployment.path.read_bytes()

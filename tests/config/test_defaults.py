@@ -1,4 +1,4 @@
-"""What a deployment gets that says only what it must, sway data, and files made of noise."""
+"""Defaults of a minimal deployment, sway data, and files made of noise."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What a start of the daemon does not do with the schema."""
+"""Work on the schema that a start of the daemon avoids."""
 
 import subprocess
 import sys

@@ -64,7 +64,7 @@ ANSWERS = [
 
 
 def renamed(text: str) -> str:
-    """What the answers ask for, done in an editor."""
+    """Make the changes by hand that the answers ask for."""
     for pattern, name in MOVED.items():
         old = pattern.split(".")[-1].split("|")[0]
         text = re.sub(rf"\b{old}:", f"{name}:", text)

@@ -27,7 +27,7 @@ AXES = {"slew": (0x110, 0, 0x200), "near_far": (0x110, 2, 0x201), "lift": (0x111
 
 @dataclass
 class Judge:
-    """What an axis may do, from the bytes of its joystick alone."""
+    """Motion that an axis may make, from the bytes of its joystick alone."""
 
     joystick: int
     byte: int

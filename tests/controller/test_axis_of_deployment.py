@@ -1,4 +1,4 @@
-"""What a deployment says of an axis gets to the axis: tick, neutral band, grid, filter, limits."""
+"""Values of a deployment reach the axis: tick, neutral band, grid, filter, limits."""
 
 from collections.abc import Callable
 from typing import Any
@@ -44,7 +44,7 @@ def test_the_grid_is_that_of_the_valve(changed_rig: Make) -> None:
 
 
 def sent(rig: Rig, axis: ShapedAxis) -> tuple[list[float], list[float]]:
-    """What slew sends, and what an axis made by hand sends, through a stroke of two seconds."""
+    """Setpoints of slew, and of an axis made by hand, through a stroke of two seconds."""
     got, expected = [], []
     for tick in range(200):
         joystick = 1000 if 3 <= tick < 100 else 0

@@ -1,4 +1,4 @@
-"""What a reload carries over: what other nodes reported, and what is latched."""
+"""A reload carries over reports of other nodes, and latched states."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a reload carries over: every counter, addresses and active faults."""
+"""A reload carries over every counter, addresses and active faults."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a reload carries over of joysticks, switches and missed deadlines."""
+"""A reload carries over states of joysticks, switches and missed deadlines."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What is counted where: an administrator reads the status message, not the log."""
+"""Counters and their places: an administrator reads the status message, not the log."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What enables a joystick: several switches, all needed, in other messages too."""
+"""Switches that enable a joystick: several, all needed, in other messages too."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What counts as a press or a release of an enable switch: by frames, and over a reload."""
+"""Press and release of an enable switch: by frames, and over a reload."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What an axis gets of a joystick whose enable switch is in the frames of another one."""
+"""Demands of a joystick whose enable switch is in the frames of another one."""
 
 from collections.abc import Callable, Iterator
 
@@ -59,7 +59,7 @@ class Joystick:
         self.releases = 0
 
     def command(self, later_ms: int = 0, trip: Reason | None = None) -> CommandInput:
-        """What an axis gets now, and knows from now on."""
+        """Demand of an axis now, and its knowledge of the switch from now on."""
         now_ns = self._inputs.now_ns + later_ms * MS
         command, self.releases = self.input.command("Slew", now_ns, self.releases, trip, 0.02)
         return command

@@ -1,4 +1,4 @@
-"""What an axis gives its sway sensor with a measurement: swing of full speed, and whose it is."""
+"""Values that an axis hands to its sway sensor: swing of full speed, and whose it is."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -34,7 +34,7 @@ class Given(NamedTuple):
 
 
 def given(runner: AxisControl) -> list[Given]:
-    """What the sensor of an axis is given from now on."""
+    """Record the values that the sensor of an axis is given from now on."""
     sensed = runner.axis.sensed
     assert sensed is not None
     measure, seen = sensed.measure, []

@@ -128,7 +128,7 @@ def test_without_near_far_slew_keeps_its_part(changed_rig: Make) -> None:
 
 
 def test_missed_ticks_are_no_way_that_is_lost(changed_rig: Make) -> None:
-    """What was held in them is taken back: the tip is where it would be without."""
+    """The way of a held velocity is taken back: the tip is where it would be without."""
     ways = []
     for missed in (0, 3):
         rig = moving_as_one(changed_rig)

@@ -1,4 +1,4 @@
-"""What ends a two-axis motion: anti-sway off, a released enable, a lost joystick, a stall."""
+"""Ends of a two-axis motion: anti-sway off, a released enable, a lost joystick, a stall."""
 
 import itertools
 import math

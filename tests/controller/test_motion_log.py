@@ -1,4 +1,4 @@
-"""What the log says of a two-axis motion: once why the axes move singly, once that they do not."""
+"""Log lines of a two-axis motion: once why the axes move singly, once that they do not."""
 
 from canshaper.controller.events import MotionEvent
 from tests.controller.motion_rig import MEASURED, Make, by_two_joysticks, moving_as_one, slewing
@@ -6,7 +6,7 @@ from tests.rigs.forwarder import Rig
 
 
 def said(rig: Rig) -> list[str]:
-    """What the log says of the motion, since this was asked last."""
+    """Log lines of the motion since the last call."""
     texts = [event.text for event in rig.controller.events if isinstance(event, MotionEvent)]
     rig.controller.events.clear()
     return texts

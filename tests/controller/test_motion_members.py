@@ -1,4 +1,4 @@
-"""What a two-axis motion knows of its axes: what was held, when they are next, how far they may."""
+"""Knowledge that a two-axis motion has of its axes: held velocity, next tick, room to move."""
 
 from typing import Any
 

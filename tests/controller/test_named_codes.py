@@ -20,7 +20,7 @@ def eight_bits(machine: Machine, *codes: tuple[int, str]) -> None:
 
 
 def listed(machine: Machine, **codes: str) -> None:
-    """What the deployment file says of them."""
+    """Codes that the deployment file lists."""
     keys = ", ".join(f"{json.dumps(name)}: {meaning}" for name, meaning in codes.items())
     machine.in_yaml(COMMAND, f"{COMMAND} codes: {{ {keys} }},")
 

@@ -62,7 +62,7 @@ class Run:
         self.frames.append(frame)
 
     def trust(self, axis: str) -> list[str]:
-        """What was reported of a sensor."""
+        """Reported state of a sensor."""
         start = f"axis={axis} sway_sensor="
         return [event.removeprefix(start) for event in self.events if event.startswith(start)]
 

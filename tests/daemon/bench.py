@@ -163,7 +163,7 @@ class Bench:
         self.put(self.rig.joystick("JoystickLeft", **raw), self.rig.joystick("JoystickRight"))
 
     def reported(self) -> tuple[str, str]:
-        """What the last status of the slew axis reports: state and reason."""
+        """State and reason in the last status of the slew axis."""
         message = self.rig.messages["SlewStatus"]
         frame = next(f for f in reversed(self.sent) if f.can_id == message.frame_id)
         values = message.decode(frame.data)

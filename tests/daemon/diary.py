@@ -1,4 +1,4 @@
-"""What a daemon says and does, in its order."""
+"""Log lines, frames and calls of a daemon, in their order."""
 
 from collections.abc import Callable, Iterable
 from typing import Any

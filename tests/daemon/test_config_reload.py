@@ -40,7 +40,7 @@ def answer(reading: ConfigReload) -> Deployment | str:
 
 
 def drive(deployment: Deployment) -> list[Frame]:
-    """What a controller sends while every joystick goes to its end and back."""
+    """Frames of a controller while every joystick goes to its end and back."""
     controller = Controller(deployment)
     sent = []
     for tick in range(300):

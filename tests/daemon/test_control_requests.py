@@ -1,4 +1,4 @@
-"""What the control socket of a daemon is asked, and what of that its log has."""
+"""Requests to the control socket of a daemon, and their lines in its log."""
 
 import os
 import stat

@@ -15,7 +15,7 @@ from tests.rigs.forwarder import ROOT
 
 
 class CountingGateway:
-    """What a gateway does between its ticks, counted; it has received joystick frames by then."""
+    """Counts calls of a gateway between its ticks; it has received joystick frames by then."""
 
     def __init__(
         self, bench: Bench, deployment: Deployment, on_fault: Callable[[FrameFault], None]

@@ -39,7 +39,7 @@ def deployment_of(folder: Path, follow: str = "left", **changed: str) -> Deploym
 
 
 class Joysticks:
-    """What the controller knows of both: when their last good frames came."""
+    """Times of the last good frames of both joysticks in the controller."""
 
     def __init__(self, folder: Path) -> None:
         self.left, self.right = (SimpleNamespace(received_ns=None) for _ in range(2))

@@ -1,4 +1,4 @@
-"""What one I/O cycle asks of a frame processor and of its ports, in what order."""
+"""Calls that one I/O cycle makes to a frame processor and to its ports, in their order."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""What a part of the program raises: neutral valves, a reason with its place, an orderly end."""
+"""An exception of the program: neutral valves, a reason with its place, an orderly end."""
 
 import json
 import zipfile

@@ -81,7 +81,7 @@ logging.getLogger("library").warning("careful")
 
 
 def standard_error(environment: dict[str, str], pipe: Pipe) -> str:
-    """What a process writes to a pipe that is its standard error."""
+    """Text that a process writes to a pipe that is its standard error."""
     subprocess.run(
         [sys.executable, "-c", SET_UP],
         stderr=pipe.writer,

@@ -40,7 +40,7 @@ class Daemon:
             )
 
     def received(self, last: str) -> list[str]:
-        """What the manager receives, until a message with this line; not what comes each second.
+        """Messages to the manager, until one with this line; without those of each second.
 
         Lines of a message are separated by ";".
         """

@@ -119,7 +119,7 @@ CAP_IPC_LOCK = 14  # linux/capability.h
 
 
 def lock(prepare: str = "") -> tuple[str, int, int]:
-    """What a process says that locks its memory and then takes 4 MB; kB locked, kB in all."""
+    """Output of a process that locks its memory and then takes 4 MB; kB locked, kB in all."""
     result = subprocess.run(
         [sys.executable, "-c", IMPORT + prepare + LOCK],
         capture_output=True,

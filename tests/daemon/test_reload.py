@@ -1,4 +1,4 @@
-"""What a reload must not do: set anything going, or take ourselves for another."""
+"""A reload sets nothing going, and does not take ourselves for another sender."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""What is old after a reload: frames from before it, on whatever bus, and the time it took."""
+"""Frames that are old after a reload: from before it, on whatever bus, and the time it took."""
 
 from collections.abc import Callable
 from typing import Any

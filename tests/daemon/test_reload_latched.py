@@ -1,4 +1,4 @@
-"""What is latched outlives a reload, and nothing else of the controller before does."""
+"""Latched states outlive a reload, and nothing else of the controller before does."""
 
 import gc
 import weakref

@@ -1,4 +1,4 @@
-"""What the log says of what runs: its digest, unused messages, filters that do not fit."""
+"""Log lines about the running file: its digest, unused messages, filters that do not fit."""
 
 import pytest
 

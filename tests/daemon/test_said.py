@@ -1,4 +1,4 @@
-"""What a daemon says of itself: to its service manager, in its log, in one line for people."""
+"""Reports of a daemon: to its service manager, in its log, in one line for people."""
 
 import logging
 from collections.abc import Callable

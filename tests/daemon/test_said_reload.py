@@ -1,4 +1,4 @@
-"""What a daemon says of a reload, and what becomes of its ports."""
+"""Reports of a daemon on a reload, and the state of its ports after it."""
 
 import os
 from collections.abc import Callable

@@ -99,7 +99,7 @@ CLOCKED = ("bus", "inputs", "protocols", "controller", "daemon", "commissioning"
 
 
 def test_no_loop_has_a_clock_that_stands_still_in_a_suspend() -> None:
-    """What is compared with the time of a tick has to be of the same clock."""
+    """Times that are compared with that of a tick are of its clock."""
     monotonic = re.compile(r"monotonic_ns\(\)|= time\.monotonic_ns\b")
     own = {"raw.py", "gateway.py", "notify.py"}  # of bus and service manager, which ask themselves
     rooms = [ROOT / "canshaper" / name for name in CLOCKED]

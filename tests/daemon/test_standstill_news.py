@@ -1,4 +1,4 @@
-"""What waits in the sockets while the loop stands still: only bad news of it counts."""
+"""Frames that wait in the sockets while the loop stands still: only bad news of them counts."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the profiles of the shipped machine do; its file shows it."""
+"""Effects of the profiles of the shipped machine; its file shows them."""
 
 import json
 import re

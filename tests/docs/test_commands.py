@@ -57,7 +57,7 @@ def pasted(page: Path) -> list[str]:
 
 
 def words_of(command: str) -> list[str] | None:
-    """What follows canshaper on a command line; None for another program."""
+    """Return the words behind canshaper on a command line; None for another program."""
     shell = shlex.shlex(command, posix=True, punctuation_chars=True)
     shell.whitespace_split = True
     words = [*takewhile(lambda word: not set(word) <= set("|&;>"), shell)]

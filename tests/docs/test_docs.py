@@ -1,4 +1,4 @@
-"""What README and docs name is there: files, verbs and their options, states, reasons, faults."""
+"""README and docs name what exists: files, verbs and their options, states, reasons, faults."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""What is generated from the program is current, and a new reason reaches all of it."""
+"""Generated parts are current, and a new reason reaches all of them."""
 
 import runpy
 from enum import IntEnum

@@ -24,7 +24,7 @@ PROGRESS = 500
 def run_one(
     name: str | None, seed: int, trace: Callable[[str], None] | None = None
 ) -> tuple[Counter[str], str]:
-    """What was seen in one, and what is wrong with it."""
+    """Drive one sequence; return its counts, and what is wrong with it."""
     try:
         one = Sequence(name, seed, trace=trace) if name else Drive(seed, trace=trace)
         return one.run(), ""

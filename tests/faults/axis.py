@@ -174,7 +174,7 @@ class Axis:
         return values
 
     def sensor_state(self, data: bytes) -> str:
-        """What a status frame says of the sway sensor, by the names of the DBC."""
+        """State of the sway sensor in a status frame, by the names of the DBC."""
         assert self.status_message is not None
         names = self.status_message.get_signal_by_name("SwaySensor").choices
         assert names is not None

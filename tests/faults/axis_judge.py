@@ -39,7 +39,7 @@ SETTLED_OTHERS = 25
 
 
 class AxisJudge:
-    """What one axis may do."""
+    """Judge of the frames of one axis."""
 
     def __init__(self, axis: Axis, joystick: ReceivedJoystick) -> None:
         self.axis = axis
@@ -209,7 +209,7 @@ class AxisJudge:
     # -- what was sent ----------------------------------------------------------------------------
 
     def check(self, frame: Frame) -> str:
-        """What is wrong with a frame of the valve; nothing when it is allowed."""
+        """Return the fault of a frame of the valve; nothing when it is allowed."""
         axis = self.axis
         raw, count = axis.sent(frame.data)
         if axis.valve_counter:
@@ -263,7 +263,7 @@ class AxisJudge:
         self._status = self.axis.status(frame.data)
 
     def wrong_status(self) -> str:
-        """What is wrong with the status frame of this tick, if there is one."""
+        """Return the fault of the status frame of this tick, if there is one."""
         values, self._status = self._status, {}
         if not values:
             return ""
@@ -280,7 +280,7 @@ class AxisJudge:
         return ""
 
     def agrees(self) -> str:
-        """What the state reported so far says against the frame sent."""
+        """Compare the state reported so far with the frame sent."""
         if self.raw and self.state not in MOVING:
             return f"moves in state {self.state}"
         if self.mode == LATCHED and self.state != TRIPPED:

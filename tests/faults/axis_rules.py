@@ -1,4 +1,4 @@
-"""What one axis may do by the rules of docs/safety.md; see ``rules``."""
+"""Rules of docs/safety.md for one axis; see ``rules``."""
 
 from collections import deque
 
@@ -13,7 +13,7 @@ RELEASED = "enable released"
 
 
 class AxisRules:
-    """What one axis may do."""
+    """Rules for the frames of one axis."""
 
     def __init__(self, axis: Axis, joystick: ReceivedJoystick, tick_ns: int) -> None:
         self.axis, self.joystick = axis, joystick
@@ -164,7 +164,7 @@ class AxisRules:
     # -- a frame ----------------------------------------------------------------------------------
 
     def check(self, frame: Frame, ticks: int) -> str:
-        """What is wrong with a frame of the valve; nothing when it is allowed.
+        """Return the fault of a frame of the valve; nothing when it is allowed.
 
         Args:
             frame: the frame.
@@ -177,7 +177,7 @@ class AxisRules:
         return f"sent {raw}: {wrong}" if wrong else ""
 
     def count(self, frame: Frame, *, late: bool) -> str:
-        """What is wrong with the alive counter of a frame."""
+        """Return the fault of the alive counter of a frame."""
         field = self.axis.valve_counter
         if (
             field is None or self.axis.valve_key[1] == self.axis.joystick.key[1]

@@ -31,7 +31,7 @@ OVERRUN_TICKS = 55
 
 
 class Driven(Protocol):
-    """What a drive needs of a controller."""
+    """Methods of a controller that a drive calls."""
 
     def receive(self, frame: Frame, now_ns: int) -> object: ...
     def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]: ...

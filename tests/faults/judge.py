@@ -166,7 +166,7 @@ class Judge:
             joystick.resets, joystick.presses = self._before[name]
 
     def words(self) -> str:
-        """What is allowed now, for a reader."""
+        """The limits in force now, for a reader."""
         return "; ".join(
             f"{name} {WORDS[a.mode]} state {a.state} sent {a.raw} in {a.low:.3f}..{a.high:.3f}"
             for name, a in self.axes.items()

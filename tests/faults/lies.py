@@ -1,4 +1,4 @@
-"""What a daemon does wrong, each one thing: the rules have to catch them all.
+"""Daemons that do one thing wrong each: the rules have to catch them all.
 
 They stand between the daemon and its buses, so they stay what they are however it is built.
 """

@@ -1,4 +1,4 @@
-"""What other nodes have said, by CiA 301, CiA 408 and SAE J1939-81, and what follows from it."""
+"""States of other nodes, by CiA 301, CiA 408 and SAE J1939-81, and their consequences."""
 
 from canshaper.codec.frame import Frame
 from tests.faults.axis import Node, Words
@@ -39,7 +39,7 @@ class NodeRules:
             self._emergency = bool(code or register)  # only with both 0 all errors are over
 
     def seen(self, now_ns: int) -> set[str]:
-        """What is wrong with it, or was since it was looked at."""
+        """Return its fault, now or since the last call."""
         causes = set(self._since)
         if self._state != OPERATIONAL:
             causes.add("the node is not operational")
@@ -113,7 +113,7 @@ class AddressRules:
             self._unanswered = 0
 
     def sent(self, frame: Frame, now_ns: int) -> str:
-        """What is wrong with a frame of ours."""
+        """Return the fault of a frame of ours."""
         if frame.bus != self._bus or not frame.extended:
             return ""
         if frame[:3] == self._claim:
@@ -132,7 +132,7 @@ class AddressRules:
         return waited and not self.lost
 
     def _under_it(self, now_ns: int) -> str:
-        """What is wrong with sending anything under our address now."""
+        """Return why nothing may be sent under our address now."""
         if self._name is None or now_ns - self._claimed_ns < WAIT_NS - SLACK_NS:
             return "a frame before the address is ours"
         if self.lost:

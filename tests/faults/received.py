@@ -1,4 +1,4 @@
-"""What was received of the inputs, from the bytes on the bus alone."""
+"""States of the inputs, from the bytes on the bus alone."""
 
 from tests.faults.axis import Axis
 from tests.faults.fields import Field

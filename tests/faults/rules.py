@@ -188,7 +188,7 @@ class Rules:
             self.moves += one.raw != 0
 
     def words(self) -> str:
-        """What is allowed now, for a reader."""
+        """The limits in force now, for a reader."""
         return "; ".join(
             f"{name} {one.velocity:.3f}{' armed' * one.armed}{' latched' * one.latched}"
             for name, one in self.axes.items()

@@ -34,7 +34,7 @@ class Sender:
         return raw
 
     def passed(self, frames: list[bytes]) -> list[bytes]:
-        """What of these frames arrives now."""
+        """Return those of the frames that arrive now."""
         frames = self._waiting + frames
         self._waiting = []
         if frames and self._rng.random() < self._late:

@@ -33,7 +33,7 @@ class SensorMessage:
         self.signals: dict[str, tuple[Axis, bool, int]] = {}
 
     def values(self, swings: Mapping[str, Swing], rng: random.Random) -> Values:
-        """What is measured now, in the unit of the DBC."""
+        """Measurements now, in the unit of the DBC."""
         values = dict.fromkeys((s.name for s in self.message.signals), 0.0)
         for name, (axis, rate, sign) in self.signals.items():
             swing = swings[axis.name]

@@ -26,7 +26,7 @@ RARE = {SecondSenderUnseen, SendFailureUnseen, StopUnseen}
 
 
 def driven(first: int, count: int) -> Counter[str]:
-    """What the drives of these seeds did; fails for wrong moves."""
+    """Drive these seeds and return their counts; fails for wrong moves."""
     stats: Counter[str] = Counter()
     wrong = []
     for seed in range(first, first + count):

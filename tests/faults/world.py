@@ -1,4 +1,4 @@
-"""What is on the buses of a machine besides the daemon: joysticks, valves, nodes, other senders.
+"""Other senders on the buses of a machine: joysticks, valves, nodes, a second sender.
 
 It runs on a clock of the test's. Every frame has the time at which it is on its bus.
 """
@@ -203,7 +203,7 @@ class World:
             self.put(Frame(*sensor.key, data))
 
     def _others(self) -> None:
-        """What another sender sends in each tick of a fault."""
+        """Return the frames of another sender in a tick of a fault."""
         for fault in self.active():
             extra = inject.EXTRA.get(fault.kind, later.choices)
             for frame in extra(fault):

@@ -70,7 +70,7 @@ def golden(name: str) -> Path:
 
 
 def replay(name: str, drive: list[str]) -> list[str]:
-    """What a deployment sends at the ticks, in order."""
+    """Frames of a deployment at the ticks, in order."""
     controller = Guarded(Controller(load_deployment(CONFIG / f"{name}.yaml")))
     waiting = [parsed(row) for row in drive]
     waiting.reverse()

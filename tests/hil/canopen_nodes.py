@@ -60,7 +60,7 @@ SERVO_VALVE: Pdos = {
 
 @dataclass(frozen=True)
 class Parts:
-    """What is on the bus of a machine.
+    """Nodes on the bus of a machine.
 
     Attributes:
         valves: PDOs of each valve of CiA 408.
@@ -171,7 +171,7 @@ class Unit:
             self.apply({(variable.index, variable.subindex): variable.raw for variable in pdo})
 
     def apply(self, received: dict[tuple[int, int], int]) -> None:
-        """What it does with a PDO."""
+        """Act on a PDO."""
 
 
 class Joystick(Unit):

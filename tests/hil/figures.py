@@ -1,4 +1,4 @@
-"""What was measured of stops and silence: whether it is right, and the table of docs/safety.md."""
+"""Measurements of stops and silence: whether they are right, and the table of docs/safety.md."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -35,7 +35,7 @@ def rules(file: Path, state: str, code: int = 0) -> str:
 
 
 def cangw() -> list[str]:
-    """What the foreign tool sees."""
+    """Rules and counters that the foreign tool shows."""
     # Its exit code is a length.
     done = subprocess.run(["cangw", "-L"], capture_output=True, text=True, check=False)
     return [line.partition(" #")[0] for line in done.stdout.splitlines()]

@@ -90,7 +90,7 @@ def not_decoded(log: Path, file: Path = FILE) -> list[str]:
 
 
 def key_of(can_id: int, *, extended: bool) -> Key:
-    """What a message is found by: of 29 bits its group, of 11 bits the identifier."""
+    """Key of a message: of 29 bits its group, of 11 bits the identifier."""
     return extended, can_id & GROUP_MASK if extended else can_id
 
 

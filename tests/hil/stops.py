@@ -98,7 +98,7 @@ class Bench:
                 yield message
 
     def _seen(self, seconds: float) -> list[can.Message]:
-        """What comes in that time or waits, behind the last frames that were read before."""
+        """Frames of that time, behind the last ones that were read before."""
         return [*self._last.values(), *self._messages(seconds)]
 
     def _wait(self, accept: Callable[[can.Message], bool]) -> None:

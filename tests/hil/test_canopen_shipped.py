@@ -53,7 +53,7 @@ class Deployment:
 
     @property
     def actuator(self) -> Drive | Valve:
-        """What slews."""
+        """The node of the slew valve."""
         return self.machine.drive or self.machine.valves["slew"]
 
     def state(self) -> str:

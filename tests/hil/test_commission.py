@@ -44,7 +44,7 @@ def ends(axes: list[str], percent: float) -> list[Stroke]:
 
 
 def work(step: str, words: str) -> tuple[str, list[Stroke]]:
-    """What a person does who reads these words, and the log into which that goes."""
+    """Do the task of these words as a person does, and return the log of it."""
     if moved := re.search(r"move the joystick of (\w+) to its end", words):
         return f"joystick-{moved[1]}", ends([moved[1]], 100.0)
     if step == "dry":

@@ -77,7 +77,7 @@ def frames_of(log: Path, name: str) -> int:
 
 
 def witness(folder: Path, channel: str) -> set[str | None]:
-    """What is on the other crane's bus while its joysticks are moved under the name of ours."""
+    """Frames on the other crane's bus while its joysticks are moved under the name of ours."""
     log = folder / "other.log"
     until = time.monotonic() + ANSWER_S
     with candump(log, channel), joysticks_on(channel) as joysticks:

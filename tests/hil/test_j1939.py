@@ -42,7 +42,7 @@ def is_claim(message: can.Message) -> bool:
 
 
 def after_the_claim_of(name: int, log: Path) -> list[can.Message]:
-    """What came under our address after that node had claimed it."""
+    """Frames under our address after that node had claimed it."""
     messages = ours(log)
     data = name.to_bytes(8, "little")
     at = next(i for i, m in enumerate(messages) if is_claim(m) and m.data == data)

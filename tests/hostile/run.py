@@ -14,7 +14,7 @@ LIMIT_S = 120.0  # only to end one that hangs; benchmarks/hostile.py says how lo
 
 @dataclass(frozen=True)
 class Ran:
-    """What came of a command.
+    """Exit code and output of a command.
 
     Attributes:
         code: exit code.

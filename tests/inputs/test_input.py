@@ -1,4 +1,4 @@
-"""What a joystick's frames are worth: sequence, silence, and an enable seen released."""
+"""Trust in a joystick's frames: sequence, silence, and an enable seen released."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is no press of reset or enable: no one touched a switch, and a trip must stay."""
+"""Frames that are no press of reset or enable: no one touched a switch, and a trip must stay."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What to run and under which limits, the same for every lane."""
+"""Command and limits of a run, alike for every lane."""
 
 import os
 import re

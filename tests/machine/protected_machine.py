@@ -154,7 +154,7 @@ def load(directory: Path, *changes: tuple[str, str]) -> Deployment:
 
 
 def problems(directory: Path, *changes: tuple[str, str]) -> list[str]:
-    """What is wrong with the changed machine, without the directory."""
+    """Problems of the changed machine, without the directory."""
     try:
         load(directory, *changes)
     except ConfigError as error:

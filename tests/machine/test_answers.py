@@ -1,4 +1,4 @@
-"""What is wrong in a file and was answered by no other test: each one line that names the place."""
+"""Faults of a file that no other test has: each one line that names the place."""
 
 from pathlib import Path
 

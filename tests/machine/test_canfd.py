@@ -35,7 +35,7 @@ def test_each_bus_has_its_own(machine: Machine) -> None:
 
 @pytest.mark.parametrize("length", range(9, 65))
 def test_a_message_fills_the_next_longer_frame(machine: Machine, length: int) -> None:
-    """What no signal has is sent as 0, and received as anything."""
+    """Bits of no signal are sent as 0, and received as anything."""
     machine.in_yaml("bitrate: 250000", "bitrate: 250000, fd: true")
     machine.in_dbc("SlewCommand: 2", f"SlewCommand: {length}")
     machine.in_dbc("JoystickLeft: 8", f"JoystickLeft: {length}")

@@ -1,4 +1,4 @@
-"""What a deployment lets be changed, against its axes."""
+"""Values that a deployment lets be changed, against its axes."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What the deployment file says instead of the DBC: scaling, cycle, value of the multiplexor."""
+"""Corrections of the DBC in the file: scaling, cycle, value of the multiplexor."""
 
 from collections.abc import Sequence
 

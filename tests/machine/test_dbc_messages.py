@@ -214,7 +214,7 @@ def test_a_file_too_large_as_a_whole_is_not_parsed_as_one(
 
 
 def test_a_fault_of_a_used_message_is_no_fault_of_another(tmp_path: Path) -> None:
-    """What is not used may be broken too; what is used is named."""
+    """Unused messages may be broken too; a used one is named."""
     text = HEAD + OTHER.replace("8|8", "9|8") + 'CM_ "end"\nBO_ 9 Nine: 1 A\n;\n'
     _, (problem,) = load_dbc(written(tmp_path, text), {"Other"})
     assert problem.line == 5

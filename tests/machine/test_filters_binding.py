@@ -48,7 +48,7 @@ def profile(name: str, chosen: str, first: str = "", second: str = "") -> str:
 
 
 def problems(machine: Machine) -> list[str]:
-    """What is wrong, without file and line; none where it loads."""
+    """Problems without file and line; none where it loads."""
     try:
         machine.load()
     except ConfigError as error:

@@ -101,7 +101,7 @@ def test_check_prints_it() -> None:
 
 
 def said(deployment: Deployment, *digests: int) -> list[str]:
-    """What a monitor notes of these digests on the bus."""
+    """Note of a monitor on these digests on the bus."""
     status = deployment.identity_status
     assert status is not None
     monitor = Monitor(deployment)

@@ -40,7 +40,7 @@ def load(folder: Path, *changes: tuple[str, str]) -> Deployment:
 
 
 def problems(folder: Path, *changes: tuple[str, str]) -> list[str]:
-    """What is wrong with the changed machine, without file and line."""
+    """Problems of the changed machine, without file and line."""
     with pytest.raises(ConfigError) as caught:
         load(folder, *changes)
     return [

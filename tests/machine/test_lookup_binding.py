@@ -104,7 +104,7 @@ def test_what_a_protocol_refuses(
 
 
 def test_a_group_with_a_destination_may_command_a_valve_and_be_read(tmp_path: Path) -> None:
-    """What is sent to another node is no command of the valve."""
+    """A frame to another node is no command of the valve."""
     feedback = "feedback: { bus: crane, message: AVEF0,"
     deployment = load(
         tmp_path,

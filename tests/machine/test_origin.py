@@ -1,4 +1,4 @@
-"""What was measured on a simulated crane is reported by check, and moves no valve of a machine."""
+"""Values measured on a simulated crane are reported by check, and move no valve of a machine."""
 
 import re
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What is built once for these tests."""
+"""Packages that are built once for these tests."""
 
 import subprocess
 import sys

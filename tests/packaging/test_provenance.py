@@ -1,4 +1,4 @@
-"""What a package is built from: exact versions with hashes, vendored files with theirs, a bill."""
+"""Sources of a package: exact versions with hashes, vendored files with theirs, a bill."""
 
 import json
 import re

@@ -71,7 +71,7 @@ def test_the_reference_has_every_public_name_and_every_verb(site: Path) -> None:
 
 
 class Parts(HTMLParser):
-    """What a page loads when it is opened: addresses, and the scripts that may load more."""
+    """Addresses that a page loads when it is opened, and the scripts that may load more."""
 
     def __init__(self, page: Path) -> None:
         super().__init__()

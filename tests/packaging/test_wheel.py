@@ -16,7 +16,7 @@ pytestmark = pytest.mark.processes
 
 
 def hatch(tree: Path, target: str, directory: Path) -> Path:
-    """What one build gives."""
+    """Files of one build."""
     command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(directory)]
     environment = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
     subprocess.run(command, cwd=tree, check=True, capture_output=True, env=environment)

@@ -101,12 +101,12 @@ class Rig:
 
 
 def command(rig: Rig) -> float:
-    """What the operator commands of slew."""
+    """Command of the operator for slew."""
     return rig.controller.axes["slew"].axis.command
 
 
 def velocity(sent: dict[str, dict[str, Any]]) -> float:
-    """What the slew valve gets, in raw steps."""
+    """Setpoint of the slew valve, in raw steps."""
     return float(sent["SlewCommand"]["Velocity"])
 
 

@@ -50,7 +50,7 @@ class GatewayRig:
         return Frame("joysticks", message.frame_id, False, word.to_bytes(8, "little"))
 
     def receive(self, frame: Frame) -> Frame | None:
-        """What a frame from the joysticks leaves as."""
+        """Return the frame that a frame from the joysticks leaves as."""
         passed = self.controller.receive(frame, self.now_ns)
         if passed is not None:
             self.left.append(passed)

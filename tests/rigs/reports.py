@@ -1,4 +1,4 @@
-"""What the status message of an axis reports."""
+"""Values that the status message of an axis reports."""
 
 from types import SimpleNamespace
 from typing import Any

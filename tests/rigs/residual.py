@@ -1,4 +1,4 @@
-"""What an impulse shaper leaves of a swing, by the definition."""
+"""Swing that an impulse shaper leaves, by the definition."""
 
 import cmath
 from collections.abc import Sequence

@@ -56,7 +56,7 @@ SCRIPTS = {
 
 @dataclass
 class Drive:
-    """What came of a drive, a row a tick."""
+    """Result of a drive, a row a tick."""
 
     script: Script
     time_s: list[float] = field(default_factory=list)
@@ -90,7 +90,7 @@ class Drive:
 
     @property
     def states(self) -> list[Trust]:
-        """What was thought of the sensor, each once in a row."""
+        """States of the sensor, each once in a row."""
         return [now for now, _ in itertools.groupby(self.trust)]
 
 

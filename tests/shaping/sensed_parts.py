@@ -183,5 +183,5 @@ class Parts:
 
 
 def named(calls: list[Call], name: str) -> list[list[Any]]:
-    """What a method of this name was called with, call by call."""
+    """Arguments of the calls of a method of this name."""
     return [arguments for called, *arguments in calls if called == name]

@@ -50,7 +50,7 @@ def axis_with(
 
 
 def tapped(axis: ShapedAxis, level: float, duration_s: float, rest_s: float = 3.5) -> list[float]:
-    """What is sent at a tap."""
+    """Setpoints at a tap."""
     held = round(duration_s / TICK_S)
     sent = []
     for tick in range(held + round(rest_s / TICK_S)):

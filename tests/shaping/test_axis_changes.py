@@ -1,4 +1,4 @@
-"""What an axis sends after a change of filter or bypass: it joins without a jump."""
+"""Setpoints after a change of filter or bypass: they join without a jump."""
 
 import itertools
 import math

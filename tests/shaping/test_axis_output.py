@@ -1,4 +1,4 @@
-"""What an axis sends: bounds in time, and what the model is driven by."""
+"""Setpoints of an axis: bounds in time, and the input of the model."""
 
 import itertools
 from collections.abc import Callable

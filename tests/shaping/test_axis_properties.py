@@ -116,7 +116,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     @rule()
     def recover(self) -> None:
-        """What an operator does when nothing moves: let go, switch off and on."""
+        """Act as an operator does when nothing moves: let go, switch off and on."""
         self.joystick, self.added = CommandInput(bypass=self.joystick.bypass), 0.0
         self.keep(self.joystick._replace(enabled=False), 1)
         self.keep(self.joystick, 2)
@@ -189,7 +189,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
         self.check_rate(old, sent_before)
 
     def remember(self) -> None:
-        """What the operator asked for, by the inputs alone."""
+        """Keep the command of the operator, by the inputs alone."""
         if self.usable and self.armed and not self.centred:
             for demands in (self.commanded, self.demanded):
                 demands.append((self.now, self.joystick.command))

@@ -1,4 +1,4 @@
-"""What a two-axis motion adds: bounded in its way, and nothing by a senseless model."""
+"""Velocity that a two-axis motion adds: bounded in its way, none by a senseless model."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What a two-axis motion adds, against the equations of the path, term by term."""
+"""Velocity that a two-axis motion adds, against the equations of the path, term by term."""
 
 import math
 
@@ -130,7 +130,7 @@ def test_what_was_added_by_a_radius_ends_without_one_and_keeps_its_place() -> No
 
 
 def carried(elapsed_s: float, later_m: float) -> float:
-    """What near-far is moved by, where the tip is at 3 m and, so much later, elsewhere."""
+    """Way of near-far, where the tip is at 3 m and, so much later, elsewhere."""
     slew = axis(SLEW, 1.2, 0.3, -0.8, 0.9, commanded=True)
     near_far = axis(UNDAMPED, OUT_M_S, 0.0, 0.0, 0.0, commanded=True)
     motion = TwoAxisMotion(slew, near_far, WIDE_M)
@@ -141,7 +141,7 @@ def carried(elapsed_s: float, later_m: float) -> float:
 
 
 def moved_at(radius_m: float) -> float:
-    """The same for a grapple at this radius."""
+    """Way of near-far for a grapple at this radius."""
     slew = axis(SLEW, 1.2, 0.3, -0.8, 0.9, commanded=True)
     near_far = axis(UNDAMPED, OUT_M_S, 0.0, 0.0, 0.0, commanded=True)
     return added(slew, near_far, radius_m)[1]

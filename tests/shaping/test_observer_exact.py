@@ -24,7 +24,7 @@ BOTH = pytest.mark.parametrize("measured", list(Measured))
 
 
 def swung(mode: SwayMode, time_s: float) -> np.ndarray:
-    """What (angle, rate) become by theta'' + 2 zeta w theta' + w^2 theta = 0."""
+    """Angle and rate after a time, by theta'' + 2 zeta w theta' + w^2 theta = 0."""
     w, zeta = mode.omega_rad_s, mode.damping_ratio
     return np.asarray(expm(np.array([[0.0, 1.0], [-w * w, -2.0 * zeta * w]]) * time_s))
 

@@ -30,7 +30,7 @@ COMMANDS = [1.0] * 40 + [-0.4] * 40 + [0.0] * 40
 
 
 def answer(shaper: Shaper, sway: SwayModel, rate_per_tick: float = math.inf) -> list[float]:
-    """What a filter asks for, and a valve of limited rate that the model knows of."""
+    """Output of a filter, and of a valve of limited rate that the model knows of."""
     out, sent = [], 0.0
     for command in COMMANDS:
         out.append(shaper.step(command))

@@ -1,4 +1,4 @@
-"""What is left of the swing behind a real valve: limit-aware G_FF against its ordinary realisation.
+"""Swing left behind a real valve: limit-aware G_FF against its ordinary realisation.
 
 The claim of the limit-aware form, on the linear pendulum behind a slow valve, under a busy hand.
 """

@@ -1,4 +1,4 @@
-"""What is thought of a sway sensor, and what of it reaches the filter."""
+"""Trust in a sway sensor, and its effect on the filter."""
 
 import math
 from unittest.mock import Mock

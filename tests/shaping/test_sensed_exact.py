@@ -1,4 +1,4 @@
-"""What a sensed sway asks of its parts, and what it makes of their answers."""
+"""Calls of a sensed sway to its parts, and its use of their answers."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What speaks against a sensor, and what it takes to trust it again: the parts are played."""
+"""Evidence against a sensor, and the way back to trust: the parts are played."""
 
 import math
 
@@ -129,7 +129,7 @@ def test_an_offset_may_be_as_large_as_the_largest_one(
 
 
 def needed(parts: Parts, fault: Trust, *, rest: bool) -> float:
-    """What it takes to be trusted after a fault, in the same motion or after the tail."""
+    """Evidence that restores trust after a fault, in the same motion or after the tail."""
     parts.evidence.shows = fault
     parts.measure()
     assert parts.sensed.state is fault

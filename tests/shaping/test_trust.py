@@ -1,4 +1,4 @@
-"""What speaks for a sway sensor and what against it, idea by idea."""
+"""Evidence for and against a sway sensor, idea by idea."""
 
 import math
 
@@ -167,7 +167,7 @@ def still(
     command_active: bool = True,
     measured: Measured = Measured.ANGLE,
 ) -> list[Trust | None]:
-    """What each measurement says; degrees, and degrees per second a measurement."""
+    """Each measurement; degrees, and degrees per second a measurement."""
     one = Standstill(measured, NOISE, TICK_S, SWING_S)
     bent = math.radians(bent_deg)
     return [one.check(math.radians(value), bent, command_active=command_active) for value in values]
@@ -224,7 +224,7 @@ def test_what_has_moved_is_forgotten() -> None:
 
 
 def bent(one: Standstill, value: float, bent_deg: float, times: int) -> list[Trust | None]:
-    """What it says of the same value again and again."""
+    """Measurements of one value again and again."""
     return [one.check(value, math.radians(bent_deg), command_active=False) for _ in range(times)]
 
 

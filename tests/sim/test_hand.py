@@ -1,4 +1,4 @@
-"""What a hand does with the joysticks is in their frames, as a daemon reads them."""
+"""Motion of a hand at the joysticks is in their frames, as a daemon reads them."""
 
 from pathlib import Path
 from typing import Any

@@ -92,7 +92,7 @@ def test_its_energy_stays_but_for_what_the_sling_takes() -> None:
 
 
 def twin(rope_m: float, sling: SlingParameters) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The same crane in MuJoCo: bridge, trolley, rope on two hinges, its length, two hinges."""
+    """The crane in MuJoCo: bridge, trolley, rope on two hinges, its length, two hinges."""
     model = mujoco.MjModel.from_xml_string(f"""
     <mujoco><compiler balanceinertia="false"/>
       <option gravity="0 0 -{G}" integrator="RK4" timestep="{STEP_S / 4.0}">

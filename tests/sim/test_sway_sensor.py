@@ -18,7 +18,7 @@ QUIET = {"noise_deg": 0.0, "delay_s": 0.0}
 def shown(
     seconds: float, *, across: bool = True, kind: Kind = "angle", **parameters: float
 ) -> list[float]:
-    """What it shows of a swing that grows by ten degrees per second, each tick."""
+    """Measurements of a swing that grows by ten degrees per second, each tick."""
     sensor = SwaySensor(SwaySensorParameters(**parameters), "slew", across=across, kind=kind)
     values = []
     for tick in range(round(seconds / TICK_S)):

@@ -22,7 +22,7 @@ START = (0.0, 1.3, -1.87, 0.1)  # about the start pose
 
 
 def frames(slew: float, near_far: float, lift: float) -> dict[str, float]:
-    """What the valve frames carry for these speeds, the deadband of 5 % jumped over."""
+    """Values of the valve frames for these speeds, the deadband of 5 % jumped over."""
     speeds = (slew, near_far, lift)
     return {axis: with_deadband(v, 0.05) for axis, v in zip(TIP_AXES, speeds, strict=True)}
 

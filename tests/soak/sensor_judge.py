@@ -1,4 +1,4 @@
-"""What a fault of the sway sensor may do to the slew: nothing beyond the limits of the file.
+"""Effects that a fault of the sway sensor may have on slew: none beyond the limits of the file.
 
 Shares no code with canshaper: joystick, valve and status frames of the log, byte by byte.
 """
@@ -57,7 +57,7 @@ class SlewJudge:
         self._trusted = 0  # the valve's frame at which it was so last
 
     def begin_fault(self) -> None:
-        """What was said of the sensor so far was before its fault."""
+        """Forget the reports on the sensor: they were before its fault."""
         self.said.clear()
 
     def read_all(self, frames: list[Logged]) -> None:

@@ -154,7 +154,7 @@ class Listener:
         self.port: Port = open_port("crane", bus, lambda _: None)
 
     def frames(self) -> list[Frame]:
-        """What has come since the last look."""
+        """Frames since the last look."""
         frames: list[Frame] = []
         while some := list(self.port.frames()):
             frames += some

@@ -33,7 +33,7 @@ def recorded(path: Path, *, without: frozenset[int] = frozenset()) -> Path:
 
 
 def black_box(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What a trip leaves: enable is let go of after three seconds of slewing."""
+    """The black box of a trip: enable is let go of after three seconds of slewing."""
     monkeypatch.setattr(keeper, "STATE_NS", 10**9)
     boxes = folder / "boxes"
     boxes.mkdir()

@@ -19,7 +19,7 @@ DISTURBED = re.compile(
 
 
 class Page:
-    """What a page does, without a browser."""
+    """A page without a browser."""
 
     def __init__(self, connection: ClientConnection) -> None:
         self.connection = connection
@@ -51,7 +51,7 @@ class Page:
         return self.shown
 
     def now(self) -> dict[str, Any]:
-        """What is to be seen now; a page that was not looked at for a while has old pictures."""
+        """Return the newest picture; a page that was not looked at for a while has old ones."""
         now_s = time.monotonic()  # the studio's clock, too
         return self.until(lambda s: s["t"] >= now_s, "now")
 
@@ -118,5 +118,5 @@ class Page:
         return {axis["level"] for axis in axes if axis["state"]}
 
     def texts(self) -> list[str]:
-        """What happened."""
+        """Texts of the events."""
         return [event[3] for event in self.events]

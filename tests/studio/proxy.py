@@ -38,7 +38,7 @@ class Proxy:
 
     @property
     def url(self) -> str:
-        """What to open in the browser."""
+        """Address to open in the browser."""
         return f"http://127.0.0.1:{self.port}/"
 
     def lose(self) -> None:

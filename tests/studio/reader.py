@@ -34,7 +34,7 @@ def in_language(tab: Callable[..., Page], studio: Studio, language: str) -> Page
 
 
 def english_said(page: Page, language: str) -> list[str]:
-    """What the page says in English although its language has a text of its own."""
+    """English texts of the page although its language has a text of its own."""
     english, own = texts(ENGLISH), texts(language)
     said, untranslated = page.evaluate(SAID), []
     for key, text in english.items():

@@ -1,4 +1,4 @@
-"""What a page is shown of the cranes: their poses and valves."""
+"""Cranes as a page is shown them: their poses and valves."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What can be shown instead of the cranes: from above, and what the filter leaves."""
+"""Views in place of the cranes: from above, and the swing that the filter leaves."""
 
 import re
 from collections.abc import Callable

@@ -23,7 +23,7 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
 
 
 class Hand:
-    """What a person at a page does with the numbers."""
+    """A person at a page who changes the numbers."""
 
     def __init__(self, page: Page, who: str) -> None:
         self.page, self.who = page, who

@@ -1,4 +1,4 @@
-"""What the filter in force leaves of the swing, over the length of the pendulum."""
+"""Swing that the filter in force leaves, over the length of the pendulum."""
 
 import json
 from typing import Any

@@ -28,7 +28,7 @@ def address(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, int]]:
 
 
 def sent(address: tuple[str, int], *parts: bytes) -> bytes:
-    """What comes back until the server closes the connection."""
+    """Bytes that come back until the server closes the connection."""
     with socket.create_connection(address, WAIT_S) as one:
         for part in parts:
             one.sendall(part)

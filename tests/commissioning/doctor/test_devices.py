@@ -1,4 +1,4 @@
-"""What the doctor says of the device behind a bus, and the lines that it gives to paste."""
+"""Findings of the doctor about the device behind a bus, and its lines to paste."""
 
 import errno
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What was received of the joysticks, against their cycle and their timeout."""
+"""Frames received of the joysticks, against their cycle and their timeout."""
 
 import errno
 import os

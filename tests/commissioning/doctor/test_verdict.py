@@ -1,4 +1,4 @@
-"""What was measured against the tick: every limit from both sides."""
+"""Measurements against the tick: every limit from both sides."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -27,7 +27,7 @@ PAUSES_S = {ONE: (0.3, 6.0), BOTH: (0.3, 6.0), CALM: (15.0, 30.0)}
 
 
 class Case(NamedTuple):
-    """What is identified of an axis, and the truth."""
+    """Values identified of an axis, and the truth."""
 
     driving: str
     mode: SwayMode

@@ -1,4 +1,4 @@
-"""What the monitor shows: in 80 columns and 24 lines, and never by colour alone."""
+"""The view of the monitor: in 80 columns and 24 lines, and never by colour alone."""
 
 import math
 from dataclasses import replace

@@ -40,7 +40,7 @@ def machine(*changes: tuple[str, str], file: Path = FILE) -> Deployment:
 
 @dataclass(frozen=True)
 class Drive:
-    """What was driven.
+    """A drive: commands, swing and sensor.
 
     Attributes:
         deployment: the machine.
@@ -55,7 +55,7 @@ class Drive:
     script: Script | None = None
 
     def series(self, crane: CraneParameters | None = None, **sensor: float) -> Series:
-        """What the sensor of the axis shows."""
+        """Measurements of the sensor of the axis."""
         crane = crane or CraneParameters()
         crane = replace(
             crane,
@@ -68,5 +68,5 @@ class Drive:
         return read_sensors(path, self.deployment, [self.axis])[self.axis]
 
     def finding(self, **sensor: float) -> Finding:
-        """What comes of it."""
+        """The finding about its sensor."""
         return examine(self.deployment.axes[self.axis], self.series(**sensor))

@@ -1,4 +1,4 @@
-"""What is found of a sensor that is known: on every sign, delay, offset, noise and length."""
+"""Findings about a known sensor: for every sign, delay, offset, noise and length."""
 
 import itertools
 import math

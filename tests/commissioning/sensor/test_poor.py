@@ -20,7 +20,7 @@ RESTING = Script("rest", (), 30.0)
 
 @functools.cache
 def good() -> Series:
-    """What the refusals below are held against."""
+    """The good drive with which the refusals below are compared."""
     return Drive(machine()).series(delay_s=0.05)
 
 

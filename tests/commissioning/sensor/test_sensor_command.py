@@ -45,7 +45,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def trust(file: Path) -> list[str]:
-    """What the daemon thinks of the sensor of near-far in a drive."""
+    """State of the sensor of near-far in the daemon during a drive."""
     deployment = load_deployment(file)
     controller, plant = Controller(deployment), PlantNode(deployment, REAL)
     hands = [JoystickNode(deployment, SCRIPTS["pulse-near_far"])]
@@ -157,7 +157,7 @@ def test_what_says_nothing_of_a_log_or_of_the_simulated_crane_is_refused(
 
 @pytest.fixture
 def own_signals() -> Iterator[None]:
-    """What the verb does with Ctrl-C is over with it."""
+    """Restore the handlers of signals that the verb sets."""
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.getsignal(number) for number in numbers]
     yield

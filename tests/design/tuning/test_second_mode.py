@@ -131,7 +131,7 @@ def designed(file: Path, *words: str) -> BoundAxis:
 
 
 def pulse(bound: BoundAxis, hold_s: float) -> list[float]:
-    """What an axis sends for a full press, until a moment after its filter is over."""
+    """Setpoints of an axis for a full press, until a moment after its filter is over."""
     assert bound.config.sway is not None
     sway, machine = SwayModel(bound.config.sway.mode(), TICK_S), Machine.of(bound)
     shaper = build_shaper(
