@@ -186,7 +186,7 @@ def test_an_error_of_it_is_named_with_its_text_and_place(tmp_path: Path) -> None
             "config-schema",
         ),
         (
-            "from canshaper.shaping.transfer import KINDS\nKIND = KINDS[0]\n",
+            "from canshaper.shaping.registry import OFF as KIND\n",
             "ValueError: the kind 'off' is there already",
             "check forwarder.yaml",
         ),

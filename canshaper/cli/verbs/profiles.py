@@ -48,7 +48,7 @@ def profiles(
 
       canshaper profiles machine.yaml --no-work
 
-      canshaper profiles --set grapple.l2_m=1.4  # 0.2 m longer than the file says
+      canshaper profiles --set grapple.l2_m=1.4  # 0.2 m longer
 
       canshaper profiles machine.yaml --json
     """
