@@ -15,6 +15,7 @@ from canshaper.report.stroke_metrics import crane_metrics, dip
 from canshaper.report.strokes import find_strokes
 from canshaper_sim.axes import ALL_AXES, BRIDGE, SLEW, WITHOUT_SWAY, kind_of
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.joysticks import switches_off
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import dwell_s
@@ -74,7 +75,8 @@ def _row(
 ) -> Row:
     """The row of a setting."""
     drive = _Drive(deployment, setting, nominal, native)
-    raw = None if setting.fault else _Drive(deployment, setting, nominal, native, bypass=True)
+    off = switches_off(deployment) and not setting.fault
+    raw = _Drive(deployment, setting, nominal, native, bypass=True) if off else None
     row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
     return {
         **row,

@@ -8,6 +8,11 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.strokes import Script
 
 
+def switches_off(deployment: Deployment) -> bool:
+    """Whether a joystick switches anti-sway off; without one every drive is shaped."""
+    return any(one.config.anti_sway_off for one in deployment.joysticks.values())
+
+
 class JoystickNode:
     """All joysticks of a deployment, moved by a script, with the enable switch held.
 

@@ -1,13 +1,16 @@
 """``canshaper demo`` in lock-step: every shipped deployment, by the axes that it has."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from canshaper.campaign.measure import measured_drive
 from canshaper.cli.app import app
+from canshaper.config.uncertainty import Uncertainty
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
@@ -89,3 +92,18 @@ def test_several_cranes_are_driven_in_lock_step_only() -> None:
     result = CliRunner().invoke(app, ["demo", "two-cranes.yaml"])
     assert result.exit_code == 2
     assert "several buses or cranes; drive it with --lockstep" in result.output
+
+
+@pytest.mark.slow
+def test_without_a_switch_for_anti_sway_both_drives_are_said_to_be_shaped(tmp_path: Path) -> None:
+    """A campaign then has no drive to compare with."""
+    text = (ROOT / "config/forwarder-robust.yaml").read_text(encoding="utf-8")
+    text = re.sub(r" +anti_sway_off: \w+\n", "", text).replace("../dbc", str(ROOT / "dbc"))
+    path = tmp_path / "machine.yaml"
+    path.write_text(text, encoding="utf-8")
+    said, report = demo(tmp_path, str(path))
+    assert f"WARNING: {path}: no joystick has anti_sway_off" in said
+    left = [report["crane"][one]["residual_deg"] for one in ("raw", "shaped")]
+    assert left[0] == pytest.approx(left[1], abs=0.01)
+    row = measured_drive(load_deployment(path), 1, Uncertainty())
+    assert not row["fault"] and row["raw_deg"] is None

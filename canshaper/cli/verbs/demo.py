@@ -111,12 +111,15 @@ def demo(
     from canshaper.report.console import print_report
     from canshaper.report.metrics import report_dict
     from canshaper_sim.cranes import cranes, one_crane
+    from canshaper_sim.joysticks import switches_off
     from canshaper_sim.operator import script_for
     from canshaper_sim.parameters import changed_parameters
 
     if (ranges is not None and seed is None) or (seed is not None and (crane or rest) is not None):
         raise UsageError("--seed: expected with --ranges, and without --crane or --rest")
     deployment = loader(sensed(file, DEFAULT, sensor))()
+    if not switches_off(deployment):
+        echo(f"WARNING: {file}: no joystick has anti_sway_off: both drives are shaped", err=True)
     nominal = changed_parameters(changes or [], deployment)
     results = Results("Drive without and with filters", deployment, report, picture)
     lockstep = lockstep or seed is not None
