@@ -85,6 +85,12 @@ def test_a_filter_that_follows_no_rope_is_refused(tmp_path: Path) -> None:
     assert "sway.length: expected a filter that follows it, gff, robust, got zvd" in says
 
 
+def test_a_second_mode_is_refused_with_a_rope(tmp_path: Path) -> None:
+    second = "second: { period_s: 1.2, damping_ratio: 0.005, length_range_pct: 20 }, duration_s"
+    says = rope_problems(tmp_path, ("duration_s", second))
+    assert "filter.designed_for.second: expected none with sway.length" in says
+
+
 def test_a_schedule_beside_it_is_refused(tmp_path: Path) -> None:
     point = (
         "{ breakpoint: 0, sway: { period_s: 2, damping_ratio: 0, full_speed_m_s: 1 }, filter: F }"
