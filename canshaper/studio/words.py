@@ -79,6 +79,7 @@ class Event(NamedTuple):
         source: a crane, or "page".
         text: what happened.
         level: "info", "warn" or "bad".
+        clock_s: monotonic time, that of the charts.
     """
 
     number: int
@@ -86,6 +87,7 @@ class Event(NamedTuple):
     source: str
     text: str
     level: str
+    clock_s: float
 
 
 class Events:
@@ -98,9 +100,10 @@ class Events:
 
     def add(self, source: str, text: str, level: str = "info") -> None:
         """Add one."""
+        clock_s = time.monotonic()
         with self._lock:
             self._count += 1
-            self._events.append(Event(self._count, time.time(), source, text, level))
+            self._events.append(Event(self._count, time.time(), source, text, level, clock_s))
 
     def since(self, number: int) -> list[Event]:
         """Return the events after this one, in order."""

@@ -1,5 +1,6 @@
 """Frames of a crane, and what the page is shown of them."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.shaping.states import Reason, State
 from canshaper.studio.server import drawn_of
 from canshaper.studio.view import SILENT_S, CraneView
-from canshaper.studio.words import FAULTS, fault_words, reason_words, state_words
+from canshaper.studio.words import FAULTS, Events, fault_words, reason_words, state_words
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.hand import Hand, Held
@@ -322,3 +323,11 @@ def test_a_joystick_position_that_is_old_is_shown_no_more(watched: Watched) -> N
         watched.view.check(1.0 + age_s)
         axis = watched.view.values(1.0 + age_s)["axes"]["slew"]
         assert axis["joystick"] == (position and pytest.approx(position, abs=0.005))
+
+
+def test_an_event_has_the_clock_of_the_charts() -> None:
+    """Only the page reads it: it draws its mark on the time axis."""
+    events, before_s = Events(), time.monotonic()
+    events.add("page", "something")
+    ((*_, clock_s),) = events.since(0)
+    assert before_s <= float(clock_s) <= time.monotonic()
