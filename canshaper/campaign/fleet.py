@@ -20,7 +20,6 @@ from canshaper.commissioning.robust import RobustDesign, design_robust
 from canshaper.config.filters import filter_of
 from canshaper.config.limits import Sway
 from canshaper.design.parallel import Processes
-from canshaper.design.profiles import swinging_axis
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import OnProgress
@@ -54,7 +53,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class FleetRow:
-    """What the drives leave that judge.
+    """Swing that the judging drives leave.
 
     Attributes:
         name: of the row.
@@ -93,14 +92,16 @@ def swinging(deployment: Deployment) -> dict[str, Sway]:
     Raises:
         DesignError: there is none, or one has more than one filter.
     """
-    axes = {name: axis for name, axis in deployment.axes.items() if axis.config.sway}
+    axes = {}
+    for name, axis in deployment.axes.items():
+        if sway := axis.config.sway:
+            if axis.rope or axis.config.gain_schedule or axis.config.profiles:
+                text = "expected one filter, got a rope, gain_schedule or profiles"
+                raise DesignError(f"--fleet: axis {name}: {text}")
+            axes[name] = sway
     if not axes:
         raise DesignError("expected an axis with sway data, got none")
-    for name, axis in axes.items():
-        if axis.rope or axis.config.gain_schedule or axis.config.profiles:
-            text = "expected one filter, got a rope, gain_schedule or profiles"
-            raise DesignError(f"--fleet: axis {name}: {text}")
-    return {name: swinging_axis(deployment, name)[1] for name in axes}
+    return axes
 
 
 def design_fleet(
@@ -112,7 +113,7 @@ def design_fleet(
         deployment: the machine.
         duration_s: of the impulse responses; None for that of the file's, or one swing.
         workers: drive the candidates.
-        on_progress: told the part that is done.
+        on_progress: called with the part that is done.
 
     Raises:
         ConfigError: the C has no part for the machine.

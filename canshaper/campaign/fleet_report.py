@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def table(design: FleetDesign) -> Table:
-    """What each row leaves, in degrees; its lengths are parts of those in the file."""
+    """Swing left by each row, in degrees; its lengths are parts of those in the file."""
     made = new_table("left, deg", "run-on, s", "lengths", "worst 5 %", "p50", "p99")
     for row in design.rows:
         of = row.candidate
@@ -34,8 +34,8 @@ def verdict(design: FleetDesign) -> str:
     chosen = design.asked.worst_deg
     count = len(JUDGING) - design.left_out
     text = f"The worst twentieth of {count} drives that it has not seen leaves {chosen:.1f} deg"
-    drawn = f"{design.left_out} drives with faults, or that only Python drives, are left out"
-    return f"{text}; with the file {file:.1f}, with a box of all lengths {box:.1f}. {drawn}."
+    absent = f"{design.left_out} drives are left out: with a fault, or of parts that C lacks"
+    return f"{text}; with the file {file:.1f}, with a box of all lengths {box:.1f}. {absent}."
 
 
 def figure(design: FleetDesign) -> "Figure":

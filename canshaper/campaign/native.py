@@ -23,6 +23,7 @@ from canshaper_sim.axes import TIP_AXES
 from canshaper_sim.crane import FULL_SPEEDS, INTERNAL_STEP_S, CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple
+from canshaper_sim.hand import Hand
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script
@@ -124,7 +125,7 @@ class NativeCrane:
         self._wiring = [_wiring(deployment, axes.get(one)) for one in TIP_AXES]
 
         still = Script("still", (), 1.0)
-        cycles_ms = [one.message.cycle_time or 20 for one in deployment.joysticks.values()]
+        cycles_ms = Hand(deployment).cycles_ms
         self._drive = _drive_type(len(cycles_ms))
         self._neutral = []  # anti-sway on, off
         for off in (False, True):
@@ -192,8 +193,8 @@ class NativeCrane:
         arrays = [empty, loaded, np.array(strokes), *frames, np.empty((_COLUMNS, ticks)), measures]
         at = (None if one is None else one.ctypes.data_as(ctypes.c_void_p) for one in arrays)
         self._c.cs_drive(ctypes.byref(drive), *at)
-        *found, swung_over = measures.tolist()
-        named = zip(_MEASURES, found, strict=True)
+        *values, swung_over = measures.tolist()
+        named = zip(_MEASURES, values, strict=True)
         return {name: None if math.isnan(one) else one for name, one in named}, bool(swung_over)
 
     def _packed(self, hands: Joysticks, ticks: int) -> tuple[Any, Any]:

@@ -293,8 +293,8 @@ def lines(summary: Summary) -> Iterator[str]:
         verdict = "kept" if one.kept else "NOT SHOWN"
         if one.quantile.low is not None and one.quantile.low > one.limit:
             verdict = "EXCEEDED"
-        found = bounded(one.quantile)
-        yield f"accept.{one.key}: {found}, expected at most {one.limit:g}: {verdict}"
+        value = bounded(one.quantile)
+        yield f"accept.{one.key}: {value}, expected at most {one.limit:g}: {verdict}"
 
 
 def difference_table(differences: Mapping[str, Difference]) -> Table:

@@ -17,11 +17,31 @@ def write_filters(
     filters: Sequence[tuple[Place, Mapping[str, FileValue]]],
     tail_s: float | None,
     verb: str,
+) -> list[str]:
+    """Write filters of an axis into the file; see ``filter_changes``.
+
+    Returns:
+        Lines that have changed, and the notes.
+
+    Raises:
+        ConfigError: the file cannot be changed, or is no good deployment with the filters: a range
+            in which the sway may be adjusted can be too wide for it. The file is as it was.
+    """
+    changes, notes = filter_changes(deployment, axis, filters, tail_s, verb)
+    return [*change(deployment.path, changes), *notes]
+
+
+def filter_changes(
+    deployment: Deployment,
+    axis: str,
+    filters: Sequence[tuple[Place, Mapping[str, FileValue]]],
+    tail_s: float | None,
+    verb: str,
     *,
     sway: Mapping[str, FileValue] | None = None,
     rope: Mapping[str, FileValue] | None = None,
-) -> list[str]:
-    """Write filters, and a longer tail where the stopping distance of the file allows it.
+) -> tuple[list[Change], list[str]]:
+    """Filters of an axis, and a longer tail where the stopping distance of the file allows it.
 
     What they were designed for carries where it comes from: measured as the swing was.
 
@@ -36,13 +56,9 @@ def write_filters(
         rope: keys of the length that it follows.
 
     Returns:
-        Lines that have changed, which kind its own replaces, and why the tail has not.
-
-    Raises:
-        ConfigError: the file cannot be changed, or is no good deployment with the filters: a range
-            in which the sway may be adjusted can be too wide for it. The file is as it was.
+        Changes of the file; notes on the kind that its own replaces, and why the tail stays.
     """
-    path, config = deployment.path, deployment.axes[axis].config
+    config = deployment.axes[axis].config
     changes: list[Change] = [
         (("axes", axis, *place, "filter"), _with_origin(config, values, verb), note(verb))
         for place, values in filters
@@ -57,15 +73,15 @@ def write_filters(
         kept = stop_fault(deployment, axis, config.model_copy(update={"limits": limits}))
         if not kept:
             changes.append(of_limits(axis, config, {"tail_s": tail_s}))
-    lines = change(path, changes)
+    notes = []
     was = config.filter.kind
     for kind in (values["kind"] for place, values in filters if not place):
         if was != kind:
-            lines.append(f"NOTE: axes.{axis}.filter.kind: {kind} replaces {was}")
+            notes.append(f"NOTE: axes.{axis}.filter.kind: {kind} replaces {was}")
     if kept:
         text = f"expected {tail_s:g} s, got {config.limits.tail_s:g} s, which stays"
-        lines.append(f"WARNING: axes.{axis}.limits.tail_s: {text}: stop_distance_m: {kept}")
-    return lines
+        notes.append(f"WARNING: axes.{axis}.limits.tail_s: {text}: stop_distance_m: {kept}")
+    return changes, notes
 
 
 def refuse_scheduled(deployment: Deployment, axis: str, cure: str) -> None:

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from canshaper.commissioning.filter_file import write_filters
+from canshaper.commissioning.filter_file import filter_changes
 from canshaper.commissioning.robust import RobustDesign
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.source import Place
 from canshaper.design.tuning.evaluate import shaper_of, swing_left
 from canshaper.design.tuning.modes import second_residual
+from canshaper.edit.edit import Change, change
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 
@@ -76,7 +77,19 @@ def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console
 
 
 def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
-    """Write designs for an axis into the file; see ``write_filters``."""
+    """Write designs into the file, all or none; return changed lines and notes."""
+    changes, notes = list[Change](), list[str]()
+    for axis in dict.fromkeys(one.bound.name for one in designs):
+        own, noted = _changes(deployment, [one for one in designs if one.bound.name == axis])
+        changes += own
+        notes += noted
+    return [*change(deployment.path, changes), *notes]
+
+
+def _changes(
+    deployment: Deployment, designs: Sequence[RobustDesign]
+) -> tuple[list[Change], list[str]]:
+    """Changes of the file for the designs of an axis; see ``filter_changes``."""
     config, parts = designs[0].bound.config, []
     for one in designs:
         at = one.task.at
@@ -87,7 +100,7 @@ def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
     longest = max(designs, key=lambda one: one.shaper.duration_s)
     name, task = longest.bound.name, designs[0].task
     own = {"sway": task.sway, "rope": task.rope}
-    return write_filters(deployment, name, parts, longest.needed_s, "robust", **own)
+    return filter_changes(deployment, name, parts, longest.needed_s, "robust", **own)
 
 
 def figure(one: RobustDesign) -> "Figure":

@@ -140,7 +140,7 @@ def _readme(deployment: Deployment, numbers: Numbers, golden: Golden, precision:
 
 
 def _bill(deployment: Deployment, out: Path) -> str:
-    """What a folder is made of, in CycloneDX 1.6: deployment, program, and every file of it."""
+    """Return the bill of a folder, CycloneDX 1.6: deployment, program, and every file of it."""
     identity = deployment.identity
     made_of = {deployment.path.name: identity.deployment, **identity.dbc}
     for path in sorted(one for one in out.rglob("*") if one.is_file()):

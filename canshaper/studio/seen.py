@@ -1,4 +1,4 @@
-"""What the frames on the buses say of an axis and of each source, for the page. No clock."""
+"""State of each axis and source by the frames on the buses, for the page. No clock."""
 
 from collections import deque
 from collections.abc import Iterable

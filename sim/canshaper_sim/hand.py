@@ -43,12 +43,14 @@ class Hand:
 
     Attributes:
         cycle_ms: frames are due at multiples of it only.
+        cycles_ms: of each joystick.
     """
 
     def __init__(self, deployment: Deployment) -> None:
         joysticks = [_Joystick(one, deployment) for one in deployment.joysticks.values()]
         for behind in [one for one in joysticks if one.next_profile][1:]:
             behind.next_profile = None  # pressed on both it would be two presses
+        self.cycles_ms = [one.cycle_ms for one in joysticks]
         self._messages: list[_Message] = [*joysticks]
         self._messages += [_Switches(one, deployment) for one in deployment.switches]
         if deployment.emergency_stop:

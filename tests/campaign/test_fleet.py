@@ -1,6 +1,7 @@
 """Robust shapers for a fleet: the drives, the choice among candidates, and what is refused."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +18,8 @@ from canshaper.campaign.measure import measured_drive
 from canshaper.campaign.run import Source
 from canshaper.campaign.statistics import Quantile
 from canshaper.commissioning import robust_report
-from canshaper.commissioning.robust import RobustDesign, design_robust
+from canshaper.commissioning.filter_file import filter_changes
+from canshaper.commissioning.robust import design_robust
 from canshaper.design.parallel import Processes
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.binding import load_deployment
@@ -107,15 +109,15 @@ def test_all_axes_are_written_or_none(tmp_path: Path, monkeypatch: pytest.Monkey
     row = FleetRow("", Candidate(0.9, 1.1, 1.0), 1.0, *[Quantile(1.0, None, None)] * 2)
     made = FleetDesign(designs, row, [row] * 3, 0)
     monkeypatch.setattr(fleet, "design_fleet", lambda *_: made)
-    written = robust_report.write_design
+    changes = filter_changes
 
-    def fails(deployment: Deployment, one: RobustDesign) -> list[str]:
-        if one.bound.name == "near_far":
+    def fails(deployment: Deployment, axis: str, *given: Any, **own: Any) -> Any:
+        if axis == "near_far":
             raise DesignError("no room")
-        return written(deployment, one)
+        return changes(deployment, axis, *given, **own)
 
     with monkeypatch.context() as planted:
-        planted.setattr(robust_report, "write_design", fails)
+        planted.setattr(robust_report, "filter_changes", fails)
         assert invoke("robust", str(path), "--fleet", "--write").exit_code == 2
     assert path.read_text(encoding="utf-8") == before
     picture = tmp_path / "front.svg"

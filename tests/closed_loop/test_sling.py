@@ -118,8 +118,8 @@ def test_identify_finds_both_modes(
     signal = ("--file", str(file), "--signal", "bridge=LoadSway.SwayBridge")
     done = CliRunner().invoke(app, ["identify", str(log), *signal, *about, "--out", str(tmp_path)])
     said = " ".join(done.output.split())
-    found = [re.search(p, said) for p in (r"period_s: ([\d.]+)", r"--second ([\d.]+),")]
-    periods_s = [float(one[1]) for one in found if one]
+    matches = [re.search(p, said) for p in (r"period_s: ([\d.]+)", r"--second ([\d.]+),")]
+    periods_s = [float(one[1]) for one in matches if one]
     expected = [2.0 * math.pi / omega for omega in modes(ROPE_M, sling_m, ratio)]
     assert periods_s == pytest.approx(expected, rel=0.01), said
 

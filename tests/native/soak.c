@@ -29,7 +29,7 @@ static void hash(uint64_t *h, const void *data, size_t n)
     for (size_t i = 0; i < n; i++) { *h = (*h ^ ((const uint8_t *)data)[i]) * 0x100000001b3u; }
 }
 
-/* What a hand does with a joystick, and what its sender is at. */
+/* Motion of a hand at a joystick, and state of its sender. */
 typedef struct {
     cs_real wanted[CS_NUMBERS], held[CS_NUMBERS];
     int32_t count, silent, resting, enable, reset, off;

@@ -114,9 +114,9 @@ def swing_deg(plant: PlantNode) -> tuple[float, float]:
 @pytest.fixture(scope="module")
 def expected() -> list[tuple[float, float]]:
     simulation = Simulation(ROBUST, SCRIPT)
-    found = [swing_deg(simulation.plant) for _ in simulation.ticks()]
-    assert max(map(max, found)) > 100.0 * NEAR_DEG
-    return found
+    swings = [swing_deg(simulation.plant) for _ in simulation.ticks()]
+    assert max(map(max, swings)) > 100.0 * NEAR_DEG
+    return swings
 
 
 def differ_deg(ones: list[tuple[float, float]], others: list[tuple[float, float]]) -> float:
@@ -137,7 +137,7 @@ def test_fmpy_finds_no_fault(units: dict[str, Path], kind: str) -> None:
 def test_the_demo_through_the_controller(
     units: dict[str, Path], expected: list[tuple[float, float]], tmp_path: Path
 ) -> None:
-    plant, hands, found = PlantNode(ROBUST, listeners=False), Hands(), []
+    plant, hands, swings = PlantNode(ROBUST, listeners=False), Hands(), []
     senders = {name: axis.valve.message.sender() for name, axis in ROBUST.axes.items()}
     with running(units["controller"], tmp_path) as slave:
         for tick in range(len(expected)):
@@ -150,14 +150,14 @@ def test_the_demo_through_the_controller(
                 raw = {ROBUST.axes[name].config.valve.signal: reader.zero + steps}
                 plant.receive(sender.frame(raw))
             plant.advance(TICK_S)
-            found.append(swing_deg(plant))
-    assert differ_deg(found, expected) <= NEAR_DEG
+            swings.append(swing_deg(plant))
+    assert differ_deg(swings, expected) <= NEAR_DEG
 
 
 def test_the_demo_through_both(
     units: dict[str, Path], expected: list[tuple[float, float]], tmp_path: Path
 ) -> None:
-    found, hands = [], Hands()
+    swings, hands = [], Hands()
     with (
         running(units["controller"], tmp_path / "a") as controller,
         running(units["plant"], tmp_path / "b") as plant,
@@ -170,8 +170,8 @@ def test_the_demo_through_both(
                 plant.set(f"{axis}.command", controller.get(f"{axis}.command"))
             plant.step(tick)
             across, along = plant.get("sway.across"), plant.get("sway.along")
-            found.append((math.degrees(across), math.degrees(along)))
-    assert differ_deg(found, expected) <= NEAR_DEG
+            swings.append((math.degrees(across), math.degrees(along)))
+    assert differ_deg(swings, expected) <= NEAR_DEG
 
 
 def test_switches_states_and_steps(units: dict[str, Path], tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_it_is_so_in_a_long_drive_behind_the_gate(name: str) -> None:
 @pytest.mark.study
 @pytest.mark.parametrize("name", SHIPPED)
 def test_it_is_so_in_ten_million_ticks(name: str) -> None:
-    """Of all machines together; half an hour of a processor."""
+    """All machines share them; half an hour of a processor."""
     c, ticks = NativeController(shipped(name)), -(-10_000_000 // len(SHIPPED))
     assert difference(read(CONFIG / f"{name}.yaml"), c, "ten million", ticks)[0] == ""
 

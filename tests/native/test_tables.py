@@ -85,7 +85,7 @@ def test_what_is_refused_is_named_with_its_line(machine: Machine) -> None:
 
 
 def test_a_counter_with_more_values_than_c_counts_is_refused(machine: Machine) -> None:
-    """Of 2^32 values nothing would be left: none of its frames would be checked."""
+    """A count of 2^32 values would become 0: none of its frames would be checked."""
     machine.in_dbc(" SG_ AliveCounter : 56|8@1+", " SG_ AliveCounter : 38|26@1+")
     text = "expected a whole signal of up to 24 bits in an export, got AliveCounter"
     assert problems(machine)[0].endswith(text)
@@ -118,9 +118,9 @@ def test_the_numbers_are_exact() -> None:
 
 
 def test_the_sign_of_a_zero_is_kept() -> None:
-    found = tables(read(CONFIG / "forwarder.yaml"))
-    found["axis"][0]["deadband"] = -0.0
-    assert ".deadband = R(-0x0.0p+0)" in tables_source(found)
+    numbers = tables(read(CONFIG / "forwarder.yaml"))
+    numbers["axis"][0]["deadband"] = -0.0
+    assert ".deadband = R(-0x0.0p+0)" in tables_source(numbers)
 
 
 def test_no_line_of_the_source_is_code() -> None:

@@ -40,7 +40,7 @@ class Crane:
 
     @property
     def energy(self) -> float:
-        """Of a hook of 1 kg and its load, with a trolley that stands; J."""
+        """Energy of a hook of 1 kg and its load, with a trolley that stands; J."""
         apart = math.dist(self.hook, self.slung.position)
         stretched = 0.5 * 40.0**2 * max(apart - self.sling.length_m, 0.0) ** 2
         rate = self.slung.rate

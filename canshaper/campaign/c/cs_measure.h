@@ -1,4 +1,4 @@
-/* What is measured of a drive; cs_plant.c drives. */
+/* Measures of a drive; cs_plant.c drives. */
 #ifndef CS_MEASURE_H
 #define CS_MEASURE_H
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from canshaper.config.filters import Filter, filter_of
-from canshaper.config.limits import Sway
+from canshaper.config.limits import Limits, Sway
 from canshaper.config.load import limits
 
 # Proposals where nothing is known: ten swings in s, speeds of the tip (m/s) and of slewing (rad/s),
@@ -245,6 +245,8 @@ def stop_distance_m(
 ) -> float:
     """Room for the run-on of a filter and for a lost joystick, rounded up to a tenth of a metre.
 
+    At most what a file may have: no machine with sense needs more.
+
     Args:
         full_speed_m_s: speed of the tip.
         period_s: of the swing; a filter that we recommend runs on for a third of it.
@@ -252,7 +254,8 @@ def stop_distance_m(
         valve_timeout_ms: that of the valve, of which its cycle is a third at most.
     """
     waits_s = joystick_timeout_ms / 1000.0 + 2.0 * valve_timeout_ms / 3000.0
-    return math.ceil(10.0 * full_speed_m_s * (waits_s + RUN_ON_PERIODS * period_s)) / 10.0
+    distance_m = math.ceil(10.0 * full_speed_m_s * (waits_s + RUN_ON_PERIODS * period_s)) / 10.0
+    return min(distance_m, limits(Limits, "stop_distance_m")[1])
 
 
 def rounded(number: float) -> str:

@@ -22,8 +22,6 @@ from canshaper.cli.interview.first import (
     rounded,
     stop_distance_m,
 )
-from canshaper.config.limits import Limits
-from canshaper.config.load import limits as limits_of
 from canshaper.edit.edit import plain
 
 
@@ -205,7 +203,6 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> 
     # One response for a range of pendulums runs on a third longer.
     longest_s = load.ten_swings_s[axis.name] / 7.5 if load else sway.mode().period_s
     distance = stop_distance_m(speed, longest_s, joystick_timeout_ms, axis.timeout_ms)
-    distance = min(distance, limits_of(Limits, "stop_distance_m")[1])
     yield "    # stop_distance_m: write how far the tip may travel when it stops from full speed."
     yield "    # It is a limit, here a guess; `canshaper check` shows what the filter needs."
     tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"

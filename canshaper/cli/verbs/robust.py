@@ -178,13 +178,7 @@ def _for_fleet(
     if path := results.picture(None, lambda: figure(design)):
         results.picture_line(path)
     if write:
-        before = deployment.path.read_bytes()
-        try:
-            lines = [line for one in design.designs for line in write_design(deployment, one)]
-        except BaseException:  # all axes or none
-            deployment.path.write_bytes(before)
-            raise
-        lines.append(written_line(deployment.path))
+        lines = [*write_design(deployment, *design.designs), written_line(deployment.path)]
     else:
         lines = [
             f"axes.{one.bound.name}:\n  sway: {flow(one.task.sway)}\n  filter: {flow(one.section)}"

@@ -17,6 +17,7 @@ from canshaper.commissioning.identification.driven_data import driven_s
 from canshaper.commissioning.identification.segments import SETTLING_S, FreeSwings, find_free
 from canshaper.commissioning.identification.series import Series, Value
 from canshaper.commissioning.identification.swing import SAMPLES, clipped, mixed
+from canshaper.design.tuning.modes import SECOND_PERIODS
 
 # Fewer full swings show no damping.
 LEAST_SWINGS = 3.0
@@ -26,8 +27,6 @@ WIDEST_PERIOD = 0.03
 WIDEST_RATIO, WIDEST_RATIO_ABS = 0.4, 0.01
 # Largest swing that the correction for amplitude holds for, rad.
 LARGE_RAD = math.radians(60.0)
-# Longest period of a second swing, part of the first one's.
-SECOND_PERIODS = 0.8
 # Part of the driven swing that the commands have to explain.
 LEAST_EXPLAINED = 0.8
 LEAST_EXPLAINED_ALONE = 0.9
@@ -169,9 +168,9 @@ def _second(first: DecayFit, series: Sequence[Series]) -> list[str]:
             inside = (at >= 0.0) & (at <= own.time_s[-1])
             if own.source == one.source and inside.any():
                 basis, _ = DecayProblem([own], [float(fit.envelope[0])]).basis(0, x, at[inside])
-                found, *_ = np.linalg.lstsq(basis, one.value[inside], rcond=None)
+                amounts, *_ = np.linalg.lstsq(basis, one.value[inside], rcond=None)
                 time.append(one.time_s[inside])
-                left.append(one.value[inside] - basis @ found)
+                left.append(one.value[inside] - basis @ amounts)
         swings = find_free(replace(one, time_s=np.concatenate(time), value=np.concatenate(left)))
         if swings and (best is None or swings.worth > best.worth):
             best = swings

@@ -23,7 +23,7 @@ MOST_RANGE_PCT = 60.0
 # the valve takes two thirds of its period to full speed, and has no room between two ticks; for one
 # beyond 0.4 of its period the first pays up to an eighth, or a response that is longer by a third.
 _SECOND_DAMPING = 0.4
-_SECOND_RISES, _SECOND_TICKS, _SECOND_PERIODS = 1.5, 10, 0.8
+_SECOND_RISES, _SECOND_TICKS, SECOND_PERIODS = 1.5, 10, 0.8
 _SHORTEST_S = 0.25  # the fastest mode that can be modelled, with the largest range
 
 
@@ -69,7 +69,7 @@ def second_mode(
         DesignError: a value is out of range: overdamped, too fast or too slow.
     """
     fastest_s = max(_SECOND_RISES / rate_per_s, _SECOND_TICKS * tick_s, _SHORTEST_S)
-    slowest_s = _SECOND_PERIODS * first.period_s
+    slowest_s = SECOND_PERIODS * first.period_s
     if fastest_s > slowest_s:
         raise DesignError(f"expected none with a valve of {rate_per_s:g} /s, got {period_s:g} s")
     for name, value, low, high, unit in (

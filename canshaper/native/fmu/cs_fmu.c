@@ -48,7 +48,7 @@ FMI3_Export const char *fmi3GetVersion(void) { return "3.0"; }
 
 FMI3_Export status fmi3SetDebugLogging(void *u, bool on, size_t n, const char *const categories[])
 {
-    (void)u, (void)on, (void)n, (void)categories; /* errors are always told */
+    (void)u, (void)on, (void)n, (void)categories; /* errors are always reported */
     return OK;
 }
 

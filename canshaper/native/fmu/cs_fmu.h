@@ -1,4 +1,4 @@
-/* What cs_fmu.c, the interface FMI 3.0, needs of a unit of co-simulation: the controller, or the plant. */
+/* Interface between cs_fmu.c, which has FMI 3.0, and a unit of co-simulation: the controller, or the plant. */
 #ifndef CS_FMU_H
 #define CS_FMU_H
 

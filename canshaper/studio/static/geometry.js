@@ -51,7 +51,7 @@ function fromJoints(boom, start, lift, knuckle, extension) {
   return { start, elbow, base, end: along(boom.outer_boom_m), tip: along(boom.outer_boom_m + extension) };
 }
 
-/** What hangs from the tip of a crane: a load on its rope, or a grapple. */
+/** Points below the tip of a crane: a load on its rope, or a grapple. */
 export function hungPoints(hello, { rope, sway }) {
   return grapplePoints(rope ? { l1: 0, l2: rope } : hello.grapple, sway);
 }
