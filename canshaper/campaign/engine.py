@@ -50,16 +50,24 @@ class Cluster:
     on_refusal: Callable[[str], object] = field(default=lambda _text: None)
     workers_s: float | None = WORKERS_S
 
-    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Do every job; see ``Engine``."""
-        from distributed import Client, KilledWorker, as_completed  # noqa: PLC0415  (an extra)
-        from distributed.comm import get_address_host_port  # noqa: PLC0415
+    def __post_init__(self) -> None:
+        """Check the address; a client that has begun with a wrong one takes half a minute to end.
+
+        Raises:
+            CampaignError: ``scheduler`` is no address.
+        """
+        from distributed.comm import get_address_host_port  # noqa: PLC0415  (an extra)
 
         try:
             get_address_host_port(self.scheduler, strict=True)
-        except ValueError:  # a client that has begun with one would take half a minute to end
+        except ValueError:
             expected = "expected the address of a scheduler, such as tcp://10.0.0.1:8786"
             raise CampaignError(f"{self.scheduler}: {expected}") from None
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job; see ``Engine``."""
+        from distributed import Client, KilledWorker, as_completed  # noqa: PLC0415  (an extra)
+
         try:
             client: Any = Client(self.scheduler, timeout=CONNECT_S, set_as_default=False)
         except OSError as error:

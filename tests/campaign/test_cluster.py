@@ -152,6 +152,7 @@ def test_a_scheduler_that_is_not_there_is_reported_in_one_line(
 ) -> None:
     monkeypatch.setattr("canshaper.campaign.engine.CONNECT_S", 0.5)
     arguments = ["campaign", str(ROBUST), "-n", "16", "--scheduler", "tcp://127.0.0.1:9"]
+    arguments += ["--engine", "python"]  # said by name, or a machine without a compiler says so
     done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
     assert done.exit_code == 2
     assert done.output.startswith("tcp://127.0.0.1:9: no scheduler answers: ")

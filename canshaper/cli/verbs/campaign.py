@@ -104,6 +104,7 @@ def campaign(
         for k, (one, source) in enumerate(zip(files, sources, strict=True))
     ]
     interrupted = False
+    workers = engine(processes, scheduler, cluster)
     if merge:
         for store in stores:
             for folder in merge:
@@ -119,7 +120,7 @@ def campaign(
         for source in sources:  # compiled, and held against Python, before anything begins
             if isinstance(why := source.native(), ConfigError):
                 echo(f"driven by Python: {why}", err=True)
-        interrupted = _drive(engine(processes, scheduler, cluster), sources, seeds, stores)
+        interrupted = _drive(workers, sources, seeds, stores)
     accepted = _report(files, stores, results)
     results.write()
     if interrupted:
