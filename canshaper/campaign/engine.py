@@ -91,8 +91,13 @@ class Cluster:
                 doing[future.key] = job
                 done.add(future)
 
-            for job in islice(waiting, 4 * sum(client.ncores().values())):
-                submit(job)
+            def fill() -> None:
+                """Give every core four jobs; workers come and go, one job is always under way."""
+                most = max(1, 4 * sum(client.ncores().values()))
+                for job in islice(waiting, max(0, most - len(doing))):
+                    submit(job)
+
+            fill()
             for future in done:
                 job = doing.pop(future.key)
                 try:
@@ -106,8 +111,7 @@ class Cluster:
                 except KilledWorker:
                     raise CampaignError(f"{self.scheduler}: the workers died of {job}") from None
                 yield job, result
-                for following in islice(waiting, 1):
-                    submit(following)
+                fill()
 
 
 @dataclass

@@ -183,9 +183,8 @@ class PlantNode:
         bus = next(iter(deployment.axes.values())).config.valve.bus
         self._feedback = _FEEDBACK_OF.get(name, {**JOINT_FEEDBACK, **FEEDBACK})
         self._senders: dict[str, Sender] = {}
-        # A feedback message that is the measured radius of the deployment is protected as it asks.
-        measured = [motion.radius for motion in deployment.motions.values()]
-        radii = {radius.message.name: radius.protection for radius in measured if radius}
+        # A feedback message that the deployment reads is sent where and as it asks.
+        read = {i.message.name: (i.config.bus, i.protection) for i in deployment.inputs()}
         for message, signals in self._feedback.items():
             entry = deployment.messages.find(message)
             if isinstance(entry, str):
@@ -193,8 +192,8 @@ class PlantNode:
             elif missing := [s for s in signals if not find_signal(entry[1], s)]:
                 problems.append(entry[0].problem(entry[1], f"lacks {', '.join(missing)}"))
             else:
-                protection = radii.get(message, UNPROTECTED)
-                sent = SentMessage(bus, entry[1], protection=protection)
+                where, protection = read.get(message, (bus, UNPROTECTED))
+                sent = SentMessage(where, entry[1], protection=protection)
                 self._senders[message] = sent.sender()
         if problems:
             raise ConfigError(problems)

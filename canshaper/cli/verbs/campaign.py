@@ -89,6 +89,7 @@ def campaign(
     from canshaper.cli.results import Results
     from canshaper.native.library import has_compiler
     from canshaper_sim.parameters import changed_parameters
+    from canshaper_sim.recorder import dwell_s
 
     deployment = loader(file)()
     changed_parameters(changes or [], deployment)  # wrong ones are named before anything begins
@@ -98,7 +99,8 @@ def campaign(
     results = Results("Campaign", deployment, report)
     ranges = deployment.config.uncertainty
     engine_name = native or ("native" if has_compiler() else "python")
-    sources = [Source.of(one, ranges, changes or [], engine_name) for one in files]
+    longest_s = max(map(dwell_s, files))
+    sources = [Source.of(one, ranges, changes or [], engine_name, longest_s) for one in files]
     stores = [
         Store(out / f"{'ab'[k]}-{one.path.stem}" if against else out, source.about)
         for k, (one, source) in enumerate(zip(files, sources, strict=True))

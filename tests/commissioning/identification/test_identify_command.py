@@ -179,6 +179,18 @@ def test_a_stopwatch(tmp_path: Path, file: Path) -> None:
     assert not (tmp_path / "out").exists()  # nothing to draw
 
 
+def test_an_axis_that_follows_its_rope_keeps_the_rope(tmp_path: Path) -> None:
+    text = (ROOT / "config" / "bridge-crane.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
+    timed = "--swings", "10", "--seconds", "60", "--first", "20", "--last", "5"
+    before = file.read_bytes()
+    result = run(tmp_path, *timed, "--file", file, "--axis", "trolley", "--write")
+    assert result.exit_code == 2
+    assert "axis trolley: expected an axis with a period, got one that follows" in said(result)
+    assert file.read_bytes() == before
+
+
 def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: Path) -> None:
     before = file.read_bytes()
     result = run(tmp_path, logs / "still.log", "--file", file, "--write")
