@@ -5,13 +5,16 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from canshaper.codec.frame import Frame, FrameFault, group_of
+from canshaper.codec.layout import Layout
 from canshaper.config.bus import Bus
 from canshaper.errors import CutOffError, LogError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.j1939.groups import AnySource, ReceivedGroup
 
 Key = tuple[str, int, bool]
@@ -226,3 +229,30 @@ class _Noted(Generic[_Input]):
 
     def invalidate(self) -> None:
         """Do nothing: no state is kept."""
+
+
+def joystick_commands(
+    joystick: BoundJoystick, axes: Mapping[str, BoundAxis], data: bytes
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Decode a joystick's frame: its raw values, and the command of each of its axes.
+
+    Both are empty for a frame of another length; a command that is no value is left out.
+    """
+    if len(data) != joystick.message.length:
+        return {}, {}
+    raw, commands = joystick.decode(data)
+    values = {}
+    for name, axis in axes.items():
+        config = axis.config.command
+        value = commands.get(config.signal) if config.joystick == joystick.name else None
+        if type(value) is float:
+            values[name] = value
+    return raw, values
+
+
+def valve_part(axis: BoundAxis, layout: Layout, data: bytes) -> float | None:
+    """Command in a valve frame, part of full; None for a frame of another length or a wrong one."""
+    if len(data) != axis.valve_message.length:
+        return None
+    steps = axis.valve.read(layout.decode(data))
+    return None if steps is None else steps / axis.valve.steps

@@ -11,9 +11,8 @@ if TYPE_CHECKING:
     from cantools.database.can import Message
 
     from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
-    from canshaper.commissioning.nodes import MessageTiming
     from canshaper.commissioning.nodes.eds import Eds
-    from canshaper.commissioning.nodes.node import Node, Pdo
+    from canshaper.commissioning.nodes.node import MessageTiming, Node, Pdo
     from canshaper.commissioning.nodes.parameters import Parameter
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
@@ -171,7 +170,7 @@ class Nodes:
 
 def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, MessageTiming]":
     """How a machine uses messages: how often they come, and when they are lost."""
-    from canshaper.commissioning.nodes import MessageTiming
+    from canshaper.commissioning.nodes.node import MessageTiming
 
     cycles = {message.name: message.cycle_time for message in messages}
     uses: dict[str, MessageTiming] = {}

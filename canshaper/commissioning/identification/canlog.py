@@ -1,6 +1,7 @@
 """Signals of a CAN log, named by DBC, with the commands in the same log."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from ipaddress import ip_address
@@ -13,8 +14,15 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.frame import NULL, group_of
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import find_signal, special_codes
-from canshaper.commissioning.identification.commands import Commands, Samples
-from canshaper.commissioning.identification.series import Kind, Series, Unit, ordered, unit_of
+from canshaper.commissioning.identification.series import (
+    Commands,
+    Kind,
+    Samples,
+    Series,
+    Unit,
+    ordered,
+    unit_of,
+)
 from canshaper.commissioning.identification.table import is_table
 from canshaper.errors import ConfigError, CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
@@ -125,21 +133,22 @@ def read_can(
         IdentificationError: a signal is not in the log, or from two senders.
         LogError: the log cannot be read.
     """
-    sensors = [s for a in deployment.axes.values() if (s := a.sway_sensor)] if deployment else []
-    merits = {one.name: one.config.merit for one in sensors}
+    axes = deployment.axes.values() if deployment else ()
+    merits = {s.name: s.config.merit for one in axes if (s := one.sway_sensor)}
     readers = {
         axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis), merits.get(name))
         for axis, name in names.items()
     }
-    load: list[_Reader] = []
+    load = None
     state = deployment.load_state if deployment else None
     if state and (signal := find_signal(state.message, state.config.signal)):
-        load = [_Reader("load state", state.message, signal, Unit(Kind.OTHER, 1.0, ""))]
+        load = _Reader("load state", state.message, signal, Unit(Kind.OTHER, 1.0, ""))
     commands = Commands(deployment)
     log = LogFile(path, on_progress)
-    seen, notes = _read(log, path, channel, [*readers.values(), *load], commands)
-    loads = [value for one in load for value in one.samples.value]
-    load_value = float(np.median(loads)) if loads else None
+    seen, notes = _read(
+        log, path, channel, [*readers.values(), *([load] if load else [])], commands
+    )
+    load_value = float(np.median(load.samples.value)) if load and load.samples.value else None
     idle = commands.idle()
     result = {}
     for axis, reader in readers.items():
@@ -153,7 +162,7 @@ def read_can(
     return result
 
 
-Seen = dict[tuple[int, bool], int]  # frames of each identifier
+Seen = Counter[tuple[int, bool]]  # frames of each identifier
 
 
 def _read(
@@ -161,7 +170,7 @@ def _read(
 ) -> tuple[Seen, list[str]]:
     """Hand every frame to who reads it: which there were, and what to note."""
     readers_of: dict[tuple[int, bool], list[_Reader]] = {}
-    seen: Seen = {}
+    seen: Seen = Counter()
     notes: list[str] = []
     first_ns = None
     channels: set[str] = set()
@@ -174,7 +183,6 @@ def _read(
             time_s = (frame.time_ns - first_ns) / 1e9
             key = frame.can_id, frame.extended
             if key not in seen:
-                seen[key] = 0
                 readers_of[key] = [r for r in readers if r.wants(*key)]
             seen[key] += 1
             for reader in readers_of[key]:

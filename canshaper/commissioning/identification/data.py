@@ -11,6 +11,7 @@ import numpy as np
 
 from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
 from canshaper.commissioning.identification.canlog import is_simulated, read_can
+from canshaper.commissioning.identification.decay import free_columns
 from canshaper.commissioning.identification.segments import find_free
 from canshaper.commissioning.identification.series import Array, Series, Value, ordered
 from canshaper.commissioning.identification.table import Table, is_table, read_table
@@ -100,8 +101,7 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
         at = start_s + 0.5 * period * (k + np.linspace(0.0, 3.0, 90))
         if at[0] < columns[0].time_s[0] or at[-1] > columns[0].time_s[-1]:
             continue
-        waves = [np.cos(omega * at), np.sin(omega * at), np.ones_like(at), at - at.mean()]
-        basis = np.stack(waves, axis=1)
+        basis = free_columns(at, omega * at, np.ones_like(at))
         values = np.stack([np.interp(at, c.time_s, c.value) for c in columns], axis=1)
         fitted, *_ = np.linalg.lstsq(basis, values, rcond=None)
         directions, sizes, _ = np.linalg.svd(fitted[:2].T)
@@ -115,7 +115,7 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
 
 # Swing of each axis as `canshaper sim` sends it.
 _PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
-SIMULATED = {
+_SIMULATED = {
     "slew": "GrappleSway.SwayPerpendicular",
     **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
     "bridge": "LoadSway.SwayBridge",
@@ -202,10 +202,10 @@ def logged(
     deployment: Deployment | None,
     messages: Messages,
     *,
-    axis: str | None,
-    channel: str | None,
-    about_s: float | None,
     on_progress: OnProgress,
+    axis: str | None = None,
+    channel: str | None = None,
+    about_s: float | None = None,
 ) -> list[Finding]:
     """Return the findings of logs, by axis and label."""
     if not logs:
@@ -220,7 +220,10 @@ def logged(
             axes = [*signals] or [axis_named(axis, deployment)]
             shown = {a: series_of(table, label, signals.get(a), about_s) for a in axes}
         else:
-            names = signals or _simulated(deployment, messages, axis)
+            names = signals or simulated_signals(deployment, messages, axis)
+            if not names:
+                text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
+                raise UsageError(text)
             known: dict[str, Any] = {"deployment": deployment, "channel": channel}
             shown = read_can(path, label, names, messages, **known, on_progress=report)
         for name, one in shown.items():
@@ -273,19 +276,15 @@ def _labelled(text: str) -> tuple[str, Path]:
     return label, Path(rest)
 
 
-def _simulated(
-    deployment: Deployment | None, messages: Messages, axis: str | None
+def simulated_signals(
+    deployment: Deployment | None, messages: Messages, axis: str | None = None
 ) -> dict[str, str]:
-    """Signals of the simulated crane, where no others are named."""
-    moves = deployment.coordinates if deployment else {one: one for one in SIMULATED}
-    there = {
+    """Signals of the simulated crane by axis, of those that the DBC files have."""
+    moves = deployment.coordinates if deployment else {one: one for one in _SIMULATED}
+    return {
         a: signal
         for a, m in moves.items()
         if axis in (None, a)
-        and (signal := SIMULATED.get(m))
+        and (signal := _SIMULATED.get(m))
         and not isinstance(messages.find(signal.partition(".")[0]), str)
     }
-    if not there:
-        text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
-        raise UsageError(text)
-    return there

@@ -12,13 +12,13 @@ from canopen.sdo.exceptions import SdoError
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can, receive
 from canshaper.codec.frame import EMERGENCY
-from canshaper.commissioning.nodes import MessageTiming
 from canshaper.commissioning.nodes.messages import ANALOGUE_INPUTS
 from canshaper.commissioning.nodes.node import (
     COB_ID,
     EVENT_TIMER,
     EXTENDED_BIT,
     TRANSMISSION,
+    MessageTiming,
     Node,
     Pdo,
 )

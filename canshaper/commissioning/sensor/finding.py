@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from canshaper.commissioning.identification.driven_data import Driven, driven_s, stretches
+from canshaper.commissioning.identification.driven import Driven, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
 from canshaper.commissioning.identification.swing import clipped
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
@@ -133,7 +133,7 @@ def _useless(axis: str, series: Series, period_s: float) -> str | None:
         )
     if float(np.ptp(value)) == 0.0:
         return f"{source}: it stands at {value[0]:g}: is it the right signal, and the sensor on?"
-    if (seconds := sum(map(driven_s, _alone(series, period_s)))) < LEAST_DRIVEN_S:
+    if (seconds := sum(one.driven_s for one in _alone(series, period_s))) < LEAST_DRIVEN_S:
         return (
             f"expected {axis} driven alone for {LEAST_DRIVEN_S:g} s or more, got {seconds:.1f} s;"
             f" what moves the tool without a command shows no sign: {DRIVE_IT}"

@@ -6,7 +6,7 @@ from functools import partial
 from itertools import pairwise
 from statistics import fmean
 
-from canshaper.commissioning.identification.commands import Samples
+from canshaper.commissioning.identification.series import Samples
 from canshaper.commissioning.procedure.bench import Mode, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.check import MOTION

@@ -9,9 +9,9 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from canshaper.commissioning.identification.data import (
-    SIMULATED,
     logged,
     measured_in,
+    simulated_signals,
     timed_by_hand,
 )
 from canshaper.commissioning.identification.plot import figure
@@ -75,10 +75,10 @@ def run(context: Context) -> Outcome:
         log = context.folder / "swing.log"
         bench.drive(deployment, log, _task([*sources.signals], bench.raw_mode("swing")))
         logs.append(log)
-        findings += _identified([log], sources.signals, deployment, bench)
+        findings += _identified(log, sources.signals, context)
     for name, path in sources.tables.items():
         logs.append(path)
-        findings += _identified([path], {}, deployment, bench, axis=name)
+        findings += _identified(path, {}, context, axis=name)
     for name, values in sources.timed.items():
         timed: dict[str, float | None] = dict(zip(_TIMED, values, strict=True))
         findings.append(timed_by_hand(timed, [], name))
@@ -102,13 +102,10 @@ _TIMED = ("swings", "seconds", "first", "last")
 
 def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
     """Ask what shows the swing of each axis; of the simulated crane it is its own message."""
-    sources = _Sources()
+    sources, own = _Sources(), simulated_signals(deployment, deployment.messages)
     for name in axes:
         sensor = deployment.axes[name].sway_sensor
-        default = sensor.name if sensor else NONE
-        shown = SIMULATED.get(deployment.coordinates.get(name, ""), "")
-        if shown and not isinstance(deployment.messages.find(shown.partition(".")[0]), str):
-            default = shown
+        default = own.get(name, sensor.name if sensor else NONE)
         question = (
             f"swing: {name}: what shows it: MESSAGE.SIGNAL of the bus, file of a phone (.csv), or"
             " stopwatch SWINGS SECONDS FIRST LAST such as 10 23.6 20 5"
@@ -143,23 +140,11 @@ def _task(axes: Sequence[str], mode: Mode) -> Task:
 
 
 def _identified(
-    logs: Sequence[Path],
-    signals: dict[str, str],
-    deployment: Deployment,
-    bench: Bench,
-    axis: str | None = None,
+    log: Path, signals: dict[str, str], context: Context, axis: str | None = None
 ) -> list[Finding]:
-    with bench.person.progress("identifying") as on_progress:
-        return logged(
-            [*map(str, logs)],
-            signals,
-            deployment,
-            deployment.messages,
-            axis=axis,
-            channel=None,
-            about_s=None,
-            on_progress=on_progress,
-        )
+    machine = context.deployment
+    with context.bench.person.progress("identifying") as shown:
+        return logged([str(log)], signals, machine, machine.messages, axis=axis, on_progress=shown)
 
 
 def _origin(logs: Sequence[Path], deployment: Deployment, *, simulated: bool) -> dict[str, Any]:
