@@ -14,8 +14,8 @@ from typing import Any
 
 from canshaper.commissioning.procedure.bench import Simulated, check_rehearsal
 from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
-from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-from canshaper.commissioning.procedure.state import State, read_state
+from canshaper.commissioning.procedure.procedure import Procedure
+from canshaper.commissioning.procedure.state import Outcome, State, read_state
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.commissioning.procedure.steps.report import NAME as REPORT
 from canshaper.errors import CanshaperError, UsageError
@@ -24,7 +24,7 @@ from canshaper.report.console import OnProgress
 
 NICE = 10  # the cranes of the live page go first
 # The last results, not accepted yet.
-_proposals: dict[Path, Proposal] = {}
+_proposals: dict[Path, Outcome] = {}
 _CHOICE = ("offered", "recommended", "chosen")  # numbers of a step that asks for one
 
 

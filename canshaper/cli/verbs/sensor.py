@@ -112,9 +112,7 @@ def sensor(
             return of_sensors(findings)
 
         results.picture_line(results.picture(out / "sensor.png", figure))
-    results.write()
-    if any(finding.problems for finding in findings):
-        raise typer.Exit(EXIT_TOO_POOR)
+    results.write(EXIT_TOO_POOR if any(finding.problems for finding in findings) else 0)
 
 
 def _axes(deployment: "Deployment", axis: str | None) -> list[str]:

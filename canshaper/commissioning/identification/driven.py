@@ -185,10 +185,10 @@ class DrivenProblem:
 
     def fitted(self, x: Array) -> list[tuple[Array, Array]]:
         """Return for each stretch: the model, and the amounts of what else it holds."""
-        gain, fits = gain_of(self.projected(x)), []
+        gain, fits = gain_of(self.projected(x)), list[tuple[Array, Array]]()
         for one, (swing, free) in zip(self.data, self.model(x), strict=True):
             amounts, *_ = np.linalg.lstsq(free, one.value - gain * swing, rcond=None)
-            fits.append((gain * swing + free @ amounts, amounts))
+            fits.append((gain * swing + free @ amounts, np.asarray(amounts)))
         return fits
 
 

@@ -50,9 +50,6 @@ def _shown(value: Value, factor: float = 1.0, digits: int = 2) -> str:
     return f"{number:.{digits}f} ± {max(half, least):.{digits}f}"
 
 
-ROW_PX, TOP_PX, FOOT_PX = 600, 130, 150
-
-
 def write_sensors(
     deployment: Deployment, findings: Sequence[Finding], log: Path | None, *, live: bool
 ) -> list[str]:

@@ -10,8 +10,8 @@ import pytest
 from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.files import Files
-from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-from canshaper.commissioning.procedure.state import Record, Status
+from canshaper.commissioning.procedure.procedure import Procedure
+from canshaper.commissioning.procedure.state import Outcome, Record, Status
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
@@ -71,7 +71,7 @@ def drive(
     signals: dict[str, str],
     change: Change = lambda task: task,
     without: Callable[[str, float], bool] = lambda _log, _time_s: False,
-) -> tuple[Procedure, Proposal]:
+) -> tuple[Procedure, Outcome]:
     # As the step valve would have measured it.
     machine.write_text(machine.read_text().replace("deadband_pct: 0", "deadband_pct: 5"))
     one = Procedure(Files(machine), Live(driver, change, without), load_deployment, STEPS)
@@ -236,5 +236,5 @@ def test_without_the_step_swing_the_sway_sensor_measures(machine: Path) -> None:
     _, proposal = drive(machine, driver, {})
     assert proposal.problems == []
     assert driver.questions == []
-    shown = "\n".join(part["text"] for part in proposal.parts if "text" in part)
+    shown = "\n".join(part["text"] for part in proposal.sheet.parts if "text" in part)
     assert "Swing measured: slew by SwayAngle.Across, near_far by SwayAngle.Along" in shown

@@ -10,7 +10,8 @@ import pytest
 from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Simulated, Task
 from canshaper.commissioning.procedure.files import Files
-from canshaper.commissioning.procedure.procedure import Procedure, Proposal
+from canshaper.commissioning.procedure.procedure import Procedure
+from canshaper.commissioning.procedure.state import Outcome
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
@@ -28,7 +29,7 @@ class Otherwise(Simulated):
         super().drive(deployment, log, self._change(task))
 
 
-def run(machine: Path, step: str, change: Any) -> Proposal:
+def run(machine: Path, step: str, change: Any) -> Outcome:
     one = Procedure(Files(machine), Otherwise(change), load_deployment, STEPS, origin=machine)
     return one.run(one.step(step))
 

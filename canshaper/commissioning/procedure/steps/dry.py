@@ -88,7 +88,7 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
 def figure(traffic: Traffic, title: str) -> Figure:
     """Joystick and valve of each axis over time, and when its joystick was enabled."""
     height = 190 + 300 * len(traffic.axes)
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     for number, (name, axis) in enumerate(traffic.axes.items()):
         bottom = (height - 110 - 300 * (number + 1) + 95) / height
         panel = fig.add_axes((0.11, bottom, 0.86, 185 / height))
@@ -113,11 +113,11 @@ def figure(traffic: Traffic, title: str) -> Figure:
                 panel.axvline(time_s, color=style.TEXT_COLOUR, linewidth=0.8)
         panel.set_xlim(0.0, traffic.duration_s)
         panel.set_ylim(-110.0, 110.0)
-        panel.set_ylabel("%", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+        style.label(panel, y="%")
         if not number:
             panel.legend(loc="upper right", fontsize=style.TEXT_PT, frameon=False, ncols=3)
-    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
+    style.label(panel, "time, s")
+    style.headline(fig, title)
     return fig
 
 

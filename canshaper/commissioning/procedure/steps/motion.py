@@ -83,9 +83,8 @@ def run(context: Context) -> Outcome:
     return outcome
 
 
-def _begin(deployment: Deployment, names: list[str]) -> list[str]:
+def _begin(deployment: Deployment, names: list[str]) -> None:
     change(deployment.path, [(("motion", name), {"waits": None}, "") for name in names])
-    return []
 
 
 def _follows(axis: AxisTraffic) -> bool:

@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from canshaper.commissioning.identification.data import (
     logged,
     measured_in,
@@ -89,11 +87,12 @@ def run(context: Context) -> Outcome:
     outcome.files = [log for log in logs if log.parent == context.folder]
     usable = [one for one in advice if one.sway]
     if usable:
-        origin = _origin(logs, deployment, simulated=bench.simulated)
+        origin = measured_in([*map(str, logs)], deployment.messages)
+        origin |= {"source": "simulated"} if bench.simulated else {}
         outcome.edit = partial(_write, findings=findings, advice=usable, origin=origin)
     seen = [finding for finding in findings if finding.free or finding.driven]
     if seen:
-        outcome.figures[""] = partial(_figure, seen, advice)
+        outcome.figures[""] = lambda: figure(seen, headlines(seen, advice))
     return outcome
 
 
@@ -147,11 +146,6 @@ def _identified(
         return logged([str(log)], signals, machine, machine.messages, axis=axis, on_progress=shown)
 
 
-def _origin(logs: Sequence[Path], deployment: Deployment, *, simulated: bool) -> dict[str, Any]:
-    origin = measured_in([*map(str, logs)], deployment.messages)
-    return {**origin, "source": "simulated"} if simulated else origin
-
-
 def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
     for finding in findings:
         outcome.sheet.print("\n".join(lines(finding)))
@@ -180,15 +174,6 @@ def _write(
     return [f"NOTE: {name}: its gain schedule stays as it is" for name in scheduled]
 
 
-def _figure(findings: Sequence[Finding], advice: Sequence[Advice]) -> Figure:
-    return figure(findings, headlines(findings, advice))
-
-
-def swings(deployment: Deployment) -> bool:
-    """Whether any axis makes the grapple swing."""
-    return bool(swinging(deployment))
-
-
 SWING = Step(
     "swing",
     "Swing, recorded and identified",
@@ -196,5 +181,5 @@ SWING = Step(
     run,
     writes="`sway`",
     needs=("joysticks",),
-    applies=swings,
+    applies=lambda deployment: bool(swinging(deployment)),
 )
