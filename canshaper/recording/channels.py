@@ -14,10 +14,9 @@ from canshaper.errors import CutOffError, LogError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.j1939.groups import AnySource, ReceivedGroup
-
-Key = tuple[str, int, bool]
 
 
 class Kind(Enum):
@@ -183,7 +182,7 @@ class InputFinder(Generic[_Input]):
     """
 
     def __init__(self, buses: Mapping[str, Bus], inputs: Iterable[_Input]) -> None:
-        self._by_key: dict[tuple[str, int, bool], _Input] = {}
+        self._by_key: dict[Key, _Input] = {}
         self._by_group: dict[tuple[str, int], ReceivedGroup] = {}
         self._input: _Input | None = None
         for bound in inputs:

@@ -16,7 +16,7 @@ from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.layout import CLASSICAL_BYTES, Layout, layout_fault
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key
+from canshaper.machine.routing import Key
 from canshaper.recording.form import AXIS, EXTRAS, POSE, Channel, Group, Row, Writer, install
 from canshaper.recording.history import History
 from canshaper.recording.listen import ReceivedFrame

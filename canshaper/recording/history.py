@@ -5,7 +5,7 @@ from typing import Any
 
 from canshaper.codec.status import LAST_FAULT, StatusCodec
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key
+from canshaper.machine.routing import Key
 from canshaper.recording.listen import ReceivedFrame
 
 

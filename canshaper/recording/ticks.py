@@ -11,7 +11,8 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.controller.runner import AxisControl
 from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.recording.channels import Key, Kind
+from canshaper.machine.routing import Key
+from canshaper.recording.channels import Kind
 from canshaper.shaping.states import Reason, State
 from canshaper.shaping.sway import SwayMode
 

@@ -26,8 +26,7 @@ from canshaper.studio.crane import CraneSession
 from canshaper.studio.in_process import HeldHand, InProcessCrane
 from canshaper.studio.server import hello_of, page_app, pages_of
 from canshaper.studio.stage import Stage
-from canshaper.studio.study import Placement, Session
-from canshaper.studio.study_files import Table
+from canshaper.studio.study import Placement, Session, Table
 from canshaper.studio.view import CraneView
 from canshaper.studio.words import Events
 from canshaper_sim.crane import CraneParameters

@@ -13,6 +13,7 @@ from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
 from canshaper.studio.seen import AxisView, Sources, rounded
@@ -62,7 +63,7 @@ class CraneView:
         models = [axis.config.sway for axis in deployment.axes.values()]
         self._swing = Swing((m for m in models if m), deployment.config.still_deg)
         self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
-        self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
+        self._handlers: dict[Key, list[Any]] = {}
         self._find_messages()
         names = [_source_of(joystick) for joystick in deployment.joysticks.values()]
         for entries in self._handlers.values():
@@ -101,7 +102,7 @@ class CraneView:
         entry = self._deployment.messages.find(name)
         return None if isinstance(entry, str) else entry[1]
 
-    def _on(self, key: tuple[str, int, bool], handler: Any, what: Any, message: str) -> None:
+    def _on(self, key: Key, handler: Any, what: Any, message: str) -> None:
         self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:

@@ -18,8 +18,18 @@ from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.shipped import deployment_path
 from canshaper.studio.in_process import InProcessCrane
-from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, plan
-from canshaper.studio.study_files import KEY, Key, Table, read_key, rows_of
+from canshaper.studio.study import (
+    KEY,
+    LIMIT_S,
+    ORDERS,
+    SHOWN_S,
+    Key,
+    Session,
+    Table,
+    plan,
+    read_key,
+    rows_of,
+)
 from canshaper.studio.study_stage import CRANE, RealJoysticks, StudyStage, setting
 from canshaper.studio.view import CraneView
 from canshaper_sim.hand import Hand, Held

@@ -9,7 +9,8 @@ from rich.text import Text
 
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import InputFinder, Key
+from canshaper.machine.routing import Key
+from canshaper.recording.channels import InputFinder
 from canshaper.recording.history import AxisStatus, History, HistoryEvent
 from canshaper.recording.listen import ReceivedFrame
 

@@ -225,11 +225,3 @@ def _section(index: int, subindex: int) -> str:
 
 def _object(index: int, subindex: int) -> str:
     return f"{index:04X}h:{subindex}"
-
-
-@dataclass(frozen=True)
-class MessageTiming:
-    """How a deployment uses a message: sent every so many ms, lost after so many."""
-
-    cycle_ms: int | None
-    timeout_ms: int

@@ -18,7 +18,6 @@ from canshaper.commissioning.nodes.node import (
     EVENT_TIMER,
     EXTENDED_BIT,
     TRANSMISSION,
-    MessageTiming,
     Node,
     Pdo,
 )
@@ -34,6 +33,14 @@ _ANALOGUE_ON = (0x6423, 0)
 _SAVE = int.from_bytes(b"save", "little")
 _BY_EVENT = (254, 255)  # transmission types: on no SYNC
 _PROFILE = 255
+
+
+@dataclass(frozen=True)
+class MessageTiming:
+    """How a deployment uses a message: sent every so many ms, lost after so many."""
+
+    cycle_ms: int | None
+    timeout_ms: int
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,9 @@ from canshaper.errors import IdentificationError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
-from canshaper.recording.channels import InputFinder, Key, joystick_commands, valve_part
+from canshaper.recording.channels import InputFinder, joystick_commands, valve_part
 from canshaper.recording.history import History
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.recording.log import LogFile
