@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.calibration.fit import FULL, Calibration
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.verdict import ENDS_US, histogram, summary
-from canshaper.commissioning.sensor.finding import Finding
-from canshaper.commissioning.sensor.report import heading
+from canshaper.commissioning.sensor.finding import Finding, heading
 from canshaper.report import style
 from canshaper.report.console import axis_title
 from canshaper.shaping.limits import OutputLimits

@@ -16,8 +16,7 @@ from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
-from canshaper.studio.seen import AxisView, Sources, rounded
-from canshaper.studio.swing import ACROSS, ALONG, Swing, sway_of
+from canshaper.studio.seen import ACROSS, ALONG, AxisView, Sources, Swing, rounded, sway_of
 from canshaper.studio.words import fault_words, reason_words, said, state_level, state_words
 from canshaper_sim.axes import BRIDGE, SLEW, TROLLEY
 

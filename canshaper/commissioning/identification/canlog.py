@@ -28,7 +28,7 @@ from canshaper.errors import ConfigError, CutOffError, IdentificationError, LogE
 from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.log import LogFile, read_log
+from canshaper.recording.log import LogFile
 from canshaper.shipped import data_directory
 
 
@@ -108,7 +108,6 @@ def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
 
 def read_can(
     path: Path,
-    label: str,
     names: Mapping[str, str],
     messages: Messages,
     *,
@@ -121,7 +120,6 @@ def read_can(
 
     Args:
         path: the log.
-        label: state of the grapple in it.
         names: "Message.Signal" of each axis.
         messages: of the DBC files.
         deployment: names commands, signal of the grapple and figures of merit, where known.
@@ -157,7 +155,7 @@ def read_can(
         source, texts = f"{path.name}: {reader.name}", [*notes, *left_out]
         own, others = commands.of(axis), commands.others(axis)
         result[axis] = Series(
-            source, label, reader.unit, time, value, own, idle, others, load_value, texts
+            source, reader.unit, time, value, own, idle, others, load_value, texts
         )
     return result
 
@@ -248,7 +246,7 @@ def is_simulated(log: Path, messages: Messages) -> bool:
     try:
         return any(
             (frame.can_id, frame.extended) == own or _is_virtual(frame.channel)
-            for frame in islice(read_log(log), _FRAMES)
+            for frame in islice(LogFile(log), _FRAMES)
         )
     except CutOffError:
         return False

@@ -28,7 +28,7 @@ ROUND = 0.3
 SWINGS = 6
 
 
-def series_of(table: Table, label: str, column: str | None, about_s: float | None = None) -> Series:
+def series_of(table: Table, column: str | None, about_s: float | None = None) -> Series:
     """The swing in a table: a column, or without one what the gyroscope turns about most.
 
     ``about_s``: the period as far as it is known, s.
@@ -37,7 +37,7 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
         IdentificationError: no such column, no gyroscope, or a clock that goes back.
     """
     if column is not None:
-        return _series(table, label, table.column(column))
+        return _series(table, table.column(column))
     gyroscope = table.gyroscope()
     if not gyroscope:
         raise IdentificationError(
@@ -52,8 +52,8 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
             " the sensor on?"
         )
     if len(names) == 1:
-        return _series(table, label, names[0])
-    direction, width = _direction([_series(table, label, n) for n in names], about_s)
+        return _series(table, names[0])
+    direction, width = _direction([_series(table, n) for n in names], about_s)
     # The sign is free; the largest part counts positive.
     direction *= math.copysign(1.0, direction[int(np.argmax(np.abs(direction)))])
     parts = " ".join(
@@ -62,7 +62,7 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
         if abs(v) >= 0.05
     )
     turned = direction @ np.stack([table.columns[n] for n in names])
-    one = _series(table, label, names[0], f"gyroscope ({parts})", turned)
+    one = _series(table, names[0], f"gyroscope ({parts})", turned)
     if width > ROUND:
         one.notes.append(
             f"{table.path}: it swings round, {100.0 * width:.0f} % as wide as long; swing it in"
@@ -71,14 +71,12 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
     return one
 
 
-def _series(
-    table: Table, label: str, column: str, name: str = "", values: Array | None = None
-) -> Series:
+def _series(table: Table, column: str, name: str = "", values: Array | None = None) -> Series:
     """A column, or other values in its unit, under a name of their own."""
     unit = table.unit(column)
     name, values = (column, table.columns[column]) if values is None else (name, values)
     time, value = ordered(f"{table.path}: {name}", table.time_s, values * unit.factor)
-    return Series(f"{table.path.name}: {name}", label, unit, time, value, notes=[*table.notes])
+    return Series(f"{table.path.name}: {name}", unit, time, value, notes=[*table.notes])
 
 
 def _direction(columns: Sequence[Series], about_s: float | None) -> tuple[Array, float]:
@@ -218,14 +216,14 @@ def logged(
         if is_table(path):
             table = read_table(path, report)
             axes = [*signals] or [axis_named(axis, deployment)]
-            shown = {a: series_of(table, label, signals.get(a), about_s) for a in axes}
+            shown = {a: series_of(table, signals.get(a), about_s) for a in axes}
         else:
             names = signals or simulated_signals(deployment, messages, axis)
             if not names:
                 text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
                 raise UsageError(text)
             known: dict[str, Any] = {"deployment": deployment, "channel": channel}
-            shown = read_can(path, label, names, messages, **known, on_progress=report)
+            shown = read_can(path, names, messages, **known, on_progress=report)
         for name, one in shown.items():
             series.setdefault((name, label), []).append(one)
     findings = []
@@ -247,7 +245,7 @@ def pump_in(
     axes = pair_of(deployment, [*speeds])
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
     for _, path in map(_labelled, logs):
-        shown = read_can(path, "", names, deployment.messages, deployment=deployment, **of)
+        shown = read_can(path, names, deployment.messages, deployment=deployment, **of)
         columns = [time_s := shown[axes[0]].time_s]
         for name, one in shown.items():
             if one.command is None or not len(one.time_s):

@@ -117,7 +117,6 @@ class Series:
     """A signal of one axis, in rad, rad/s or its own unit; times from the start of the log, s."""
 
     source: str  # file and signal, for people
-    label: str  # state of the grapple it was logged in, such as "empty"; may be ""
     unit: Unit
     time_s: Array  # rising
     value: Array

@@ -55,6 +55,11 @@ class AxisTraffic:
     valve: Samples = field(default_factory=Samples)
     states: list[tuple[float, str, str]] = field(default_factory=list)
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Least and most of its joystick."""
+        return min(self.joystick.value, default=0.0), max(self.joystick.value, default=0.0)
+
 
 @dataclass
 class Traffic:
@@ -207,7 +212,7 @@ def machine_recording(log: Path, deployment: Deployment, signals: Mapping[str, s
     """
     sensors = {name: s for name in signals if (s := deployment.axes[name].sway_sensor)}
     sources = {n: one.config.source for n, one in sensors.items() if one.name == signals[n]}
-    swings = read_can(log, "", signals, deployment.messages, deployment=deployment, sources=sources)
+    swings = read_can(log, signals, deployment.messages, deployment=deployment, sources=sources)
     traffic = read_traffic(log, deployment)
     time_s = next(iter(swings.values())).time_s
     planes: dict[str, list[float]] = {}

@@ -142,7 +142,6 @@ def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dic
     sensors = {name: s for name in axes if (s := deployment.axes[name].sway_sensor)}
     return read_can(
         path,
-        "",
         {name: one.name for name, one in sensors.items()},
         deployment.messages,
         deployment=deployment,

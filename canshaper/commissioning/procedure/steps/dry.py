@@ -43,7 +43,7 @@ def run(context: Context) -> Outcome:
     outcome = Outcome(files=[log])
     show_states(outcome, traffic)
     for name, axis in traffic.axes.items():
-        least, most = min(axis.joystick.value, default=0.0), max(axis.joystick.value, default=0.0)
+        least, most = axis.reach
         if min(-least, most) < LEAST:
             text = f"its joystick went from {100 * least:.0f} to {100 * most:.0f} %"
             outcome.problems.append(f"{name}: {text}: move it to both ends, enable held")
@@ -72,12 +72,8 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
     table = new_table("axis", "least, %", "most, %", "states")
     for name, axis in traffic.axes.items():
         states = list(dict.fromkeys(state for _, state, _ in axis.states))
-        table.add_row(
-            name,
-            f"{100 * min(axis.joystick.value, default=0.0):.0f}",
-            f"{100 * max(axis.joystick.value, default=0.0):.0f}",
-            ", ".join(states) or "no status message",
-        )
+        ends = (f"{100 * end:.0f}" for end in axis.reach)
+        table.add_row(name, *ends, ", ".join(states) or "no status message")
         outcome.numbers[name] = {"states": states}
     outcome.sheet.print(table)
     if traffic.missed_deadlines is not None:

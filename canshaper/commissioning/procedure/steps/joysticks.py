@@ -37,7 +37,7 @@ def run(context: Context) -> Outcome:
         outcome.files.append(log)
         axis = seen[name] = traffic.axes[name]
         moved = _moved(traffic)
-        least, most = _extremes(axis)
+        least, most = axis.reach
         held = _held(axis)
         table.add_row(
             name,
@@ -71,11 +71,6 @@ def _moved(traffic: Traffic) -> list[str]:
     return sorted((name for name in far if far[name] > MOVED), key=lambda name: -far[name])
 
 
-def _extremes(axis: AxisTraffic) -> tuple[float, float]:
-    values = axis.joystick.value or [0.0]
-    return min(values), max(values)
-
-
 def _held(axis: AxisTraffic) -> float | None:
     """Part of the deflected time in which the enable switch was held; None where not known."""
     if len(axis.enabled.value) != len(axis.joystick.value):
@@ -103,7 +98,7 @@ def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str
     """Return the fault of a joystick, and what to do; None where it is as it should be."""
     command = deployment.axes[name].config.command
     own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
-    least, most = _extremes(axis)
+    least, most = axis.reach
     text = None
     if max(-least, most) < MOVED and moved:
         text = f"{moved[0]} moved, and {own} of the file did not: put its message into joysticks:"

@@ -5,9 +5,8 @@ from functools import partial
 from canshaper.commissioning.plots import of_sensors
 from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
-from canshaper.commissioning.sensor.finding import DRIVE_IT, examine
+from canshaper.commissioning.sensor.finding import DRIVE_IT, examine, heading, table, write_sensors
 from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
-from canshaper.commissioning.sensor.report import heading, table, write_sensors
 from canshaper.machine.deployment import Deployment
 
 
