@@ -191,9 +191,9 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> 
     yield f"    # {ten_s}, from {swing.first:g} to {swing.last:g}.{guess}"
     yield f"    {_sway(swing)}"
     if sensor := axis.sensor:
-        keys = {"message": sensor.message, "signal": sensor.signal, "kind": sensor.kind}
-        keys |= {"fusion_s": sensor.fusion_s, "codes": _codes(sensor.codes), "use": "watch"}
-        keys |= {"timeout_ms": sensor.timeout_ms, "node": sensor.node}
+        keys: dict[str, object] = {"message": sensor.message, "signal": sensor.signal}
+        keys |= {"kind": sensor.kind, "fusion_s": sensor.fusion_s, "codes": _codes(sensor.codes)}
+        keys |= {"use": "watch", "timeout_ms": sensor.timeout_ms, "node": sensor.node}
         yield "    # Sign, delay and noise: `canshaper sensor FILE --live --write`. Then use: damp."
         yield f"    sway_sensor: {_flow(bus='crane', **keys)}"
     yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."

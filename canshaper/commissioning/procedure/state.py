@@ -220,4 +220,4 @@ class Step:
     run: Callable[[Context], Outcome]
     writes: str = ""
     needs: tuple[str, ...] = ()
-    applies: Callable[[Deployment], bool] = lambda _deployment: True
+    applies: Callable[[Deployment], object] = lambda _deployment: True

@@ -176,5 +176,5 @@ FILTER = Step(
     run,
     writes="`filter`, `tail_s`",
     needs=("swing", "valve"),
-    applies=lambda deployment: bool(swinging(deployment)),
+    applies=swinging,
 )

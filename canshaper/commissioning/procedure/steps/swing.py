@@ -181,5 +181,5 @@ SWING = Step(
     run,
     writes="`sway`",
     needs=("joysticks",),
-    applies=lambda deployment: bool(swinging(deployment)),
+    applies=swinging,
 )

@@ -96,5 +96,5 @@ VALVE = Step(
     run,
     writes="`limits.curve_*`",
     needs=("joysticks",),
-    applies=lambda deployment: bool(swinging(deployment)),
+    applies=swinging,
 )
