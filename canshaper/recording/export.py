@@ -86,10 +86,6 @@ class Export:
         self._axes = {n: writer.group(Group(f"axes/{n}", AXIS)) for n in deployment.axes}
         self._states = dict.fromkeys(deployment.axes, (State.NEUTRAL_WAIT, Reason.START))
         self._history = History(deployment)
-        statuses = {
-            axis.status.message.key: n for n, axis in deployment.axes.items() if axis.status
-        }
-        self._statuses: dict[Key, str] = statuses
         self._crane = _CranePose(writer, deployment, parameters)
         self._last_ns = 0
 
@@ -101,12 +97,11 @@ class Export:
         if decoded:
             self._crane.measured(frame.time_ns, *decoded)
         history, before = self._history, len(self._history.changes)
-        history.receive(frame)
+        name = history.receive(frame)
         for change in history.changes[before:]:
             self._writer.event(change.time_ns, change.text)
-        name = self._statuses.get((frame.bus, frame.can_id, frame.extended))
-        if name and (status := history.axes.get(name)) and status.time_ns == frame.time_ns:
-            one = status.values
+        if name:
+            one = history.axes[name].values
             commands = one["RawCommand"] / 100.0, one["ShapedCommand"] / 100.0
             row = (*commands, one["PredictedSway"], one["State"], one["Reason"])
             self._axes[name](frame.time_ns, row)

@@ -114,10 +114,10 @@ class _Reader:
         for axis in self._valves.get(key, ()):
             if (part := valve_part(axis, Layout(axis.valve_message), frame.data)) is not None:
                 traffic.axes[axis.name].valve.add(time_s, part)
-        self._history.receive(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
+        name = self._history.receive(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
         traffic.missed_deadlines = self._history.counters.get("MissedDeadlines")
-        for name, status in self._history.axes.items():
-            states = traffic.axes[name].states
+        if name:
+            states, status = traffic.axes[name].states, self._history.axes[name]
             if not states or states[-1][1:] != (status.state, status.reason):
                 states.append((time_s, status.state, status.reason))
         if candidate := self._candidates.get(key[1:]):
