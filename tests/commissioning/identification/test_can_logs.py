@@ -36,8 +36,8 @@ def write(log: Path, lines: list[str]) -> None:
 
 def test_signals_and_commands(log: Path, deployment: Deployment) -> None:
     done: list[float] = []
-    known: dict[str, Any] = {"deployment": deployment, "on_progress": done.append}
-    recorded = read_can(log, SWAY, deployment.messages, **known)
+    messages = deployment.messages
+    recorded = read_can(log, SWAY, messages, deployment=deployment, on_progress=done.append)
     assert done[-1] == 1.0
     slew, near = recorded["slew"], recorded["near_far"]
     assert slew.source == "a.log: GrappleSway.SwayPerpendicular"
