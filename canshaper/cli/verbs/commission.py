@@ -127,9 +127,8 @@ def _procedure(
 ) -> "Procedure":
     """The steps, and what is to be said before the first of them."""
     from canshaper.commissioning.procedure.procedure import Procedure
-    from canshaper.commissioning.procedure.steps import STEPS
 
-    procedure = Procedure(files, bench, load, STEPS, origin=path if bench.simulated else None)
+    procedure = Procedure(files, bench, load, origin=path if bench.simulated else None)
     if bench.simulated:
         echo(f"REHEARSAL on a simulated crane, with {files.deployment}, a copy of {path}")
     return procedure
@@ -137,8 +136,8 @@ def _procedure(
 
 def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
     """Print how far the procedure has come."""
+    from canshaper.commissioning.procedure.procedure import STEPS
     from canshaper.commissioning.procedure.state import State, read_state
-    from canshaper.commissioning.procedure.steps import STEPS
     from canshaper.report.console import SafeConsole, new_table
 
     state = read_state(files.state) or State()

@@ -1,6 +1,6 @@
 """The procedure: runs steps, keeps their state, writes what a person has accepted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from difflib import unified_diff
 from pathlib import Path
@@ -20,10 +20,36 @@ from canshaper.commissioning.procedure.state import (
     stamped,
     write_state,
 )
+from canshaper.commissioning.procedure.steps.buses import BUSES
+from canshaper.commissioning.procedure.steps.check import CHECK
+from canshaper.commissioning.procedure.steps.drive import DRIVE
+from canshaper.commissioning.procedure.steps.dry import DRY
+from canshaper.commissioning.procedure.steps.filter import FILTER
+from canshaper.commissioning.procedure.steps.joysticks import JOYSTICKS
+from canshaper.commissioning.procedure.steps.motion import FIRST_MOTION
+from canshaper.commissioning.procedure.steps.report import REPORT
+from canshaper.commissioning.procedure.steps.sensor import SENSOR
+from canshaper.commissioning.procedure.steps.swing import SWING
+from canshaper.commissioning.procedure.steps.valve import VALVE
 from canshaper.edit.edit import replace_text
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.style import draw
+
+STEPS: tuple[Step, ...] = (
+    BUSES,
+    JOYSTICKS,
+    SWING,
+    VALVE,
+    FILTER,
+    SENSOR,
+    CHECK,
+    DRY,
+    FIRST_MOTION,
+    DRIVE,
+    REPORT,
+)
+"""The steps of a day of commissioning, in order."""
 
 
 class Procedure:
@@ -33,7 +59,6 @@ class Procedure:
         files: of the deployment.
         bench: where it is measured.
         load: reads the deployment of a path, with the bus options of the command.
-        steps: in order.
         origin: the file that a rehearsal's is a copy of.
 
     Attributes:
@@ -51,13 +76,12 @@ class Procedure:
         files: Files,
         bench: Bench,
         load: Callable[[Path], Deployment],
-        steps: Sequence[Step],
         origin: Path | None = None,
     ) -> None:
         self.files, self._bench, self._load = files, bench, load
         self.news: list[str] = []
         deployment = load(files.deployment)
-        self.steps = [step for step in steps if step.applies(deployment)]
+        self.steps = [step for step in STEPS if step.applies(deployment)]
         new = State(bench.simulated, bench.changes, hash_of(origin) if origin else "")
         self.state = read_state(files.state) or new
         self._check_bench()

@@ -12,7 +12,6 @@ from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure
 from canshaper.commissioning.procedure.state import Outcome, Record, Status
-from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
 from tests.commissioning.procedure.conftest import ROOT
@@ -74,7 +73,7 @@ def drive(
 ) -> tuple[Procedure, Outcome]:
     # As the step valve would have measured it.
     machine.write_text(machine.read_text().replace("deadband_pct: 0", "deadband_pct: 5"))
-    one = Procedure(Files(machine), Live(driver, change, without), load_deployment, STEPS)
+    one = Procedure(Files(machine), Live(driver, change, without), load_deployment)
     numbers = {name: {"signal": signal} for name, signal in signals.items()}
     one.state.steps["swing"] = Record(Status.DONE, numbers=numbers)
     return one, one.run(one.step("drive"))
@@ -100,7 +99,7 @@ def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path
     measured: Any = proposal.numbers["crane"]
     copy = machine.with_name("copy.yaml")
     copy.write_bytes(machine.read_bytes())
-    other = Procedure(Files(copy), Simulated(Prompts(), []), load_deployment, STEPS, origin=copy)
+    other = Procedure(Files(copy), Simulated(Prompts(), []), load_deployment, origin=copy)
     simulated: Any = other.run(other.step("drive")).numbers["crane"]
     for name in ("residual_before_deg", "residual_after_deg"):
         assert measured[name] == pytest.approx(simulated[name], abs=0.1)
