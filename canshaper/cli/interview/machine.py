@@ -75,15 +75,15 @@ def machine_of(
     load = load_of(axes, left, _meanings([joystick for joystick, _ in joysticks], axes, motion))
     status, identity = suggest.service_status(messages), suggest.identity(messages)
     machine = FirstMachine(
-        channel_name,
-        bitrate,
-        dbc,
-        [joystick for joystick, _ in joysticks],
-        axes,
-        status.name if status else None,
-        identity.name if identity else None,
-        motion,
-        interface,
+        channel=channel_name,
+        bitrate=bitrate,
+        dbc=dbc,
+        joysticks=[joystick for joystick, _ in joysticks],
+        axes=axes,
+        status=status.name if status else None,
+        identity=identity.name if identity else None,
+        motion=motion,
+        interface=interface,
         load=load,
     )
     uses = uses_of(machine, messages)
