@@ -170,19 +170,19 @@ def _joystick(
     off = switch("switch for anti-sway off", suggest.named(left, suggest.ANTI_SWAY_OFF))
     counter = suggest.counter(message)
     joystick = FirstJoystick(
-        suggest.axis_name(nodes.name_of(message.name) or message.name),
-        message.name,
-        int(min(max(FEWEST_CYCLES * cycle, least), most)),
-        enable,
-        reset,
-        off,
-        None if counter in (enable, reset, off) else counter,
-        None if message.cycle_time else cycle,
-        of,
-        nodes.supervised(message.name),
-        other,
-        page,
-        code,
+        name=suggest.axis_name(nodes.name_of(message.name) or message.name),
+        message=message.name,
+        timeout_ms=int(min(max(FEWEST_CYCLES * cycle, least), most)),
+        enable=enable,
+        reset=reset,
+        anti_sway_off=off,
+        alive_counter=None if counter in (enable, reset, off) else counter,
+        cycle_ms=None if message.cycle_time else cycle,
+        switch=of,
+        node=nodes.supervised(message.name),
+        enable_of=other,
+        multiplexor=page,
+        code=code,
     )
     return joystick, message
 

@@ -118,17 +118,19 @@ def _result(problem: DrivenProblem, x: Array) -> SensorFit:
         data,
         omega,
     )
+    square, left = problem.squares(x)
     delay, faster, decay, size = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
     return SensorFit(
-        gain,
-        delay_s,
-        omega,
-        sigma,
-        np.array([amounts[2] for _, amounts in fits]),
-        [model for model, _ in fits],
-        *problem.squares(x),
-        sum(len(one.time_s) for one in data),
-        (delay, faster, decay, size),
+        gain=gain,
+        delay_s=delay_s,
+        omega=omega,
+        sigma=sigma,
+        offsets=np.array([amounts[2] for _, amounts in fits]),
+        fitted=[model for model, _ in fits],
+        square=square,
+        left=left,
+        count=sum(len(one.time_s) for one in data),
+        deviations=(delay, faster, decay, size),
     )
 
 
