@@ -67,8 +67,8 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (65_925, "a new ability takes the room of an old one"),
-    "tests": (101_291, "one level for each behaviour"),
+    "canshaper": (65_960, "a new ability takes the room of an old one"),
+    "tests": (101_367, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (344, "one that only hands on is joined to its reader")}
