@@ -67,7 +67,7 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (65_960, "a new ability takes the room of an old one"),
+    "canshaper": (65_961, "a new ability takes the room of an old one"),
     "tests": (101_367, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.

@@ -120,7 +120,8 @@ def swing_filter(
 ) -> tuple[Array, Array]:
     """Swing by the speed that is commanded, sampled with a zero-order hold: b and a of z^-1.
 
-    By partial fractions of the step response. The three poles differ: one is real, two are not.
+    By partial fractions of the step response, as a matrix exponential for every try of the solver
+    takes most of its time. The three poles differ: one is real, two are not.
     """
     square = omega**2 + sigma**2
     poles = np.array([-1.0 / lag, complex(-sigma, omega), complex(-sigma, -omega)])
