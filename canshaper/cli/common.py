@@ -62,7 +62,7 @@ CRANE = typer.Option(
     "--crane",
     help="Which one, where the deployment has several: the first part of axis names.",
 )
-SENSED = "forwarder-sensor.yaml"
+DEFAULT, SENSED = "forwarder-robust.yaml", "forwarder-sensor.yaml"
 SENSOR: bool = typer.Option(
     False, "--sensor", help=f"The shipped deployment with a sway sensor: {SENSED}."
 )
@@ -168,13 +168,13 @@ def refuse_shipped(file: str, option: str = "--write") -> None:
         raise ConfigError([Problem(file, None, option, text)])
 
 
-def sensed(file: str, default: str, sensor: bool) -> str:
+def sensed(file: str, sensor: bool) -> str:
     """The deployment to show: with ``--sensor`` the shipped one with a sway sensor.
 
     Raises:
         UsageError: both are asked for.
     """
-    if sensor and file != default:
+    if sensor and file != DEFAULT:
         raise UsageError(f"--sensor: expected without FILE, got {file}: it is {SENSED}")
     return SENSED if sensor else file
 

@@ -13,16 +13,17 @@ from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
-from canshaper.studio.seen import AxisView, Sources, rounded
-from canshaper.studio.swing import ACROSS, ALONG, Swing, sway_of
+from canshaper.studio.seen import ACROSS, ALONG, AxisView, Sources, Swing, rounded, sway_of
 from canshaper.studio.words import fault_words, reason_words, said, state_level, state_words
 from canshaper_sim.axes import BRIDGE, SLEW, TROLLEY
 
 SILENT_S = 0.5
 """A daemon or a crane that has sent nothing for so long is shown as silent."""
 
+_JOINTS, _TROLLEY = ("LiftAngle", "KnuckleAngle", "Extension"), ("Bridge", "Trolley", "RopeLength")
 # Of a model: it lags behind the tip, and across the boom and below a trolley that is negative.
 _BEHIND = (SLEW, BRIDGE, TROLLEY)
 
@@ -61,7 +62,7 @@ class CraneView:
         models = [axis.config.sway for axis in deployment.axes.values()]
         self._swing = Swing((m for m in models if m), deployment.config.still_deg)
         self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
-        self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
+        self._handlers: dict[Key, list[Any]] = {}
         self._find_messages()
         names = [_source_of(joystick) for joystick in deployment.joysticks.values()]
         for entries in self._handlers.values():
@@ -84,10 +85,10 @@ class CraneView:
                 self._on(motion.aim.message.key, self._aim, motion.aim, motion.config.aim.message)
         for message_name, handler in (
             ("GrappleSway", partial(self._sway, "SwayPerpendicular", "SwayParallel")),
-            ("TipPosition", self._position),
-            ("JointPosition", self._joints),
+            ("TipPosition", partial(self._measured, "pose", ("SlewAngle", "Radius", "Height"))),
+            ("JointPosition", partial(self._measured, "joints", _JOINTS)),
             ("LoadSway", partial(self._sway, "SwayBridge", "SwayTrolley")),
-            ("CranePosition", self._trolley),
+            ("CranePosition", partial(self._measured, "trolley", _TROLLEY)),
             ("HookPosition", self._hook),
         ):
             message = self._message(message_name)
@@ -100,7 +101,7 @@ class CraneView:
         entry = self._deployment.messages.find(name)
         return None if isinstance(entry, str) else entry[1]
 
-    def _on(self, key: tuple[str, int, bool], handler: Any, what: Any, message: str) -> None:
+    def _on(self, key: Key, handler: Any, what: Any, message: str) -> None:
         self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -282,25 +283,16 @@ class CraneView:
         self._swing.add(sway_deg, now_s)
         self._crane_s = now_s
 
-    def _position(self, message: Message, data: bytes, now_s: float) -> None:
+    def _measured(
+        self, what: str, signals: tuple[str, ...], message: Message, data: bytes, now_s: float
+    ) -> None:
         values: Any = message.decode(data)
-        angle, radius, height = (float(values[n]) for n in ("SlewAngle", "Radius", "Height"))
-        self.pose = (angle, radius, height)
-        self._crane_s = now_s
-
-    def _trolley(self, message: Message, data: bytes, now_s: float) -> None:
-        values: Any = message.decode(data)
-        self.trolley = tuple(float(values[n]) for n in ("Bridge", "Trolley", "RopeLength"))
+        setattr(self, what, tuple(float(values[name]) for name in signals))
         self._crane_s = now_s
 
     def _hook(self, message: Message, data: bytes, _now_s: float) -> None:
         values: Any = message.decode(data)
         self.rope_m = float(values["RopeLength"])
-
-    def _joints(self, message: Message, data: bytes, now_s: float) -> None:
-        values: Any = message.decode(data)
-        self.joints = tuple(float(values[n]) for n in ("LiftAngle", "KnuckleAngle", "Extension"))
-        self._crane_s = now_s
 
 
 def _source_of(joystick: BoundJoystick) -> str:

@@ -17,7 +17,7 @@ from canshaper.codec.frame import BusState
 from canshaper.controller.controller import Controller
 from canshaper.daemon.reporter import Reporter
 from canshaper.machine.binding import load_deployment
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from canshaper.shaping.shapers.gff import Gff
 from tests.blackbox.driven import SECOND, TRIP, drive, inside, replayed
 from tests.daemon.bench import Bench, FakePort
@@ -33,7 +33,7 @@ def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path)
     assert box.name == "machine-0001.zip"
     out, export = tmp_path / "out", tmp_path / "drive.mcap"
     text = replayed(box, "--verify", "--out", out, "--export", export)
-    exported, log = (list(read_log(path)) for path in (export, out / "machine.log"))
+    exported, log = (list(LogFile(path)) for path in (export, out / "machine.log"))
     assert [frame[2:] for frame in exported] == [frame[2:] for frame in log]
     assert "the ticks are those of the daemon that the black box is of" in text
     assert "frames sent, every one the same to the last bit" in text

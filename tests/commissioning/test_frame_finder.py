@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.identification.commands import Commands
+from canshaper.commissioning.identification.series import Commands
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput

@@ -16,7 +16,7 @@ from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Listener, ReceivedFrame
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from canshaper.recording.record import Recording
 from tests.bus.lines import SerialLine, until
 
@@ -82,7 +82,7 @@ def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path, suffix
 
     path = tmp_path / f"drive.{suffix}"
     recording.run(path, 30.0, going)
-    assert [frame.data[0] for frame in read_log(path)] == [0, 1, 2]
+    assert [frame.data[0] for frame in LogFile(path)] == [0, 1, 2]
     assert f"3 frames, {len(GARBLED)} ERRORS of the interface, the last bus crane: " in str(
         recording
     )

@@ -17,9 +17,9 @@ from canshaper.config.schema import Bus
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.shipped import deployment_path
+from canshaper.studio import study
 from canshaper.studio.in_process import InProcessCrane
-from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, plan
-from canshaper.studio.study_files import KEY, Key, Table, read_key, rows_of
+from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, Table, plan, rows_of
 from canshaper.studio.study_stage import CRANE, RealJoysticks, StudyStage, setting
 from canshaper.studio.view import CraneView
 from canshaper_sim.hand import Hand, Held
@@ -178,19 +178,19 @@ def test_a_row_that_was_cut_off_is_taken_away(tmp_path: Path) -> None:
 
 def test_the_key_is_sealed_and_that_of_one_study(tmp_path: Path) -> None:
     settings, task = {"raw": "1", "a.yaml": "1", "b.yaml": "2"}, {"practice": 2}
-    key = Key(tmp_path / KEY, settings, task)
+    key = study.Key(tmp_path / study.KEY, settings, task)
     assert set(key.letters) == set("ABC") and set(key.letters.values()) == set(settings)
-    again = Key(tmp_path / KEY, settings, task)
+    again = study.Key(tmp_path / study.KEY, settings, task)
     assert (again.letters, again.seed, again.mark) == (key.letters, key.seed, key.mark)
-    assert b"raw" not in (tmp_path / KEY).read_bytes()
-    assert read_key(tmp_path / KEY)["letters"] == key.letters
+    assert b"raw" not in (tmp_path / study.KEY).read_bytes()
+    assert study.read_key(tmp_path / study.KEY)["letters"] == key.letters
     with pytest.raises(UsageError, match="expected the settings that the study began with"):
-        Key(tmp_path / KEY, settings | {"b.yaml": "3"}, task)
+        study.Key(tmp_path / study.KEY, settings | {"b.yaml": "3"}, task)
     with pytest.raises(UsageError, match="expected the task that the study began with"):
-        Key(tmp_path / KEY, settings, task | {"practice": 3})
-    (tmp_path / KEY).write_text("{")
+        study.Key(tmp_path / study.KEY, settings, task | {"practice": 3})
+    (tmp_path / study.KEY).write_text("{")
     with pytest.raises(UsageError, match="expected the key of a study"):
-        read_key(tmp_path / KEY)
+        study.read_key(tmp_path / study.KEY)
 
 
 def swing_of(crane: InProcessCrane, view: CraneView, *, anti_sway: bool) -> float:

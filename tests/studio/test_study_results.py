@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.studio.study_files import COLUMNS, KEY, Key
+from canshaper.studio.study import COLUMNS, KEY, Key
 from canshaper.studio.study_results import SPREAD, person_page, power, rows_of
 from tests.studio.second_program import figures, of_page
 

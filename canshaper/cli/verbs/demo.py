@@ -10,6 +10,7 @@ import typer
 
 from canshaper.cli.common import (
     CRANE,
+    DEFAULT,
     EXIT_INTERRUPTED,
     EXPORT,
     PICTURE,
@@ -38,7 +39,6 @@ GROUP = "look"
 
 # What `report.json` says of a drive without a bus.
 EXIT_NOT_DRIVEN = 1
-DEFAULT = "forwarder-robust.yaml"
 LOCKSTEP = "lock-step, no bus"
 
 
@@ -117,7 +117,7 @@ def demo(
 
     if (ranges is not None and seed is None) or (seed is not None and (crane or rest) is not None):
         raise UsageError("--seed: expected with --ranges, and without --crane or --rest")
-    deployment = loader(sensed(file, DEFAULT, sensor))()
+    deployment = loader(sensed(file, sensor))()
     if not switches_off(deployment):
         echo(f"WARNING: {file}: no joystick has anti_sway_off: both drives are shaped", err=True)
     nominal = changed_parameters(changes or [], deployment)

@@ -148,9 +148,7 @@ def robust(
     lines += [f"filter: {flow(one.section)}" for one in designs]
     lines = [*changed, written_line(deployment.path)] if write else lines
     results.print("\n".join(lines), soft_wrap=True)
-    results.write()
-    if useless:
-        raise typer.Exit(EXIT_USELESS)
+    results.write(EXIT_USELESS if useless else 0)
 
 
 def _for_fleet(

@@ -127,9 +127,7 @@ def tune(
     results.picture_line(drawn)
     if written and not as_json:
         echo("\n".join([*changed, written_line(written)]))
-    results.write()
-    if useless:
-        raise typer.Exit(EXIT_USELESS)
+    results.write(EXIT_USELESS if useless else 0)
 
 
 def _numbers(text: str | None) -> list[float] | None:

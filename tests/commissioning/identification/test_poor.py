@@ -37,7 +37,7 @@ def noise(count: int, degrees: float, seed: int = 1) -> Array:
 
 
 def series(time: Array, value: Array, unit: Unit = DEGREES, **known: object) -> Series:
-    return Series("a.log: Sway.Angle", "", unit, time, value, **known)  # type: ignore[arg-type]
+    return Series("a.log: Sway.Angle", unit, time, value, **known)  # type: ignore[arg-type]
 
 
 def times(seconds: float, step_s: float = 0.02) -> Array:
