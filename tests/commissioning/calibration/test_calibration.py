@@ -258,9 +258,11 @@ def test_the_speed_of_the_file_bounds_the_ramp(tmp_path: Path) -> None:
     file = with_limits(tmp_path, "max_pct: 30, deadband_pct: 5")
     line = file.read_text(encoding="utf-8").split("max_pct: 30")[0].count("\n") + 1
     shown = CliRunner().invoke(app, ["calibrate", str(file), "--axis", "slew", "--top", "80"])
-    expected = "axes.slew.limits.max_pct: expected a ramp (--top) up to 30 % of full speed"
+    expected = (
+        f"{file}:{line}: axes.slew.limits.max_pct: expected a ramp (--top) up to 30 % of full"
+    )
     assert shown.exit_code == 2
-    assert f"{file}:{line}: {expected}, got 80 %" in shown.output.replace("\n", "")
+    assert f"{expected} speed, got 80 %" in shown.output.replace("\n", "")
     usual = CliRunner().invoke(app, ["calibrate", str(file), "--axis", "slew"])
     assert (usual.exit_code, "above 30 % of the command" in usual.output) == (0, True), usual.output
 
