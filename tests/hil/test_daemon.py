@@ -21,6 +21,7 @@ from tests.hil.machine import (
     joysticks_on,
     logged,
     message_name,
+    open_bus,
     service,
     wait_for,
 )
