@@ -10,7 +10,6 @@ import pytest
 
 from canshaper.controller.controller import Controller
 from canshaper.daemon.follow import AFTER_NS, CLUSTER_NS, TickFollower, tick_follower
-from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.rigs.forwarder import ROOT
@@ -140,26 +139,6 @@ def test_where_the_command_line_takes_another_interface_the_ticks_stay(
     assert tick_follower(changed, Controller(changed)) is None
     (record,) = caplog.records
     assert record.message.startswith("tick=plain expected a bus of socketcan")
-
-
-def test_a_tick_names_a_joystick_that_can_be_followed(tmp_path: Path) -> None:
-    def fault(**changed: str) -> str:
-        with pytest.raises(ConfigError) as error:
-            deployment_of(tmp_path, **changed)
-        return str(error.value)
-
-    deployment_of(tmp_path, **{"tick_ms: 20": "tick_ms: 10"})  # a cycle may be several ticks
-    assert "tick.follow: expected a joystick, got 'middle'; there are left, right" in fault(
-        follow="middle"
-    )
-    assert (
-        "tick.follow: expected a bus of socketcan, which stamps frames, got virtual, the bus of"
-        " left" in fault(socketcan="virtual")
-    )
-    assert (
-        "tick.follow: expected a GenMsgCycleTime that is a multiple or a part of 19 ms, got 20 ms,"
-        " that of left" in fault(**{"tick_ms: 20": "tick_ms: 19"})
-    )
 
 
 def step(cycle_ms: int, *others_ns: int, deadline_ns: int) -> int:

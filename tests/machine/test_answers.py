@@ -4,8 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.controller.controller import Controller
-from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from tests.machine.gateway_files import j1939_gateway
@@ -13,21 +11,13 @@ from tests.machine.gateway_files import problems as of_gateway
 from tests.rigs.files import Machine
 from tests.rigs.forwarder import ROOT
 
-BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
 STATUS = "status: { bus: crane, message: ShaperStatus }"
-LIFT_FILTER = "    filter: { kind: off } # lifting excites no sway\n"
 FEEDBACK = "    status: { bus: crane, message: LiftStatus }\n"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "place", "text"),
     [
-        (
-            BUS,
-            BUS.replace(" }", ", options: { fd: true } }"),
-            "buses.crane.options",
-            "expected none with socketcan, which the system sets up, got some",
-        ),
         (
             STATUS,
             f"{STATUS}\nload_state: {{ bus: crane, message: Nothing, signal: W, timeout_ms: 500 }}",
@@ -47,12 +37,6 @@ FEEDBACK = "    status: { bus: crane, message: LiftStatus }\n"
             "axes:\n",
             "switches.seat.message",
             "Nothing",
-        ),
-        (
-            LIFT_FILTER,
-            f"{LIFT_FILTER}    profiles:\n      calm: {{ filter: {{ kind: off }} }}\n",
-            "axes.lift",
-            "expected sway data of its own with profiles or a gain schedule, got none",
         ),
     ],
 )
@@ -159,11 +143,6 @@ def test_a_float_has_the_full_scale_of_the_file_alone(machine: Machine, signal: 
     assert (of_file.minimum, of_file.maximum) == (-80.0, 80.0)
 
 
-def test_where_no_one_reads_the_status_none_is_sent(machine: Machine) -> None:
-    sent = {f.can_id for f in Controller(machine.load().unreported).tick(0)}
-    assert sent == {0x200, 0x201, 0x202}
-
-
 def test_dbc_files_of_a_bundle_are_inside_it(machine: Machine) -> None:
     machine.load()
     file = machine.directory / "machine.yaml"
@@ -189,9 +168,3 @@ def test_a_sway_sensor_is_named_by_message_and_signal() -> None:
     axes = load_deployment(ROOT / "config" / "forwarder-sensor.yaml").axes
     assert axes["slew"].sway_sensor is not None
     assert axes["slew"].sway_sensor.name == "SwayAngle.Across"
-
-
-def test_which_profile_each_set_is_of(machine: Machine) -> None:
-    assert profile_by_number(machine.load().axes["slew"]) == []
-    profiles = load_deployment(ROOT / "config" / "j1939-profiles.yaml").axes["slew"]
-    assert profile_by_number(profiles) == ["", *profiles.config.profiles]

@@ -155,22 +155,6 @@ def test_a_bus_without_a_message_has_no_load(machine: Machine) -> None:
     assert machine.load().load("boom") == BusLoad(0.0, 0)
 
 
-def test_the_load_is_not_known_without_a_bit_rate(machine: Machine) -> None:
-    machine.in_yaml(", bitrate: 250000", "")
-    assert machine.load().load("crane") is None
-
-
-def test_the_load_is_that_of_the_bit_rate(machine: Machine) -> None:
-    deployment = machine.load()
-    slow = deployment.load("crane")
-    machine.in_yaml("bitrate: 250000", "bitrate: 500000")
-    fast = machine.load().load("crane")
-    assert slow is not None
-    assert fast is not None
-    assert slow.share == pytest.approx(2 * fast.share)
-    assert slow.messages == fast.messages == 10
-
-
 # -- inputs and senders ----------------------------------------------------------------------------
 
 

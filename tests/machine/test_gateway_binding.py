@@ -5,10 +5,8 @@ from pathlib import Path
 import cantools
 import pytest
 
-from canshaper.checksums.kinds import Checksum
 from canshaper.codec.frame import EFF_FLAG
-from canshaper.codec.message import Protection
-from canshaper.codec.rewrite import RewrittenMessage, neutral_fault
+from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -123,21 +121,6 @@ def test_a_fallback_needs_a_joystick_that_is_passed_on(tmp_path: Path) -> None:
         "gateway.fallback: expected stop where no valve has the message of a joystick on the other"
         " bus, got neutral"
     ]
-
-
-@pytest.mark.parametrize(
-    ("kind", "byte", "possible"),
-    [
-        ("xor", 3, True),
-        ("sum", 7, False),
-        ("crc8_autosar", 0, True),
-        ("crc8_autosar", 7, True),
-        ("crc8_autosar", 6, False),
-    ],
-)
-def test_checksums_that_the_kernel_can_make(kind: str, byte: int, possible: bool) -> None:
-    fault = neutral_fault(Protection(check=Checksum(kind, byte)), 8)
-    assert (fault is None) == possible
 
 
 def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -> None:
