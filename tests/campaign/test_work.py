@@ -14,7 +14,8 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator_model import Known, Skill
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import Recorder
-from tests.campaign.work import CONFIG, known, source, works
+from tests.campaign.work import known, source, works
+from tests.rigs.files import CONFIG
 
 
 def test_places_are_those_of_the_seed_and_within_reach() -> None:

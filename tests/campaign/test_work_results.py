@@ -25,7 +25,8 @@ from canshaper.campaign.work_results import (
 )
 from canshaper.cli.app import app
 from canshaper_sim.operator_model import Operators
-from tests.campaign.work import CONFIG, ROBUST, WITHIN, known, source, works
+from tests.campaign.work import ROBUST, WITHIN, known, source, works
+from tests.rigs.files import CONFIG
 
 
 def test_practice_chooses_the_fastest_technique_of_each_load() -> None:

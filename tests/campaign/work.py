@@ -6,9 +6,8 @@ from pathlib import Path
 from canshaper.campaign.run import Source
 from canshaper.campaign.work import SetUp, Work, learn
 from canshaper_sim.operator_model import Known, Skill
-from tests.rigs.files import read
+from tests.rigs.files import CONFIG, read
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 ROBUST = str(CONFIG / "forwarder-robust.yaml")
 WITHIN = 0.30, 6.0
 

@@ -21,16 +21,15 @@ from canshaper_sim.crane import Crane
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script, Stroke
 from tests.closed_loop.mujoco_twin import Twin, TwinCrane, drive, figures
+from tests.rigs.files import ROOT, text_of
 
-ROOT = Path(__file__).resolve().parents[2]
 ROBUST = "forwarder-robust.yaml"
 Change = Callable[[dict[str, Any]], object]
 
 
 def machine(tmp_path: Path, change: Change) -> Deployment:
     """The recommended deployment with both axes' sections of the file changed."""
-    data = yaml.safe_load((ROOT / "config" / ROBUST).read_text(encoding="utf-8"))
-    data["dbc"] = [str(ROOT / "dbc" / "forwarder.dbc")]
+    data = yaml.safe_load(text_of(ROBUST))
     for name in ("slew", "near_far"):
         change(data["axes"][name])
     file = tmp_path / "machine.yaml"

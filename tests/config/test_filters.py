@@ -17,12 +17,12 @@ from canshaper.machine.binding import load_deployment
 from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.rigs.files import ROOT
 from tests.rigs.residual import residual_left
 
 Load = Callable[[str], DeploymentConfig]
 Problems = Callable[[str], list[str]]
 
-ROOT = Path(__file__).parents[2]
 SLEW = "filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 LIFT = "filter: { kind: off }"
 TICK_S = 0.02

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from canshaper.config.schema import AxisSection, DeploymentConfig
-from canshaper.errors import ConfigError, did_you_mean, there_are
-from canshaper.machine.binding import load_deployment
+from canshaper.errors import did_you_mean, there_are
 from tests.config.sections import TOP, Problems, changed
+from tests.rigs.files import faults, machine_file
 
 Load = Callable[[str | bytes], DeploymentConfig]
 AXIS = ", ".join(AxisSection.model_fields)
@@ -85,9 +85,6 @@ def test_an_empty_file_is_wrong_in_its_first_line(problems: Problems, text: str)
     assert keys == ["axes", "buses", "dbc", "joysticks", "version"]
 
 
-ROOT = Path(__file__).parents[2]
-
-
 @pytest.mark.parametrize(
     ("name", "end"),
     [
@@ -123,10 +120,4 @@ def test_of_many_names_only_the_nearest_are_listed() -> None:
     ],
 )
 def test_every_kind_of_name_in_a_file(tmp_path: Path, old: str, new: str, end: str) -> None:
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    file = tmp_path / "machine.yaml"
-    changed = text.replace("../dbc", str(ROOT / "dbc")).replace(old, new, 1)
-    file.write_text(changed, encoding="utf-8")
-    with pytest.raises(ConfigError) as error:
-        load_deployment(file)
-    assert any(str(problem).endswith(end) for problem in error.value.problems)
+    assert any(one.endswith(end) for one in faults(machine_file(tmp_path, "forwarder", (old, new))))

@@ -11,23 +11,11 @@ import pytest
 from canshaper.controller.controller import Controller
 from canshaper.daemon.follow import AFTER_NS, CLUSTER_NS, TickFollower, tick_follower
 from canshaper.machine.binding import load_deployment
-from canshaper.machine.deployment import Deployment
-from tests.rigs.forwarder import ROOT
+from tests.rigs.files import machine_file
 
 MS = 1_000_000
 PERIOD_NS = 20 * MS
 MOST_NS = 200_000  # 1 % of it
-
-
-def deployment_of(folder: Path, follow: str = "left", **changed: str) -> Deployment:
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
-    text = text.replace("buses:\n", f"tick: {{ follow: {follow} }}\nbuses:\n", 1)
-    for old, new in changed.items():
-        text = text.replace(old, new)
-    file = folder / "machine.yaml"
-    file.write_text(text, encoding="utf-8")
-    return load_deployment(file)
 
 
 class Joysticks:
@@ -129,7 +117,8 @@ def test_where_the_command_line_takes_another_interface_the_ticks_stay(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("WARNING", "canshaper")
-    deployment = deployment_of(tmp_path)
+    follow = ("buses:\n", "tick: { follow: left }\nbuses:\n")
+    deployment = load_deployment(machine_file(tmp_path, "forwarder", follow))
     assert tick_follower(deployment, Controller(deployment)) is not None
     buses = {
         n: b.model_copy(update={"interface": "virtual"}) for n, b in deployment.config.buses.items()

@@ -13,7 +13,6 @@ import pytest
 from tests.hil.machine import (
     DBC,
     FILE,
-    ROOT,
     VALVES,
     Service,
     candump,
@@ -23,6 +22,7 @@ from tests.hil.machine import (
     service,
     wait_for,
 )
+from tests.rigs.files import ROOT
 
 # What an emulated processor that is late makes the daemon say, rightly.
 LATE = re.compile(r"from=ACTIVE reason=(LOOP_\w+|\w*JOYSTICK_TIMEOUT|ENABLE_LOST)")

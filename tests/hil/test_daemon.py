@@ -25,6 +25,7 @@ from tests.hil.machine import (
     service,
     wait_for,
 )
+from tests.rigs.files import machine_file
 
 HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
 PAUSE = HUGE_PAGES / "khugepaged/scan_sleep_millisecs"
@@ -101,9 +102,8 @@ def test_interface_down_and_up_is_survived(
 def test_reload_refuses_a_broken_file_and_applies_a_good_one_in_neutral(
     bus: can.BusABC, joysticks: Joysticks, tmp_path: Path
 ) -> None:
-    text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
-    file = tmp_path / "machine.yaml"
-    file.write_text(text)
+    file = machine_file(tmp_path, FILE)
+    text = file.read_text()
     with service(tmp_path / "daemon.log", "run", str(file)) as daemon:
         daemon.wait_log("started file=")
         drive(bus, joysticks)

@@ -6,7 +6,8 @@ import pytest
 
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
-from tests.rigs.canopen import DBC_FILE, ROOT, write_variant
+from tests.rigs.canopen import DBC_FILE, write_variant
+from tests.rigs.files import ROOT, machine_file
 
 LAST_NODE = "lift: { id: 0x22, heartbeat_ms: 500 }"
 
@@ -58,11 +59,8 @@ def test_a_valve_with_cia408_has_its_node_there(tmp_path: Path) -> None:
 
 
 def test_the_node_of_a_drive_is_one_of_its_bus(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "cia402-forwarder.yaml").read_text()
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace("200, node: slew", "200, node: slow")
-    file = tmp_path / "machine.yaml"
-    file.write_text(text)
-    (problem,) = problems(file)
+    slow = ("200, node: slew", "200, node: slow")
+    (problem,) = problems(machine_file(tmp_path, "cia402-forwarder", slow))
     assert "axes.slew.valve.node: expected a node of bus crane, got 'slow'; there are" in problem
 
 

@@ -16,9 +16,9 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping import transfer
 from canshaper.shaping.registry import ADDED
+from tests.rigs.files import ROOT
 from tests.rigs.sent import status_frame
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = [
     path.name
     for path in sorted((ROOT / "config").glob("*.yaml"))

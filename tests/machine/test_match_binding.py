@@ -14,8 +14,8 @@ from canshaper.daemon.ports import open_ports
 from canshaper.errors import BusError, ConfigError, WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.bus.fake_devices import FakeDevices
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 ONE = "channel: vcan0, bitrate: 250000"
 TWO = "channel: vcan1, bitrate: 250000"
 

@@ -13,8 +13,8 @@ from canshaper.config.bus import Bus
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 MADE = "date: 2026-11-23, by: canshaper calibrate 0.1.0, source:"
 CURVE = "curve_command_pct: [-100, -5, 5, 100], curve_speed_pct: [-100, 0, 0, 100]"
 

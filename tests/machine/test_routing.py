@@ -9,8 +9,7 @@ from canshaper.config.bus import J1939, Bus, Canopen, CanopenNode, J1939Name
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import GroupRoute, Key, Role, Route, Routing, build_routing
-
-CONFIG = Path(__file__).parents[2] / "config"
+from tests.rigs.files import CONFIG
 
 
 def machine(name: str) -> Deployment:

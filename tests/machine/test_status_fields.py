@@ -14,8 +14,8 @@ from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 ACTIVE_SET = "SG_ ActiveSet : 4|4@1+ (1,0) [0|15]"
 AT_REST = "SG_ AtRest : 4|1@1+ (1,0) [0|1]"
 FIELD: StatusField[status.ReportedAxis] = StatusField("AtRest", lambda one: one.axis.neutral, int)

@@ -10,8 +10,8 @@ import cantools
 from canshaper.cli.common import loader
 from canshaper.recording.replay import look
 from canshaper.recording.shift import LogOfWork, Shifts, first_ns
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 TICK_S = 0.02
 MONDAY_S = 1_790_000_000.0  # 2026-09-21 14:13:20
 HOUR_S = 3600.0

@@ -13,7 +13,6 @@ from tests.recording.shift_logs import (
     MONDAY_S,
     OFF,
     OUT,
-    ROOT,
     SHORT,
     Part,
     counted,
@@ -23,6 +22,7 @@ from tests.recording.shift_logs import (
     waited_s,
     written,
 )
+from tests.rigs.files import machine_file
 
 
 def test_figures_are_those_that_the_log_was_made_with(tmp_path: Path) -> None:
@@ -174,13 +174,7 @@ def test_each_crane_has_its_rows(tmp_path: Path) -> None:
 
 
 def test_each_profile_has_its_row(tmp_path: Path) -> None:
-    text = (
-        (ROOT / "config" / "forwarder.yaml")
-        .read_text(encoding="utf-8")
-        .replace("../dbc", f"{ROOT / 'dbc'}")
-    )
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace(*BUTTON).replace(SLEW, FAST), encoding="utf-8")
+    file = machine_file(tmp_path, "forwarder", BUTTON, (SLEW, FAST))
     path = written(tmp_path / "a.log", OUT)
     written(path, [Part(0.3)], MONDAY_S + 8.0, AntiSwayOff=1)
     rows, _ = counted(written(path, BACK, MONDAY_S + 8.3), file=str(file))

@@ -15,8 +15,8 @@ from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 from canshaper_sim.plant import PlantNode
 from tests.machine import protected_machine
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 IDS = list(range(1, 17))
 SLEW = (
     "BO_ 512 SlewCommand: 2 SHAPER\n"

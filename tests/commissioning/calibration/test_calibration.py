@@ -23,8 +23,8 @@ from canshaper.shaping.limits import ValveCurve
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script, Stroke
 from canshaper_sim.parameters import changed_parameters
+from tests.rigs.files import ROOT, machine_file, text_of
 
-ROOT = Path(__file__).parents[3]
 FILE = ROOT / "config" / "forwarder.yaml"
 RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
 SPEED = ("TipVelocity", "SlewRate")
@@ -86,8 +86,7 @@ def test_a_quick_or_low_ramp_finds_the_same_valve(
 
 
 def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
-    file = tmp_path / "machine.yaml"
-    file.write_text(FILE.read_text().replace("../dbc", str(ROOT / "dbc")))
+    file = machine_file(tmp_path, FILE)
     options = ["calibrate", str(file), "--axis", "slew", "--top", "25", "--rate", "5", "--write"]
     reported = CliRunner().invoke(app, [*options, "--set", "slew.negative_more_deadband=0.05"])
     assert reported.exit_code == 0, reported.output
@@ -247,8 +246,7 @@ def test_a_frame_not_sent_and_a_loop_that_stood_still_end_it(
 
 def with_limits(tmp_path: Path, limits: str) -> Path:
     """The machine with these limits of slew; ``canshaper set`` may change its speed."""
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    text = text.replace("limits: { deadband_pct: 5,", f"limits: {{ {limits},", 1)
+    text = text_of(FILE).replace("limits: { deadband_pct: 5,", f"limits: {{ {limits},", 1)
     text += "control: { adjustable: { axes.slew.limits.max_pct: [20, 100] } }\n"
     (file := tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
     return file
@@ -297,7 +295,5 @@ def test_a_drive_without_a_deadband_has_a_curve_all_the_same() -> None:
 
 @pytest.mark.parametrize(("axis", "signal"), [("bridge", "BridgeSpeed"), ("hoist", "HoistSpeed")])
 def test_the_speed_of_an_axis_is_that_of_what_it_moves(axis: str, signal: str) -> None:
-    assert speed_signal(load_deployment(ROOT / "config/bridge-crane.yaml"), axis, None) == (
-        "CraneVelocity",
-        signal,
-    )
+    bridge = load_deployment(ROOT / "config/bridge-crane.yaml")
+    assert speed_signal(bridge, axis, None) == ("CraneVelocity", signal)

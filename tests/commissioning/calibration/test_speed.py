@@ -17,8 +17,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.parameters import changed_parameters
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[3]
 RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
 TICK_NS = 20_000_000
 MESSAGES = """

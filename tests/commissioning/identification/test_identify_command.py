@@ -16,13 +16,13 @@ from canshaper_sim.grapple import Sway
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
-    ROOT,
     candump,
     driven,
     main,
     period_of,
     phone,
 )
+from tests.rigs.files import ROOT
 
 
 @pytest.fixture(scope="module")

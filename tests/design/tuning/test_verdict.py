@@ -14,8 +14,8 @@ from canshaper.design.tuning.verdict import GOOD, Verdict, judge, verdicts
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.sway import SwayMode
 from tests.design.tuning.random_machines import COUNT, judged
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 DOUBLE = gff((-2.859, -2.859))
 RATES = "rise_per_s: 5, fall_per_s: 5"
