@@ -17,7 +17,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.parameters import changed_parameters
-from tests.rigs.files import ROOT
+from tests.rigs.files import ROOT, Machine
 
 RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
 TICK_NS = 20_000_000
@@ -39,16 +39,11 @@ BO_ 1003 Ranged: 8 PLANT
 
 
 def with_messages(folder: Path, long: int = 20, fd: str = "") -> Deployment:
-    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
-    at = dbc.index("BO_ ")
-    messages = MESSAGES.lstrip().replace("Long: 20", f"Long: {long}")
-    changed = dbc[:at] + messages + dbc[at:] + "\nSIG_VALTYPE_ 1000 Speed : 1;\n"
-    (folder / "machine.dbc").write_text(changed, "cp1252")
-    file = folder / "machine.yaml"
-    text = (ROOT / "config" / "forwarder.yaml").read_text()
-    text = text.replace("../dbc/forwarder.dbc", "machine.dbc")
-    file.write_text(text.replace("bitrate: 250000", f"bitrate: 250000{fd}"))
-    return load_deployment(file)
+    machine, messages = Machine(folder), MESSAGES.lstrip().replace("Long: 20", f"Long: {long}")
+    machine.in_dbc("BO_ ", f"{messages}BO_ ")
+    machine.dbc += "\nSIG_VALTYPE_ 1000 Speed : 1;\n"
+    machine.in_yaml("bitrate: 250000", f"bitrate: 250000{fd}")
+    return machine.load()
 
 
 def drive_on(
