@@ -144,12 +144,6 @@ def test_dbc_files_of_a_bundle_are_inside_it(machine: Machine) -> None:
             load_deployment(other / "machine.yaml", inside=other)
 
 
-def test_dbc_files_are_of_a_size(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("canshaper.machine.lookup.MOST_BYTES", 1000)
-    (answer,) = machine.problems()
-    assert "dbc: expected 1000 bytes at most in all, got" in answer
-
-
 def test_a_sway_sensor_is_named_by_message_and_signal() -> None:
     axes = load_deployment(ROOT / "config" / "forwarder-sensor.yaml").axes
     assert axes["slew"].sway_sensor is not None
