@@ -18,6 +18,7 @@ from canshaper.campaign.store import Store
 from canshaper.cli.app import app
 from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
+from tests.rigs.files import ROOT
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'canshaper[cluster]'")
 
@@ -25,7 +26,6 @@ from canshaper.campaign.engine import Cluster
 
 pytestmark = pytest.mark.processes
 
-ROOT = Path(__file__).resolve().parents[2]
 ROBUST = ROOT / "config" / "forwarder-robust.yaml"
 LIMIT_S = 60.0
 REFUSED = r"worker tcp://[\d.:]+: expected the program sha256:\w{12}, got sha256:\w{12}"

@@ -18,8 +18,8 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import dwell_s
 from tests.faults.shipped import NAMES
+from tests.rigs.files import CONFIG, text_of
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
 SENSOR = load_deployment(CONFIG / "forwarder-sensor.yaml")
 RANGES = Uncertainty()
@@ -45,9 +45,9 @@ def test_two_files_meet_the_same_crane_and_operator() -> None:
 
 
 def test_other_tails_meet_the_same_drive_and_are_judged_from_the_same_time(tmp_path: Path) -> None:
-    text = ROBUST.path.read_text(encoding="utf-8").replace("../dbc", str(CONFIG.parent / "dbc"))
-    (tmp_path / "longer.yaml").write_text(re.sub(r"tail_s: [\d.]+", "tail_s: 6", text))
-    longer = load_deployment(tmp_path / "longer.yaml")
+    file = tmp_path / "longer.yaml"
+    file.write_text(re.sub(r"tail_s: [\d.]+", "tail_s: 6", text_of(ROBUST.path)))
+    longer = load_deployment(file)
     ranges = Uncertainty(load_change_pct=100.0, bus_fault_pct=50.0)
     for seed in range(20):
         one = draw_drive(ROBUST, seed, ranges, longest_s=dwell_s(longer))

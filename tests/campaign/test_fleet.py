@@ -24,8 +24,9 @@ from canshaper.design.parallel import Processes
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.cli.invocation import ROOT, invoke
+from tests.cli.invocation import invoke
 from tests.native.judge import needs_compiler
+from tests.rigs.files import ROOT, machine_file
 
 ROBUST = ROOT / "config/forwarder-robust.yaml"
 SEEDS = range(1_000_000, 1_000_012)
@@ -101,9 +102,8 @@ def test_options_that_do_not_go_together(options: tuple[str, ...], text: str) ->
 
 @pytest.mark.slow
 def test_all_axes_are_written_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "machine.yaml"
-    before = ROBUST.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    path.write_text(before, encoding="utf-8")
+    path = machine_file(tmp_path, ROBUST)
+    before = path.read_text(encoding="utf-8")
     deployment = load_deployment(path)
     designs = [design_robust(deployment, name, duration_s=1.0) for name in ("slew", "near_far")]
     row = FleetRow("", Candidate(0.9, 1.1, 1.0), 1.0, *[Quantile(1.0, None, None)] * 2)

@@ -20,7 +20,7 @@ from canshaper.errors import CampaignError, ConfigError, NativeError
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script
 from tests.native.judge import needs_compiler
-from tests.rigs.files import CONFIG
+from tests.rigs.files import CONFIG, machine_file
 
 ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
 FAULTY = Uncertainty(bus_fault_pct=100.0)
@@ -76,15 +76,10 @@ def test_a_radius_on_another_bus_is_measured_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     short(monkeypatch)
-    text = ROBUST.path.read_text(encoding="utf-8").replace("../dbc", str(CONFIG.parent / "dbc"))
     bus = "radius: { bus: crane, message: TipPosition"
-    assert bus in text
-    text = text.replace(bus, bus.replace("crane", "second"))
-    text = text.replace(
-        "\nbuses:\n", "\nbuses:\n  second: { interface: virtual, channel: second }\n"
-    )
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
-    deployment = load_deployment(tmp_path / "machine.yaml")
+    second = "\nbuses:\n  second: { interface: virtual, channel: second }\n"
+    changes = (bus, bus.replace("crane", "second")), ("\nbuses:\n", second)
+    deployment = load_deployment(machine_file(tmp_path, ROBUST.path, *changes))
     row = measured_drive(deployment, 50, Uncertainty(), native=NativeCrane(deployment))
     assert row["residual_deg"] == measured_drive(ROBUST, 50, Uncertainty())["residual_deg"]
 

@@ -111,7 +111,7 @@ def test_what_a_file_says_of_its_crane_is_simulated(tmp_path: Path) -> None:
     assert boom.rope_m == 5.0
     assert boom.axes["bridge"].valve.parameters == parameters.overhead.bridge
     file = changed(tmp_path, ("kind: cartesian,", "kind: cartesian, simulated: { rope: 1 },"))
-    with pytest.raises(DesignError, match=r"bridge-crane.yaml: crane.simulated: rope=1.*parameter"):
+    with pytest.raises(DesignError, match=r"machine.yaml: crane.simulated: rope=1.*parameter"):
         changed_parameters([], load_deployment(file))
 
 

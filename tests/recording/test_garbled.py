@@ -7,9 +7,7 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.bus.port import open_port
 from canshaper.cli.common import loader
-from canshaper.codec.frame import Frame, FrameFault
 from canshaper.commissioning.monitor.run import run_plain
 from canshaper.commissioning.nodes.parameters import _connected
 from canshaper.config.bus import Bus
@@ -57,18 +55,6 @@ def test_a_garbled_line_costs_that_line(line: SerialLine, text: bytes) -> None:
     assert [frame.data[0] for frame in frames] == [1, 2]
     assert listener.errors == {"crane": 1}
     assert re.match("bus crane: .*Error", listener.last_error)
-
-
-@pytest.mark.processes
-def test_a_daemon_reads_on_behind_what_is_no_text(line: SerialLine) -> None:
-    faults: list[FrameFault] = []
-    port = open_port("crane", slcan(line), faults.append)
-    line.write(b"".join(GARBLED) + GOOD % 2)
-    frames: list[Frame] = []
-    until(lambda: frames.extend(port.frames()) or frames)
-    port.close()
-    assert [frame.data[0] for frame in frames] == [2]
-    assert faults == [FrameFault.BUS_ERROR] * len(GARBLED)
 
 
 @pytest.mark.parametrize("suffix", ["log", "mcap"])

@@ -153,9 +153,3 @@ def test_a_file_cut_off_is_named(tmp_path: Path, size: int) -> None:
     message = error_of(path)
     assert message.startswith(f"{path}: expected an MF4 log that is whole, got ")
     assert "\n" not in message
-
-
-def test_clocks_that_jump_are_refused(tmp_path: Path) -> None:
-    one = frames(1)[0]
-    path = written(tmp_path / "a.mf4", [one, one._replace(time_ns=one.time_ns - 10**9)])
-    assert "mixed clocks: a time 1.000 s before that of the frame before" in error_of(path)

@@ -13,8 +13,8 @@ from canshaper_sim.grapple import Sway
 from canshaper_sim.machines import build_machine
 from canshaper_sim.operator import SCRIPTS, random_script, script_for, script_named
 from canshaper_sim.strokes import Script, Stroke
+from tests.rigs.files import CONFIG, machine_file
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 TICK_S = 0.02
 
 
@@ -96,11 +96,9 @@ def test_what_the_excavator_leaves_of_pulses_reversals_and_random_drives() -> No
 def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
     """Why the shipped deployment has no motion: it knows nothing of lift and knuckle."""
     shipped = CONFIG / "forwarder-joints.yaml"
-    text = shipped.read_text().replace("../dbc", str(CONFIG.parent / "dbc"))
     radius = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200"
     motion = f"slew: slew, near_far: extension, radius: {{ {radius} }}"
-    file = tmp_path / "motion.yaml"
-    file.write_text(f"{text}\nmotion: {{ crane: {{ {motion} }} }}\n")
+    file = machine_file(tmp_path, shipped, more=f"\nmotion: {{ crane: {{ {motion} }} }}\n")
 
     def left_deg(path: Path, script: str) -> float:
         recording = drive(load_deployment(path), script_named(script, JOINT_AXES))

@@ -15,12 +15,12 @@ from tests.commissioning.identification.driven import drive
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
-    ROOT,
     Coloured,
     Push,
     driven,
     period_of,
 )
+from tests.rigs.files import ROOT
 
 DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")
 SLEW, NEAR_FAR = 0, 1

@@ -13,7 +13,8 @@ from canshaper.errors import ConfigError, IdentificationError, LogError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
-from tests.commissioning.identification.machine import FILE, ROOT, Push, candump, driven
+from tests.commissioning.identification.machine import FILE, Push, candump, driven
+from tests.rigs.files import ROOT, machine_file
 
 PUSHES = [Push("slew", 2.0, 1.0, 0.5), Push("near_far", 6.0, 1.0, -0.4)]
 DRIVE = driven(12.0, PUSHES)
@@ -196,11 +197,9 @@ def test_j1939_takes_any_priority_and_reports_two_addresses(tmp_path: Path) -> N
 
 
 def test_the_signal_of_the_grapple_is_read_next_to(tmp_path: Path) -> None:
-    text = FILE.read_text().replace("../dbc/forwarder.dbc", str(ROOT / "dbc" / "forwarder.dbc"))
-    file = tmp_path / "machine.yaml"
     # Any cyclic message will do for the weight.
     grapple = "load_state: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
-    file.write_text(text + grapple)
+    file = machine_file(tmp_path, FILE, more=grapple)
     deployment = load_deployment(file)
     log = candump(tmp_path / "a.log", DRIVE)
     lines = log.read_text().splitlines()

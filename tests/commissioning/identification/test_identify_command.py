@@ -16,13 +16,13 @@ from canshaper_sim.grapple import Sway
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
-    ROOT,
     candump,
     driven,
     main,
     period_of,
     phone,
 )
+from tests.rigs.files import ROOT, machine_file
 
 
 @pytest.fixture(scope="module")
@@ -180,9 +180,7 @@ def test_a_stopwatch(tmp_path: Path, file: Path) -> None:
 
 
 def test_an_axis_that_follows_its_rope_keeps_the_rope(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "bridge-crane.yaml").read_text(encoding="utf-8")
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
+    file = machine_file(tmp_path, "bridge-crane")
     timed = "--swings", "10", "--seconds", "60", "--first", "20", "--last", "5"
     before = file.read_bytes()
     result = run(tmp_path, *timed, "--file", file, "--axis", "trolley", "--write")

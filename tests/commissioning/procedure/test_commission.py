@@ -15,7 +15,7 @@ from canshaper.commissioning.procedure.procedure import Procedure
 from canshaper.commissioning.procedure.state import Status, read_state
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
-from tests.commissioning.procedure.conftest import ROOT
+from tests.rigs.files import text_of
 
 COPY = Path("machine.rehearsal.yaml")
 STATE = Path("machine.rehearsal.commission.json")
@@ -264,7 +264,7 @@ def test_what_the_simulated_crane_cannot_stand_for_is_refused_at_once(
     new = machine.read_text().replace("\n  slew:", "\n  boom:").replace("slew: slew", "slew: boom")
     new = new.replace("axes.slew.", "axes.boom.")
     if several:
-        new = (ROOT / "config" / "two-cranes.yaml").read_text().replace("../dbc", f"{ROOT}/dbc")
+        new = text_of("two-cranes")
     machine.write_text(new)
     assert text in commission("--yes", code=2)
     assert not COPY.exists()

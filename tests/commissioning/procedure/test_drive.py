@@ -14,7 +14,7 @@ from canshaper.commissioning.procedure.procedure import Procedure
 from canshaper.commissioning.procedure.state import Outcome, Record, Status
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
-from tests.commissioning.procedure.conftest import ROOT
+from tests.rigs.files import machine_file
 
 SIGNALS = {"slew": "GrappleSway.SwayPerpendicular", "near_far": "GrappleSway.SwayParallel"}
 BEFORE, AFTER = "drive-before.log", "drive-after.log"
@@ -228,9 +228,8 @@ def test_a_speed_is_no_swing(machine: Path) -> None:
 
 @pytest.mark.slow
 def test_without_the_step_swing_the_sway_sensor_measures(machine: Path) -> None:
-    text = (ROOT / "config" / "forwarder-sensor.yaml").read_text()
-    text = text.replace("../dbc", f"{ROOT}/dbc").replace("limits: {", "limits: { max_pct: 40,")
-    machine.write_text(text)
+    slow = ("limits: {", "limits: { max_pct: 40,")
+    machine_file(machine.parent, "forwarder-sensor", slow)
     driver = Driver()
     _, proposal = drive(machine, driver, {})
     assert proposal.problems == []

@@ -14,7 +14,7 @@ from canshaper.commissioning.procedure.procedure import Procedure
 from canshaper.commissioning.procedure.state import Outcome
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
-from tests.commissioning.procedure.conftest import ROOT
+from tests.rigs.files import ROOT
 
 
 class Otherwise(Simulated):

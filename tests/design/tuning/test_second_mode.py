@@ -26,8 +26,8 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.rigs.files import machine_file
 
-ROOT = Path(__file__).parents[3]
 TICK_S, G, LAG_S = 0.02, 9.81, 0.1
 VALVE = {"tick_s": TICK_S, "rate_per_s": 5.0}
 Vector = NDArray[np.float64]
@@ -106,12 +106,11 @@ LOGS = DoublePendulum(0.4)
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """The forwarder with the first mode of the logs on its near-far axis."""
-    path = tmp_path / "machine.yaml"
-    text = (ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc", str(ROOT / "dbc"))
     first = LOGS.modes()[0]
     swing = f"period_s: {first.period_s:.4f}, damping_ratio: {first.damping_ratio:.4f}"
-    path.write_text(text.replace("length_m: 1.2, damping_nms: 120, mass_kg: 300", swing))
-    return path
+    return machine_file(
+        tmp_path, "forwarder", ("length_m: 1.2, damping_nms: 120, mass_kg: 300", swing)
+    )
 
 
 def option(range_pct: float = 20.0) -> str:
