@@ -153,14 +153,9 @@ class RobustDesign:
 
     @property
     def reversal_s(self) -> float | None:
-        """Reversal that its second mode needs, where that of the file cuts the response off.
-
-        What makes good for a cut knows the first mode alone.
-        """
-        limits = self.bound.config.limits.output_limits()
-        needed_s = self.shaper.duration_s + limits.maximum / limits.fall_per_s
-        enough = limits.allow_reverse or limits.reversal_s >= needed_s
-        return None if enough or not self.task.second else math.ceil(10.0 * needed_s) / 10.0
+        """Reversal that its second mode needs, where that of the file cuts the response off."""
+        design = self.chosen.design()
+        return design and design.reversal_s(self.bound.config.limits)
 
 
 def design_robust(
