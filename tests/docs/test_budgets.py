@@ -42,7 +42,7 @@ BUDGET = {
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
-    "docs/machines.md": 1028,
+    "docs/machines.md": 1034,
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
