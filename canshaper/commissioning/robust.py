@@ -153,14 +153,9 @@ class RobustDesign:
 
     @property
     def reversal_s(self) -> float | None:
-        """Reversal that its second mode needs, where that of the file cuts the response off.
-
-        What makes good for a cut knows the first mode alone.
-        """
-        limits = self.bound.config.limits.output_limits()
-        needed_s = self.shaper.duration_s + limits.maximum / limits.fall_per_s
-        enough = limits.allow_reverse or limits.reversal_s >= needed_s
-        return None if enough or not self.task.second else math.ceil(10.0 * needed_s) / 10.0
+        """Reversal that its second mode needs, where that of the file cuts the response off."""
+        design = self.chosen.design()
+        return design.reversal_s(self.bound.config.limits) if design else None
 
 
 def design_robust(
@@ -186,7 +181,8 @@ def design_robust(
             follows, which it is designed for at its shortest.
         duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
         residual_pct: instead: the shortest that leaves at most this.
-        second: a second mode as the option --second has it.
+        second: a second mode as the option --second has it; None for that of the filter in the
+            file.
         first: taps with which it begins, where it has a duration.
 
     Raises:
@@ -280,8 +276,12 @@ def _at(task: RobustTask, sway: Sway, length_m: float) -> RobustTask:
 
 
 def _second(text: str | None, task: RobustTask) -> SecondMode | None:
-    """Return the second mode of the option --second."""
-    if text is None:
+    """Return the second mode of the option --second; without it that of the file's filter."""
+    config, at = task.bound.config, task.at
+    design = (config if at is None else config.gain_schedule[at]).filter.design()
+    if text is None and design and (own := design.second):
+        text = f"{own.period_s},{own.damping_ratio},{own.length_range_pct}"
+    if text is None or text == "none":
         return None
     if task.bound.rope:
         text = "its period does not go with the rope's; for one length, write sway without length"
@@ -289,7 +289,7 @@ def _second(text: str | None, task: RobustTask) -> SecondMode | None:
     try:
         period_s, damping_ratio, range_pct = (float(word) for word in text.split(","))
     except ValueError:
-        form = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20"
+        form = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, or none"
         raise UsageError(f"--second: expected {form}, got {text!r}") from None
     try:
         values = (period_s, damping_ratio, range_pct)

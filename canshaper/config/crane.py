@@ -18,7 +18,7 @@ class _Crane(Section):
     @property
     def moved(self) -> dict[str, str]:
         """Axis by the coordinate that it moves."""
-        return self.model_dump(exclude={"kind", "simulated"}, exclude_none=True)
+        return self.model_dump(exclude={"kind", "drawn", "simulated"}, exclude_none=True)
 
 
 class CylindricalCrane(_Crane):
@@ -35,6 +35,7 @@ class CartesianCrane(_Crane):
     """A trolley on a bridge: the load hangs from a rope, each axis moves it along a straight."""
 
     kind: Literal["cartesian"] = Field(description="a trolley on a bridge")
+    drawn: Literal["multicopter"] | None = Field(None, description="what a page draws instead")
     bridge: str | None = Field(None, description="axis that moves the bridge along its runway")
     trolley: str | None = Field(None, description="axis that moves the trolley along the bridge")
     hoist: str | None = Field(None, description="axis of the rope, positive up")
@@ -44,6 +45,7 @@ class JointCrane(_Crane):
     """A boom whose joints have an axis each."""
 
     kind: Literal["joints"] = Field(description="an axis for each joint of the boom")
+    drawn: Literal["excavator"] | None = Field(None, description="what a page draws instead")
     slew: str | None = Field(None, description="axis that turns, positive counter-clockwise")
     lift_cylinder: str | None = Field(None, description="axis that raises the main boom")
     knuckle: str | None = Field(None, description="axis that folds the outer boom out")

@@ -39,6 +39,8 @@ OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "CraneVelocity": ("BridgeSpeed", "TrolleySpeed", "HoistSpeed"),
     "LoadSway": ("SwayBridge", "SwayTrolley"),
 }
+# Sent first by one whose DBC has it: how the sling hangs below the hook.
+SLING_FEEDBACK: Mapping[str, tuple[str, ...]] = {"SlingSway": ("SlingBridge", "SlingTrolley")}
 
 # Sent first by other cranes with a rope: how far down it hangs.
 HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {
@@ -182,6 +184,8 @@ class PlantNode:
         problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
         self._feedback = _FEEDBACK_OF.get(name, {**JOINT_FEEDBACK, **FEEDBACK})
+        if name == OVERHEAD and not isinstance(deployment.messages.find("SlingSway"), str):
+            self._feedback = {**SLING_FEEDBACK, **self._feedback}
         self._senders: dict[str, Sender] = {}
         # A feedback message that the deployment reads is sent where and as it asks.
         read = {i.message.name: (i.config.bus, i.protection) for i in deployment.inputs()}
@@ -310,7 +314,8 @@ def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
     bridge, trolley, _ = axes
     if name == "CranePosition":
         return bridge.position, trolley.position, boom.signal_m
-    return tuple(math.degrees(angle) for angle in boom.angles[:2])
+    angles = boom.sling_angles if name == "SlingSway" else boom.angles[:2]
+    return tuple(math.degrees(angle) for angle in angles)
 
 
 def _heading_deg(theta1_rad: float) -> float:

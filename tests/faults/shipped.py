@@ -37,6 +37,7 @@ NAMES = (
     "forwarder-pump",
     "forwarder-load",
     "bridge-crane",
+    "bridge-crane-hook",
     "excavator",
     "multicopter",
     "tower-crane",

@@ -73,13 +73,34 @@ def test_a_bridge_crane_has_a_trolley_and_a_load() -> None:
     assert shown["measured"] and shown["crane"] and shown["pose"] is None
 
 
+def test_a_load_on_a_sling_hangs_as_the_crane_says() -> None:
+    watched = Watched("bridge-crane-hook")
+    assert watched.view.values(0.0)["sling"] is None
+    shown = watched.receive(watched.sway(2.0, -1.0))
+    assert shown["sling"] == pytest.approx((2.0, -1.0), abs=0.02)  # with the rope at the start
+    hall = drawn_of(changed_parameters([], watched.deployment), watched.deployment)["hall"]
+    assert (hall["rope"], hall["sling"]) == (20.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "drawn"), [("excavator", "excavator"), ("multicopter", "multicopter")]
+)
+def test_what_a_file_says_is_drawn(name: str, drawn: str) -> None:
+    """Of a multicopter that hovers in the picture, as wide as its rope may swing."""
+    deployment = load_deployment(CONFIG / f"{name}.yaml")
+    said = drawn_of(changed_parameters([], deployment), deployment)
+    assert said["drawn"] == drawn
+    hall = {"runway": 10.0, "span": 10.0, "rope": 5.0, "sling": 0.0}
+    assert said["hall"] == (hall if drawn == "multicopter" else None)
+
+
 @pytest.mark.parametrize(("name", "rope_m"), [("tower-crane", 30.0), ("telehandler", 8.0)])
 def test_a_crane_with_a_rope_at_its_tip_is_drawn_with_what_it_says(
     name: str, rope_m: float
 ) -> None:
     watched = Watched(name)
     shown = watched.receive(PlantNode(watched.deployment).feedback())
-    drawn = drawn_of(changed_parameters([], watched.deployment), watched.deployment.coordinates)
+    drawn = drawn_of(changed_parameters([], watched.deployment), watched.deployment)
     assert shown["rope"] == pytest.approx(rope_m, abs=0.01)
     boom, (_, radius_m, height_m) = drawn["boom"], shown["pose"]
     assert boom["straight"] and drawn["hall"] is None

@@ -68,7 +68,7 @@ def compare(
     shows what is done until then.
 
     Of a crane with a rope it is one table of the swing left by the length of the rope and the
-    work, next to ZVD for one length and ZV by length.
+    work, next to ZVD for one length and ZV by length; of a filter for two modes to ZV of both.
 
     Examples:
 

@@ -47,7 +47,8 @@ def robust(
         None,
         "--second",
         metavar="PERIOD,DAMPING,RANGE",
-        help="A second mode too: s, damping ratio, +- % of its length.",
+        help="A second mode too: s, damping ratio, +- % of its length; or none. Default: that"
+        " of the filter in the file.",
     ),
     write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
     force: bool = typer.Option(False, "--force", help="Write what leaves half of the swing too."),

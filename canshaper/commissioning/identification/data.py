@@ -229,12 +229,20 @@ def logged(
     findings = []
     for (name, label), parts in series.items():
         on_progress(0.5, f"{name} {label}")
-        finding = identify(name, label, parts, about_s)
+        finding = identify(name, label, parts, about_s or _slower_s(deployment, name))
         if finding.at is None:
             with suppress(ValueError):
                 finding.at = float(label)
         findings.append(finding)
     return findings
+
+
+def _slower_s(deployment: Deployment | None, axis: str) -> float | None:
+    """Period in the file where its filter covers a second mode, which may swing as much."""
+    bound = deployment.axes.get(axis) if deployment else None
+    design = bound.config.filter.design() if bound else None
+    sway = bound.config.sway if bound and design and design.second else None
+    return sway.mode().period_s if sway else None
 
 
 def pump_in(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from canshaper.config.filters import Filter, filter_of
 from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.robust import least_residual
+from canshaper.errors import DesignError
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
@@ -49,6 +50,9 @@ def candidates(deployment: Deployment) -> list[Candidate]:
     Raises:
         DesignError: one of these axes is not there, or has no sway data.
     """
+    if not {*AXES} <= deployment.axes.keys():
+        text = f"expected axes {' and '.join(AXES)}, or a crane with a rope"
+        raise DesignError(f"{deployment.path}: {text}, got {', '.join(deployment.axes)}")
     modes = {axis: swinging_axis(deployment, axis)[1].mode() for axis in AXES}
     ticks_s = {axis: tick_s(deployment, axis) for axis in AXES}
     settings = [

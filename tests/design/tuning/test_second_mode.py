@@ -240,7 +240,8 @@ def test_the_file_records_it(file: Path) -> None:
         length_range_pct=25.0,
     )
     checked = CliRunner().invoke(app, ["check", str(file)]).output
-    assert checked.count("WARNING") == checked.count("hydraulics: missing") == 1
+    assert checked.count("hydraulics: missing") == checked.count("reversal_s: 2") == 1
+    assert checked.count("WARNING") == 2
     file.write_text(file.read_text().replace("length_range_pct: 25.0", "length_range_pct: 61.0"))
     checked = CliRunner().invoke(app, ["check", str(file)])
     assert checked.exit_code == 2
@@ -264,15 +265,16 @@ def test_another_period_stretches_the_taps_as_long_as_the_second_mode_is_covered
             ValueError, match=r"designed_for\.second\.period_s: expected .*got 0.64"
         ):
             adjusted(config, {key: factor * config.sway.period_s}, config)
-    single = designed(file).config
+    assert designed(file).config.filter.design() == config.filter.design()  # it is kept
+    single = designed(file, "--second", "none").config
     assert adjusted(single, {key: 1.15 * config.sway.period_s}, single) != single
 
 
 @pytest.mark.parametrize(
     ("second", "says"),
     [
-        ("0.6,0.1", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, got '0.6,0.1'"),
-        ("quick", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, got 'quick'"),
+        ("0.6,0.1", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, or none, got '0.6,0.1'"),
+        ("quick", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, or none, got 'quick'"),
         ("0.1,0.1,20", "expected a period of 0.3 to 1.98 s, got 0.1 s"),
         ("nan,0.1,20", "expected a period of 0.3 to 1.98 s, got nan s"),
         ("2.2,0.1,20", "expected a period of 0.3 to 1.98 s, got 2.2 s"),
