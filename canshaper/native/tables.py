@@ -8,6 +8,7 @@ hangs on them.
 
 import math
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 from cantools.database.can import Message
@@ -236,7 +237,9 @@ def _filter(axis: ShapedAxis) -> Numbers:
     fir = shaper._shaper if isinstance(shaper, LimitAware) else shaper
     gff = shaper._gff if isinstance(shaper, LimitAware) else shaper
     if isinstance(fir, Fir):
-        numbers |= {"taps": [*fir.taps], "taps_n": len(fir.taps)}
+        pairs = enumerate(pairwise((0.0, *fir.taps, 0.0)))
+        edges = [{"tap": k, "before": a, "after": b} for k, (a, b) in pairs if a != b]
+        numbers |= {"edges": edges, "edges_n": len(edges), "taps_n": len(fir.taps)}
     if isinstance(gff, Gff):
         numbers |= {"k1": gff.k1, "k2": gff.k2, "share": gff._share}
     if isinstance(shaper, FirstOrder):

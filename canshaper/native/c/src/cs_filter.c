@@ -14,11 +14,23 @@ void cs_sway_step(cs_real *angle, cs_real *rate, const cs_axis_config *c, cs_rea
     *rate += (c->f21 * before) + (c->f22 * swing);
 }
 
+/* Exact sum of the rounded products of taps and commands, rounded once, as math.fsum: no other sum would stay the same
+   where its order changes. From tick to tick only a command that meets another tap than before changes it. */
 static cs_real fir(cs_axis *a, const cs_axis_config *c, cs_real command)
 {
-    a->newest = (a->newest == 0) ? (c->taps_n - 1) : (a->newest - 1);
+    int32_t n = c->taps_n + 1;
+    a->newest = (a->newest == 0) ? c->taps_n : (a->newest - 1);
     a->history[a->newest] = command;
-    return cs_sum_of_products(c->taps, a->history, a->newest, c->taps_n);
+    for (int32_t i = 0; i < c->edges_n; i++) {
+        const cs_edge *edge = &c->edges[i];
+        int32_t at = a->newest + edge->tap;
+        cs_real past = a->history[(at < n) ? at : (at - n)];
+        if (past != 0) {
+            cs_sum_add(&a->sum, edge->after * past);
+            cs_sum_add(&a->sum, -edge->before * past);
+        }
+    }
+    return cs_sum_value(&a->sum);
 }
 
 /* A FIR; the model is driven by what was sent, its twin by what the FIR asked for: the difference is what limits made. */
