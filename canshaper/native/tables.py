@@ -237,9 +237,9 @@ def _filter(axis: ShapedAxis) -> Numbers:
     fir = shaper._shaper if isinstance(shaper, LimitAware) else shaper
     gff = shaper._gff if isinstance(shaper, LimitAware) else shaper
     if isinstance(fir, Fir):
-        pairs = enumerate(pairwise((0.0, *fir.taps, 0.0)))
-        edges = [{"tap": k, "before": a, "after": b} for k, (a, b) in pairs if a != b]
-        numbers |= {"edges": edges, "edges_n": len(edges), "taps_n": len(fir.taps)}
+        pairs = enumerate(pairwise((*fir.taps, math.inf)), 1)
+        runs = [{"end": end, "tap": tap} for end, (tap, following) in pairs if tap != following]
+        numbers |= {"runs": runs, "runs_n": len(runs), "taps_n": len(fir.taps)}
     if isinstance(gff, Gff):
         numbers |= {"k1": gff.k1, "k2": gff.k2, "share": gff._share}
     if isinstance(shaper, FirstOrder):

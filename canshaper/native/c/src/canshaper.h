@@ -83,15 +83,15 @@ typedef struct {
     int32_t bus, length; uint32_t id; bool extended; uint8_t start[CS_BYTES]; cs_field counter; int32_t counts;
 } cs_valve_config;
 
-/* Where the taps of a FIR change: the tap is after from here on, and was before. */
-typedef struct { int32_t tap; cs_real before, after; } cs_edge;
+/* Equal taps of a FIR, one after the other; end: how many taps stand before the next ones. */
+typedef struct { int32_t end; cs_real tap; } cs_run;
 
 typedef struct {
     /* in: a number of a joystick; out: steps in the frame of a valve, which leaves with the axis that sends */
     int32_t joystick, number, valve, period_ticks; bool sends; cs_field setpoint; int32_t zero, sign;
-    /* sway model; filter: edges of a FIR, share, rate and change of rate of the others */
+    /* sway model; filter: runs of taps of a FIR, share, rate and change of rate of the others */
     int32_t kind; bool sways; cs_real f11, f12, f21, f22, k1, k2, share, rate, change, tick_s, fade;
-    const cs_edge *edges; int32_t edges_n, taps_n;
+    const cs_run *runs; int32_t runs_n, taps_n;
     /* limits: docs/deployment.md; the curve stands in place of the dead band */
     cs_real neutral_band, maximum, minimum, rise, fall, fall_per_s, deadband, run_on, small_least, small_most;
     const cs_real *curve_command, *curve_speed; int32_t curve_n;

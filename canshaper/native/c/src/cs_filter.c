@@ -14,21 +14,22 @@ void cs_sway_step(cs_real *angle, cs_real *rate, const cs_axis_config *c, cs_rea
     *rate += (c->f21 * before) + (c->f22 * swing);
 }
 
-/* Exact sum of the rounded products of taps and commands, rounded once, as math.fsum: no other sum would stay the same
-   where its order changes. From tick to tick only a command that meets another tap than before changes it. */
+/* Exact sum of the rounded products of taps and commands, rounded once, as math.fsum. From tick to tick only the command
+   that a run of equal taps begins with, and the one that it has left, change it. */
 static cs_real fir(cs_axis *a, const cs_axis_config *c, cs_real command)
 {
-    int32_t n = c->taps_n + 1;
+    int32_t n = c->taps_n + 1; /* with the command that has left the last run */
+    cs_real begins = command;
     a->newest = (a->newest == 0) ? c->taps_n : (a->newest - 1);
     a->history[a->newest] = command;
-    for (int32_t i = 0; i < c->edges_n; i++) {
-        const cs_edge *edge = &c->edges[i];
-        int32_t at = a->newest + edge->tap;
-        cs_real past = a->history[(at < n) ? at : (at - n)];
-        if (past != 0) {
-            cs_sum_add(&a->sum, edge->after * past);
-            cs_sum_add(&a->sum, -edge->before * past);
+    for (int32_t i = 0; i < c->runs_n; i++) {
+        int32_t at = a->newest + c->runs[i].end;
+        cs_real left = a->history[(at < n) ? at : (at - n)];
+        if (begins != left) {
+            cs_sum_add(&a->sum, c->runs[i].tap * begins);
+            cs_sum_add(&a->sum, -c->runs[i].tap * left);
         }
+        begins = left;
     }
     return cs_sum_value(&a->sum);
 }
