@@ -8,14 +8,13 @@ import ctypes
 import math
 import os
 from collections.abc import Sequence
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from canshaper.campaign.draw import Setting, driven_axes
-from canshaper.codec.frame import Frame
+from canshaper.campaign.operators import Numbered
 from canshaper.codec.layout import CLASSICAL_BYTES
 from canshaper.design.lockstep import Joysticks
 from canshaper.errors import ConfigError, NativeError
@@ -142,7 +141,8 @@ class NativeCrane:
             first = JoystickNode(deployment, still, bypass=off).frames(0)
             pairs = [*zip(self._hand.cycles_ms, first, strict=True)]
             self._neutral.append(tuple((ms, tuple(one.data)) for ms, one in pairs))
-            self._sent = [(ms, bytes(len(one.data))) for ms, one in pairs]
+            sent = [(ms, bytes(len(one.data))) for ms, one in pairs]
+        self._numbered = Numbered(self._hand, sent)
 
     def has(self, setting: Setting) -> bool:
         """Whether the C has a part for all of the crane that was drawn."""
@@ -194,7 +194,7 @@ class NativeCrane:
         )
         arrivals: Sequence[Any] = (None, None)
         if disturb := options.get("disturb"):
-            arrivals = self._arrivals(disturb(_Numbered(self._hand, self._sent)), ticks)
+            arrivals = self._arrivals(disturb(self._numbered), ticks)
         frames_n = sum(ticks * tick_ms // ms + 1 for ms in self._hand.cycles_ms)
         empty, measures = (
             np.array(grapple_numbers(parameters.grapple)),
@@ -219,27 +219,6 @@ class NativeCrane:
         arrivals["number"] = [number for _, number, *_ in came]
         arrivals["changed"] = np.frombuffer(changed, np.uint8).reshape(-1, CLASSICAL_BYTES)
         return np.array([*map(len, by_tick)], np.int32), arrivals
-
-
-class _Numbered:
-    """Joystick frames as numbers, in the order in which the C makes them, and no bit of them set.
-
-    Args:
-        hand: when they are due.
-        sent: cycle, ms, and bytes of each joystick's.
-    """
-
-    def __init__(self, hand: Hand, sent: Sequence[tuple[int, bytes]]) -> None:
-        self._hand, self._sent, self._numbers = hand, sent, count()
-
-    def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
-        """Frames that came since the last tick, in order."""
-        return [
-            Frame("", next(self._numbers), False, data)
-            for ms in self._hand.due(time_ms, tick_ms)
-            for cycle_ms, data in self._sent
-            if ms % cycle_ms == 0
-        ]
 
 
 def _cache_folder() -> Path:

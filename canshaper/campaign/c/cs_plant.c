@@ -281,24 +281,23 @@ static double joystick_at(plant_hand *h, double time_s)
 static int32_t make_frames(const plant_drive *d, plant_hand *hands, plant_sender *senders, int64_t now_ms,
                            plant_frame *made, int32_t n)
 {
-    for (int64_t ms = (now_ms < d->tick_ms) ? 0 : (now_ms - d->tick_ms + 1); ms <= now_ms; ms++) {
-        for (int32_t i = 0; i < cs_tables.joysticks_n; i++) {
-            const cs_joystick_config *j = &cs_tables.joystick[i];
-            if (ms != senders[i].due_ms) { continue; }
-            uint8_t *data = made[n].data;
-            senders[i].due_ms += d->joystick[i].cycle_ms;
-            made[n++].joystick = i;
-            memcpy(data, d->joystick[i].neutral, CS_BYTES);
-            for (int32_t k = 0; k < cs_tables.axes_n; k++) {
-                const cs_axis_config *axis = &cs_tables.axis[k];
-                if (axis->joystick != i) { continue; }
-                cs_number_write(&j->number[axis->number], data, joystick_at(&hands[k], (double)ms / 1000.0));
-            }
-            senders[i].sent = (j->message.counts > 0) ? ((senders[i].sent + 1) % j->message.counts) : 0;
-            cs_field_write(&j->message.counter, data, senders[i].sent);
+    for (;;) {
+        int32_t i = 0; /* whose frame is the next one */
+        for (int32_t k = 1; k < cs_tables.joysticks_n; k++) { i = (senders[k].due_ms < senders[i].due_ms) ? k : i; }
+        const cs_joystick_config *j = &cs_tables.joystick[i];
+        double at_s = (double)senders[i].due_ms / 1000.0;
+        uint8_t *data = made[n].data;
+        if (senders[i].due_ms > now_ms) { return n; }
+        senders[i].due_ms += d->joystick[i].cycle_ms;
+        made[n++].joystick = i;
+        memcpy(data, d->joystick[i].neutral, CS_BYTES);
+        for (int32_t k = 0; k < cs_tables.axes_n; k++) {
+            const cs_axis_config *axis = &cs_tables.axis[k];
+            if (axis->joystick == i) { cs_number_write(&j->number[axis->number], data, joystick_at(&hands[k], at_s)); }
         }
+        senders[i].sent = (j->message.counts > 0) ? ((senders[i].sent + 1) % j->message.counts) : 0;
+        cs_field_write(&j->message.counter, data, senders[i].sent);
     }
-    return n;
 }
 
 static void arrive(cs_controller *s, const cs_message_config *m, const uint8_t *data, int64_t now)
