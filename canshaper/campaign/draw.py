@@ -28,6 +28,8 @@ from canshaper_sim.strokes import Script
 
 # How near an end stop a drive begins that is to meet it.
 _NEAR_M = 1.5
+Parameters = dict[str, Any]
+"""Parameters of the crane that were drawn, in place of its nominal ones."""
 _GUSTS = 0.25  # standard deviation of the wind, of its mean
 # Parts of the drive in which a load is picked up, and put down.
 _PICK_UP, _PUT_DOWN = (0.1, 0.5), (0.5, 0.9)
@@ -104,10 +106,9 @@ def draw_drive(
         Draw(one) for one in np.random.SeedSequence(seed).spawn(5)
     )
     crane, axes = driven_axes(deployment)
-    parameters, factors = _crane(
-        of_crane, axes, ranges, nominal or changed_parameters([], deployment)
-    )
-    parameters, of_places = _place(of_place, axes, ranges, parameters, seed)
+    nominal = nominal or changed_parameters([], deployment)
+    drawn, factors = _crane(of_crane, axes, ranges, nominal)
+    placed, of_places = _place(of_place, axes, ranges, nominal, seed)
     swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
     operator = of_operator.one_of([*OPERATORS])
     script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
@@ -116,14 +117,14 @@ def draw_drive(
     script = replace(script, duration_s=duration_s + (rest_s - DWELL_S))
     if deployment.config.crane:
         script = script.moving(deployment.by_coordinate)
-    loads, of_loads = _loads(of_load, ranges, duration_s, parameters.grapple)
+    loads, of_loads = _loads(of_load, ranges, duration_s, drawn["grapple"])
     if "rope_m" in factors:  # on a rope every load swings alike
         loads, of_loads = [], {}
     sensors = any(axis.sway_sensor for axis in deployment.axes.values())
     fault = _fault(of_fault, ranges, duration_s, sensors=sensors)
-    sensor = replace(parameters.sway_sensor, seed=seed % 1_000_000, **fault.sensor)
+    sensor = replace(nominal.sway_sensor, seed=seed % 1_000_000, **fault.sensor)
     options: DriveOptions = {
-        "parameters": replace(parameters, sway_sensor=sensor),
+        "parameters": replace(nominal, **{**drawn, **placed, "sway_sensor": sensor}),
         "sway": Sway(*map(math.radians, swing)),
         "loads": loads,
         "crane": crane,
@@ -137,8 +138,8 @@ def draw_drive(
 
 def _crane(
     draw: Draw, axes: Sequence[str], ranges: Uncertainty, nominal: CraneParameters
-) -> tuple[CraneParameters, dict[str, float]]:
-    """Tool, pose and valves; what was drawn of them."""
+) -> tuple[Parameters, dict[str, float]]:
+    """Tool, pose and valves; and the numbers that were drawn for them."""
     factors = {
         "length_pct": draw.between(*ranges.length_pct),
         "damping_pct": draw.between(*ranges.damping_pct),
@@ -156,14 +157,15 @@ def _crane(
         c5_n_m_s_rad=damped * grapple.c5_n_m_s_rad,
         c6_n_m_s_rad=damped * grapple.c6_n_m_s_rad,
     )
-    crane, joints = replace(nominal, grapple=grapple), nominal.joints
+    crane: Parameters = {"grapple": grapple}
+    part = kind if by_rope else "joints"  # of the crane, that has axes of its own
+    own: Parameters = {}
     if by_joints:  # they reach the start that they were given, not any
         del factors["radius_m"]
     elif by_rope:
-        own: Any = {kind: _on_rope(getattr(nominal, kind), factors)}
-        crane = replace(crane, **own)
+        own = _on_rope(getattr(nominal, kind), factors)
     else:
-        crane = replace(crane, start_radius_m=_clamp(factors, "radius", nominal))
+        crane["start_radius_m"] = _clamp(factors, "radius", nominal)
     for axis in axes:
         drawn = {
             "dead_time_s": draw.between(*ranges.valve_dead_time_s),
@@ -175,20 +177,14 @@ def _crane(
         gain_pct = draw.between(*ranges.valve_gain_pct)
         factors |= {f"{axis}_{name}": value for name, value in drawn.items()}
         factors[f"{axis}_gain_pct"] = gain_pct
-        owner: Any = getattr(crane, kind) if by_rope else crane
-        if by_joints and axis != SLEW:
-            owner = joints
+        of_part = by_rope or (by_joints and axis != SLEW)
+        owner, changed = (getattr(nominal, part), own) if of_part else (nominal, crane)
         full = FULL_SPEEDS[axis]
-        changed = {
-            axis: replace(getattr(owner, axis), **drawn),
-            full: (1.0 + gain_pct / 100.0) * getattr(owner, full),
-        }
-        if owner is joints:
-            joints = replace(joints, **changed)
-        else:
-            changed = {kind: replace(owner, **changed)} if by_rope else changed
-            crane = replace(crane, **changed)
-    return replace(crane, joints=joints), factors
+        changed[axis] = replace(getattr(owner, axis), **drawn)
+        changed[full] = (1.0 + gain_pct / 100.0) * getattr(owner, full)
+    if own:
+        crane[part] = replace(getattr(nominal, part), **own)
+    return crane, factors
 
 
 def _clamp(factors: dict[str, float], name: str, crane: Any) -> float:
@@ -199,29 +195,27 @@ def _clamp(factors: dict[str, float], name: str, crane: Any) -> float:
     return clamped
 
 
-def _on_rope(nominal: Any, factors: dict[str, float]) -> Any:
-    """Return a crane with the rope that was drawn, and the radius where one was."""
-    own: dict[str, float] = {}
+def _on_rope(nominal: Any, factors: dict[str, float]) -> Parameters:
+    """Return the rope that was drawn, and the radius where one was."""
+    own: Parameters = {}
     if "radius_m" in factors:
         own["start_radius_m"] = _clamp(factors, "radius", nominal)
-    return replace(
-        nominal,
-        **own,
-        rope_m=_clamp(factors, "rope", nominal),
-        rope_error_pct=factors["length_pct"],
-        damping_ratio=nominal.damping_ratio * (1.0 + factors["damping_pct"] / 100.0),
-    )
+    return own | {
+        "rope_m": _clamp(factors, "rope", nominal),
+        "rope_error_pct": factors["length_pct"],
+        "damping_ratio": nominal.damping_ratio * (1.0 + factors["damping_pct"] / 100.0),
+    }
 
 
 def _place(
-    draw: Draw, axes: Sequence[str], ranges: Uncertainty, crane: CraneParameters, seed: int
-) -> tuple[CraneParameters, dict[str, float]]:
+    draw: Draw, axes: Sequence[str], ranges: Uncertainty, nominal: CraneParameters, seed: int
+) -> tuple[Parameters, dict[str, float]]:
     """Pump, ground and wind, and how near its stops the tip is; what was drawn of them.
 
     A crane with a rope has none of them.
     """
     if kind_of(axes) in ON_ROPE:
-        return crane, {}
+        return {}, {}
     factors = {
         "pump_flow": draw.between(*ranges.pump_flow),
         "starved": float(draw.between(0.0, 100.0) < ranges.starved_pct),
@@ -232,18 +226,18 @@ def _place(
         "wind_heading_deg": draw.between(-180.0, 180.0),
     }
     near, ahead_m = draw.between(0.0, 100.0) < ranges.stops_pct, draw.between(0.0, _NEAR_M)
-    at_m = draw.one_of((crane.radius_min_m + ahead_m, crane.radius_max_m - ahead_m))
+    at_m = draw.one_of((nominal.radius_min_m + ahead_m, nominal.radius_max_m - ahead_m))
+    crane: Parameters = {}
     if near := near and NEAR_FAR in axes:
-        factors["radius_m"] = at_m
-        crane = replace(crane, start_radius_m=at_m)
+        factors["radius_m"] = crane["start_radius_m"] = at_m
     tilts = {name: factors[name] for name in ("pitch_deg", "roll_deg", "rock_hz")}
     speed = factors["wind_m_s"]
     heading, gust = factors["wind_heading_deg"], _GUSTS * speed
-    wind = replace(crane.wind, speed_m_s=speed, gust_m_s=gust, heading_deg=heading, seed=seed)
+    wind = replace(nominal.wind, speed_m_s=speed, gust_m_s=gust, heading_deg=heading, seed=seed)
     if factors["pump_flow"] < MOST_FLOW:
-        pump = replace(crane.pump, shares_flow=0.0 if factors["starved"] else 1.0)
-        crane = replace(crane, pump_flow=factors["pump_flow"], pump=pump)
-    crane = replace(crane, carrier=replace(crane.carrier, **tilts), wind=wind)
+        pump = replace(nominal.pump, shares_flow=0.0 if factors["starved"] else 1.0)
+        crane |= {"pump_flow": factors["pump_flow"], "pump": pump}
+    crane |= {"carrier": replace(nominal.carrier, **tilts), "wind": wind}
     return crane, factors | {"near_stop": float(near)}
 
 

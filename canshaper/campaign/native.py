@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from canshaper.campaign.draw import Setting, driven_axes
-from canshaper.codec.frame import Frame
+from canshaper.campaign.operators import Numbered
+from canshaper.codec.layout import CLASSICAL_BYTES
 from canshaper.design.lockstep import Joysticks
 from canshaper.errors import ConfigError, NativeError
 from canshaper.machine.deployment import Deployment
+from canshaper.native.fmu import FMU_FILES
 from canshaper.native.library import NativeLibrary
 from canshaper_sim.axes import TIP_AXES
 from canshaper_sim.crane import FULL_SPEEDS, INTERNAL_STEP_S, CraneParameters
@@ -30,11 +32,10 @@ from canshaper_sim.valve import ValveParameters
 from canshaper_sim.valve_frames import CommandReader
 
 SOURCES = Path(__file__).with_name("c")
+QUICK = ("-O3", "-flto", "-fno-semantic-interposition")
 PROBES = 256  # of sine, cosine and exponential function, which libraries round differently
-_FRAME = np.dtype(
-    [("id", "u4"), ("bus", "i4"), ("length", "i4"), ("extended", "?"), ("data", "u1", 8)],
-    align=True,
-)
+_FRAME_BYTES = 12
+_ARRIVAL = np.dtype([("number", "i4"), ("changed", "u1", CLASSICAL_BYTES)])
 _VALVE = [
     "dead_time_s",
     "deadband",
@@ -49,7 +50,7 @@ _MEASURES = (
     *("still_s", "residual_deg", "peak_deg", "run_on_s", "run_on_m"),
     *("travel_error_s", "dip_pct"),
 )
-_COLUMNS = 15  # of what is measured
+_COLUMNS = 13  # of what is measured
 _GRAPPLE = ("l1_m", "l2_m", "m1_kg", "m2_kg", "c5_n_m_s_rad", "c6_n_m_s_rad", "g_m_s2")
 # Of what the C has no part for: as it is by default.
 _ABSENT = ("boom", "contact", "log", "pump_flow", "ends")
@@ -101,10 +102,18 @@ class NativeCrane:
     def __init__(
         self, deployment: Deployment, sources: Path = SOURCES, *, keeps: bool = True
     ) -> None:
-        files = (f"-I{sources}", f"{sources}/cs_plant.c", f"{sources}/cs_measure.c")
-        library = NativeLibrary(deployment, *files, cache=_cache_folder() if keeps else None)
+        files = (
+            f"-I{sources}",
+            f"-I{FMU_FILES}",
+            f"{sources}/cs_plant.c",
+            f"{sources}/cs_measure.c",
+        )
+        cache = _cache_folder() if keeps else None
+        try:
+            library = NativeLibrary(deployment, *QUICK, *files, cache=cache)
+        except NativeError:  # a compiler that has no link-time optimisation
+            library = NativeLibrary(deployment, *files, cache=cache)
         self._c, self._deployment = library.c, deployment
-        self._buses = library.buses
         _check_functions(self._c)
         crane, moved = driven_axes(deployment)
         named = [*cranes(deployment)]
@@ -124,13 +133,15 @@ class NativeCrane:
         self._wiring = [_wiring(deployment, axes.get(one)) for one in TIP_AXES]
 
         still = Script("still", (), 1.0)
-        cycles_ms = Hand(deployment).cycles_ms
-        self._drive = _drive_type(len(cycles_ms))
+        self._hand = Hand(deployment)
+        self._drive = _drive_type(len(self._hand.cycles_ms))
         self._neutral = []  # anti-sway on, off
         for off in (False, True):
-            first = self._packed(JoystickNode(deployment, still, bypass=off), 1)[1]["data"]
-            pairs = zip(cycles_ms, first.tolist(), strict=True)
-            self._neutral.append(tuple((cycle_ms, tuple(data)) for cycle_ms, data in pairs))
+            first = JoystickNode(deployment, still, bypass=off).frames(0)
+            pairs = [*zip(self._hand.cycles_ms, first, strict=True)]
+            self._neutral.append(tuple((ms, tuple(one.data)) for ms, one in pairs))
+            sent = [(ms, bytes(len(one.data))) for ms, one in pairs]
+        self._numbered = Numbered(self._hand, sent)
 
     def has(self, setting: Setting) -> bool:
         """Whether the C has a part for all of the crane that was drawn."""
@@ -180,36 +191,33 @@ class NativeCrane:
                 for axis, wired in zip(TIP_AXES, self._wiring, strict=True)
             ),
         )
-        frames: list[Any] = [None, None]
+        arrivals: Sequence[Any] = (None, None)
         if disturb := options.get("disturb"):
-            hands = disturb(JoystickNode(self._deployment, script, bypass=bypass))
-            frames = [*self._packed(hands, ticks)]
+            arrivals = self._arrivals(disturb(self._numbered), ticks)
+        frames_n = sum(ticks * tick_ms // ms + 1 for ms in self._hand.cycles_ms)
         empty, measures = (
             np.array(grapple_numbers(parameters.grapple)),
             np.zeros(len(_MEASURES) + 1),
         )
         loaded = np.array([[at, *grapple_numbers(one)] for at, one in loads])
-        arrays = [empty, loaded, np.array(strokes), *frames, np.empty((_COLUMNS, ticks)), measures]
+        made, columns = np.empty(frames_n * _FRAME_BYTES, np.uint8), np.empty((_COLUMNS, ticks))
+        arrays = [empty, loaded, np.array(strokes), made, *arrivals, columns, measures]
         at = (None if one is None else one.ctypes.data_as(ctypes.c_void_p) for one in arrays)
         self._c.cs_drive(ctypes.byref(drive), *at)
         *values, swung_over = measures.tolist()
         named = zip(_MEASURES, values, strict=True)
         return {name: None if math.isnan(one) else one for name, one in named}, bool(swung_over)
 
-    def _packed(self, hands: Joysticks, ticks: int) -> tuple[Any, Any]:
-        """How many joystick frames come in each tick, and the frames, as arrays."""
+    def _arrivals(self, hands: Joysticks, ticks: int) -> tuple[Any, Any]:
+        """How many joystick frames come in each tick, and which ones, as arrays."""
         tick_ms = self._deployment.config.tick_ms
         by_tick = [hands.frames_of_tick(k * tick_ms, tick_ms) for k in range(ticks)]
-        flat: list[Frame] = [frame for frames in by_tick for frame in frames]
-        array = np.zeros(max(1, len(flat)), _FRAME)
-        if flat:
-            buses, ids, extended, data = zip(*flat, strict=True)
-            array["id"][:], array["extended"][:] = ids, extended
-            array["bus"][:] = [self._buses.index(bus) for bus in buses]
-            array["length"][:] = [*map(len, data)]
-            joined = b"".join(one.ljust(8, b"\0") for one in data)
-            array["data"][:] = np.frombuffer(joined, np.uint8).reshape(-1, 8)
-        return np.array([*map(len, by_tick)], np.int32), array
+        came = [frame for frames in by_tick for frame in frames]
+        changed = b"".join([data.ljust(CLASSICAL_BYTES, b"\0") for *_, data in came])
+        arrivals = np.empty(len(came), _ARRIVAL)
+        arrivals["number"] = [number for _, number, *_ in came]
+        arrivals["changed"] = np.frombuffer(changed, np.uint8).reshape(-1, CLASSICAL_BYTES)
+        return np.array([*map(len, by_tick)], np.int32), arrivals
 
 
 def _cache_folder() -> Path:

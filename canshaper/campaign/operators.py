@@ -3,6 +3,7 @@
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from typing import TypeVar
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Joysticks
 from canshaper_sim.axes import WITHOUT_SWAY
+from canshaper_sim.hand import Hand
 from canshaper_sim.operator import random_script, reach_s
 from canshaper_sim.strokes import Script, Stroke
 
@@ -177,6 +179,32 @@ class _Disturbed:
                 data = value.to_bytes(len(frame.data), "little")
                 arrived.append(frame._replace(data=data))
         return arrived
+
+
+class Numbered:
+    """Joystick frames as numbers, in the order in which the C makes them, and no bit of them set.
+
+    Args:
+        hand: when they are due.
+        sent: cycle, ms, and bytes of each joystick's.
+    """
+
+    def __init__(self, hand: Hand, sent: Sequence[tuple[int, bytes]]) -> None:
+        self._hand, self._sent, self._numbers = hand, sent, count()
+        self._by_tick: list[list[Frame]] = []  # the same in every drive
+
+    def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
+        """Frames that came since the last tick, in order."""
+        while len(self._by_tick) * tick_ms <= time_ms:
+            self._by_tick.append(
+                [
+                    Frame("", next(self._numbers), False, data)
+                    for ms in self._hand.due(len(self._by_tick) * tick_ms, tick_ms)
+                    for cycle_ms, data in self._sent
+                    if ms % cycle_ms == 0
+                ]
+            )
+        return self._by_tick[time_ms // tick_ms]
 
 
 def bus_fault(draw: Draw, duration_s: float) -> Fault:

@@ -140,7 +140,8 @@ def controller_unit(deployment: Deployment) -> Unit:
             Variable(f"{name}.state", "State of the axis", "State"),
             Variable(f"{name}.reason", "Why it is in that state", "Reason"),
         ]
-    files = [*(C_FILES / "src").glob("*.[ch]"), *FMU_FILES.glob("cs_unit_controller.c")]
+    files = [*(C_FILES / "src").glob("*.[ch]")]
+    files += [FMU_FILES / name for name in ("cs_number.h", "cs_unit_controller.c")]
     return Unit(
         "controller",
         f"Anti-sway of {deployment.path.name}: joysticks to valves",

@@ -92,7 +92,7 @@ def compile_library(files: Iterable[Path], library: Path, *more: str) -> None:
 def _content(numbers: Numbers, sources: Path, more: Iterable[str]) -> str:
     """Hash of all that a library is made of."""
     version = subprocess.run([*compiler(), "--version"], capture_output=True, check=False).stdout
-    folders = [sources, *(Path(m).parent for m in more if m.endswith(".c"))]
+    folders = [sources, *(Path(m[2:]) for m in more if m.startswith("-I"))]
     files = [file for folder in folders for file in sorted(folder.rglob("*.[ch]"))]
     text = f"{compiler()}{FLAGS}{more}{sizes_source(numbers)}{tables_source(numbers)}"
     parts = [version, text.encode(), *(path.read_bytes() for path in files)]

@@ -13,7 +13,7 @@ TYPES = {
 }
 # Members that are pointers to arrays of their own.
 APART = {
-    "taps": "cs_real",
+    "runs": "cs_run",
     "curve_command": "cs_real",
     "curve_speed": "cs_real",
     "codes": "cs_code",

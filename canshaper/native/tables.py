@@ -8,6 +8,7 @@ hangs on them.
 
 import math
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 from cantools.database.can import Message
@@ -236,7 +237,9 @@ def _filter(axis: ShapedAxis) -> Numbers:
     fir = shaper._shaper if isinstance(shaper, LimitAware) else shaper
     gff = shaper._gff if isinstance(shaper, LimitAware) else shaper
     if isinstance(fir, Fir):
-        numbers |= {"taps": [*fir.taps], "taps_n": len(fir.taps)}
+        pairs = enumerate(pairwise((*fir.taps, math.inf)), 1)
+        runs = [{"end": end, "tap": tap} for end, (tap, following) in pairs if tap != following]
+        numbers |= {"runs": runs, "runs_n": len(runs), "taps_n": len(fir.taps)}
     if isinstance(gff, Gff):
         numbers |= {"k1": gff.k1, "k2": gff.k2, "share": gff._share}
     if isinstance(shaper, FirstOrder):

@@ -11,11 +11,10 @@ from tests.rigs.files import CONFIG, read
 
 # File, what stands there, what stands there instead, and what shows it first.
 MUTANTS = {
-    "a sum in the order of the ring": (
+    "a sum that is rounded as it grows": (
         "cs_math.c",
-        "return rounded(parts, parts_n);",
-        "at = 0; cs_real x = 0;"
-        " while (at < n) { x += taps[at] * history[(newest + at) % n]; at++; } return x;",
+        "if (small != 0) {",
+        "if (0 * small != 0) {",
         "unlimited",
     ),
     "a sum that is rounded twice": ("cs_math.c", "high = next;", "high = high;", "unlimited"),
@@ -42,10 +41,11 @@ MUTANTS = {
     ),
     "missed ticks of the tail": (
         "cs_limits.c",
-        "(a->aged || (leaving == e->high))",
-        "(leaving == e->high)",
+        "(a->aged || ((leaving == e->high)",
+        "(((leaving == e->high)",
         "demanded_high",
     ),
+    "a demand that leaves late": ("cs_limits.c", "oldest != e->high", "false", "commanded"),
     "a fall that ends at zero": ("cs_limits.c", "(from > c->fall)", "(from >= c->fall)", "ramp"),
     "a switch that is lost was pressed": (
         "cs_states.c",

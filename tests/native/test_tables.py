@@ -111,8 +111,9 @@ def test_a_filter_of_another_class_is_refused(
 def test_the_numbers_are_exact() -> None:
     found = tables(read(CONFIG / "forwarder-robust.yaml"))
     source = tables_source(found)
-    taps = found["axis"][0]["taps"]
-    assert f"{{R({taps[0].hex()}), R({taps[1].hex()})" in source
+    first, second, *_ = found["axis"][0]["runs"]
+    assert (first["end"], second["end"], len(found["axis"][0]["runs"])) == (2, 3, 9)
+    assert f"{{{{.end = 2, .tap = R({first['tap'].hex()})}}, {{.end = 3, .tap = R(" in source
     assert ".run_on = HUGE_VAL" in source  # of lift, which no distance bounds
     assert "#define CS_TAPS 91\n#define CS_WINDOW 111\n" in sizes_source(found)
 

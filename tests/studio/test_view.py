@@ -8,6 +8,7 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.valve_messages import Counters
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.shaping.states import Reason, State
 from canshaper.studio.server import drawn_of

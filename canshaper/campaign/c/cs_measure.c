@@ -80,10 +80,13 @@ void cs_measure(const drive_look *d, double *const *out, int32_t n, double *meas
         const double *joystick = out[JOYSTICK + i];
         if (d->axis[i] == CS_NONE) { continue; }
         double most = cs_tables.axis[d->axis[i]].maximum;
-        for (int32_t k = 0; k < n; k++) { out[CLIPPED][k] = fmin(fmax(joystick[k], -most), most); }
-        double asked = cs_sum_of_products(out[ONE], out[CLIPPED], 0, n);
-        double way = cs_sum_of_products(out[ONE], out[SPEED + i], 0, n);
-        largest(&measures[TRAVEL_ERROR], fabs(way - asked) * ((double)d->tick_ms / 1000.0));
+        cs_sum asked = {.n = 0}, way = {.n = 0};
+        for (int32_t k = 0; k < n; k++) {
+            cs_sum_add(&asked, fmin(fmax(joystick[k], -most), most));
+            cs_sum_add(&way, out[SPEED + i][k]);
+        }
+        double error = fabs(cs_sum_value(&way) - cs_sum_value(&asked));
+        largest(&measures[TRAVEL_ERROR], error * ((double)d->tick_ms / 1000.0));
         for (int32_t k = 0, end; k < n; k = end) {
             for (end = k + 1; (end < n) && (side(joystick[end]) == side(joystick[k])); end++) { }
             if (side(joystick[k]) != 0) { largest(&measures[DIP], dip_of(d, joystick, out[SENT + i], k, end)); }

@@ -15,6 +15,7 @@ enum { SLEW, NEAR_FAR, LIFT, COORDINATES };
 #else
 #include "cs_internal.h"
 #include "cs_measure.h"
+#include "cs_number.h"
 #endif
 
 #define PENDING 256 /* changes of a command within the longest dead time, 0.2 s, of ticks of 1 ms */
@@ -232,8 +233,10 @@ static bool crane_tick(crane_state *s, const plant_grapple *q)
 
 #ifndef CS_CRANE_ALONE
 typedef struct { double time_s; plant_grapple grapple; } plant_load;
-typedef struct { double start, past, duration, ramp, level, axis; } plant_stroke; /* in order of time */
+typedef struct { double start, past, duration, ramp, level, axis; } plant_stroke; /* in order of axis, then time */
 typedef struct { int64_t cycle_ms; uint8_t neutral[CS_BYTES]; } plant_joystick;
+typedef struct { int32_t joystick; uint8_t data[CS_BYTES]; } plant_frame;
+typedef struct { int32_t number; uint8_t changed[CS_BYTES]; } plant_arrival; /* of the frame that was made as such */
 typedef struct {
     plant_valve valve[COORDINATES];
     plant_joystick joystick[CS_JOYSTICKS];
@@ -242,48 +245,31 @@ typedef struct {
     int32_t steps, ticks, loads_n, strokes_n, radius; /* radius: the crane sends it */
 } plant_drive;
 
-/* A valve decodes for itself: what the DBC says of the bits. */
-static int64_t number_in(const cs_field *f, const uint8_t *data)
-{
-    uint64_t value = 0;
-    int32_t bit = f->start;
-    for (int32_t i = 0; i < f->length; i++) {
-        uint64_t one = ((uint32_t)data[bit / 8] >> (bit % 8)) & 1U;
-        if (f->motorola) {
-            value = (value << 1) | one;
-            bit = ((bit % 8) == 0) ? (bit + 15) : (bit - 1);
-        } else {
-            value |= one << i;
-            bit++;
-        }
-    }
-    bool negative = f->is_signed && ((value >> (f->length - 1)) & 1U);
-    return (int64_t)value - (negative ? ((int64_t)1 << f->length) : 0);
-}
-
 static double command_in(const plant_valve *p, const cs_frame *out, int32_t frames, double held)
 {
     const cs_axis_config *axis = &cs_tables.axis[p->axis];
     const cs_valve_config *valve = &cs_tables.valve[axis->valve];
     for (int32_t i = 0; i < frames; i++) {
         if ((out[i].id == valve->id) && (out[i].bus == valve->bus) && (out[i].extended == valve->extended)) {
-            int64_t steps = p->step * (number_in(&axis->setpoint, out[i].data) - p->zero);
-            held = (llabs(steps) <= p->full) ? ((double)steps / (double)p->full) : 0.0;
+            int32_t steps = p->step * (cs_field_read(&axis->setpoint, out[i].data) - p->zero);
+            held = (abs(steps) <= p->full) ? ((double)steps / (double)p->full) : 0.0;
         }
     }
     return held;
 }
 
-/* Joystick value of an axis. */
-static double joystick_at(const plant_drive *d, const plant_stroke *strokes, int32_t axis, double time_s)
+/* Strokes of an axis that are not over, and the state of a joystick's sender. */
+typedef struct { const plant_stroke *next, *end; } plant_hand;
+typedef struct { int64_t due_ms; int32_t sent; } plant_sender;
+
+/* Joystick value of an axis, at a time that is not before the last one. */
+static double joystick_at(plant_hand *h, double time_s)
 {
     double value = 0.0;
-    for (int32_t i = 0; i < d->strokes_n; i++) {
-        const plant_stroke *one = &strokes[i];
+    while ((h->next < h->end) && (time_s > h->next->past)) { h->next++; }
+    for (const plant_stroke *one = h->next; (one < h->end) && (time_s >= one->start); one++) {
         double press = time_s - one->start, release = press - one->duration;
-        if (((int32_t)one->axis != axis) || (press < 0.0) || (time_s > one->past) || (release >= one->ramp)) {
-            continue;
-        }
+        if ((time_s > one->past) || (release >= one->ramp)) { continue; }
         if (release > 0.0) { value += one->level * (1.0 - (release / one->ramp)); }
         else if (press < one->ramp) { value += (one->level * press) / one->ramp; }
         else { value += one->level; }
@@ -291,35 +277,32 @@ static double joystick_at(const plant_drive *d, const plant_stroke *strokes, int
     return fmin(fmax(value, -1.0), 1.0);
 }
 
-/* Raw value nearest to a physical one, within the bits of a field. */
-static int32_t raw_of(const cs_number_config *c, double value)
+/* Make the joystick frames that are due since the last tick; returns how many there are now. */
+static int32_t make_frames(const plant_drive *d, plant_hand *hands, plant_sender *senders, int64_t now_ms,
+                           plant_frame *made, int32_t n)
 {
-    int32_t bits = c->field.length - (c->field.is_signed ? 1 : 0);
-    double least = c->field.is_signed ? -ldexp(1.0, bits) : 0.0;
-    return (int32_t)fmin(fmax(rint((value - c->offset) / c->scale), least), ldexp(1.0, bits) - 1.0);
+    for (;;) {
+        int32_t i = 0; /* whose frame is the next one */
+        for (int32_t k = 1; k < cs_tables.joysticks_n; k++) { i = (senders[k].due_ms < senders[i].due_ms) ? k : i; }
+        const cs_joystick_config *j = &cs_tables.joystick[i];
+        double at_s = (double)senders[i].due_ms / 1000.0;
+        uint8_t *data = made[n].data;
+        if (senders[i].due_ms > now_ms) { return n; }
+        senders[i].due_ms += d->joystick[i].cycle_ms;
+        made[n++].joystick = i;
+        memcpy(data, d->joystick[i].neutral, CS_BYTES);
+        for (int32_t k = 0; k < cs_tables.axes_n; k++) {
+            const cs_axis_config *axis = &cs_tables.axis[k];
+            if (axis->joystick == i) { cs_number_write(&j->number[axis->number], data, joystick_at(&hands[k], at_s)); }
+        }
+        senders[i].sent = (j->message.counts > 0) ? ((senders[i].sent + 1) % j->message.counts) : 0;
+        cs_field_write(&j->message.counter, data, senders[i].sent);
+    }
 }
 
-/* Send the joystick frames that are due since the last tick; sent: how many each joystick has sent. */
-static void send_joysticks(cs_controller *s, const plant_drive *d, const plant_stroke *strokes, int64_t now_ms,
-                           int32_t *sent)
+static void arrive(cs_controller *s, const cs_message_config *m, const uint8_t *data, int64_t now)
 {
-    for (int64_t ms = (now_ms < d->tick_ms) ? 0 : (now_ms - d->tick_ms + 1); ms <= now_ms; ms++) {
-        for (int32_t i = 0; i < cs_tables.joysticks_n; i++) {
-            const cs_joystick_config *j = &cs_tables.joystick[i];
-            const cs_message_config *m = &j->message;
-            uint8_t data[CS_BYTES];
-            if ((ms % d->joystick[i].cycle_ms) != 0) { continue; }
-            memcpy(data, d->joystick[i].neutral, sizeof(data));
-            for (int32_t k = 0; k < cs_tables.axes_n; k++) {
-                const cs_number_config *n = &j->number[cs_tables.axis[k].number];
-                if (cs_tables.axis[k].joystick != i) { continue; }
-                cs_field_write(&n->field, data, raw_of(n, n->full * joystick_at(d, strokes, k, (double)ms / 1000.0)));
-            }
-            sent[i] = (m->counts > 0) ? ((sent[i] + 1) % m->counts) : 0;
-            cs_field_write(&m->counter, data, sent[i]);
-            cs_receive(s, &cs_tables, m->bus, m->id, m->extended, data, m->length, now_ms * 1000000);
-        }
-    }
+    cs_receive(s, &cs_tables, m->bus, m->id, m->extended, data, m->length, now);
 }
 
 /* The crane measures the radius of its tip and sends it, as the controller receives it. */
@@ -328,15 +311,16 @@ static void send_radius(cs_controller *s, double radius, int64_t now)
     for (int32_t i = 0; i < cs_tables.motions_n; i++) {
         const cs_motion_config *m = &cs_tables.motion[i];
         uint8_t data[CS_BYTES] = {0};
-        cs_field_write(&m->radius.field, data, raw_of(&m->radius, radius));
-        cs_receive(s, &cs_tables, m->message.bus, m->message.id, m->message.extended, data, m->message.length, now);
+        cs_number_write(&m->radius, data, radius);
+        arrive(s, &m->message, data, now);
     }
 }
 
-/* Drive and measure. counts, in: joystick frames before each tick; NULL: those that the strokes give. work: COLUMNS of
-   d->ticks each. A grapple above the horizontal ends the drive. */
+/* Drive and measure. made: room for the joystick frames of the drive. counts: how many of arrivals come before each
+   tick; NULL: all that were made. work: COLUMNS of d->ticks each. A grapple above the horizontal ends the drive. */
 void cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load *load, const plant_stroke *strokes,
-              const int32_t *counts, const cs_frame *in, double *work, double *measures)
+              plant_frame *made, const int32_t *counts, const plant_arrival *arrivals, double *work,
+              double *measures)
 {
     cs_controller s;
     cs_frame frames[CS_VALVES];
@@ -346,18 +330,29 @@ void cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load
     double held[COORDINATES] = {0.0};
     double *out[COLUMNS];
     const plant_grapple *q = empty;
-    int32_t next = 0, n = 0, sent_by[CS_JOYSTICKS] = {0};
+    plant_hand hands[CS_AXES] = {{NULL, NULL}};
+    plant_sender senders[CS_JOYSTICKS] = {{0, 0}};
+    int32_t next = 0, n = 0, made_n = 0;
     bool over = false;
     cs_init(&s, &cs_tables);
     crane_begin(&crane, d->valve, d->sway, d->step_s, d->steps);
+    for (int32_t i = 0; i < d->strokes_n; i++) {
+        plant_hand *h = &hands[(int32_t)strokes[i].axis];
+        h->next = (h->next == NULL) ? &strokes[i] : h->next;
+        h->end = &strokes[i + 1];
+    }
     for (int32_t i = 0; i < COLUMNS; i++) { out[i] = &work[i * d->ticks]; }
     for (int32_t k = 0; (k < d->ticks) && !over; k++, n++) {
         int64_t ms = k * d->tick_ms, now = ms * 1000000;
         while ((next < d->loads_n) && ((double)ms >= (1000.0 * load[next].time_s))) { q = &load[next++].grapple; }
         if ((k > 0) && d->radius) { send_radius(&s, a[NEAR_FAR].position, now); }
-        if (counts == NULL) { send_joysticks(&s, d, strokes, ms, sent_by); }
-        for (int32_t j = 0; (counts != NULL) && (j < counts[k]); j++, in++) {
-            cs_receive(&s, &cs_tables, in->bus, in->id, in->extended, in->data, in->length, now);
+        int32_t first = made_n;
+        made_n = make_frames(d, hands, senders, ms, made, made_n);
+        for (int32_t j = 0, in_n = (counts == NULL) ? (made_n - first) : counts[k]; j < in_n; j++) {
+            const plant_arrival in = (counts == NULL) ? (plant_arrival){first + j, {0}} : *arrivals++;
+            plant_frame frame = made[in.number];
+            for (int32_t i = 0; i < CS_BYTES; i++) { frame.data[i] ^= in.changed[i]; }
+            arrive(&s, &cs_tables.joystick[frame.joystick].message, frame.data, now);
         }
         int32_t sent = cs_tick(&s, &cs_tables, now, 0, frames);
         for (int32_t i = 0; i < COORDINATES; i++) {
@@ -368,7 +363,7 @@ void cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load
         out[FASTEST][k] = 0.0;
         for (int32_t i = 0; i < COORDINATES; i++) {
             int32_t axis = d->valve[i].axis;
-            out[JOYSTICK + i][k] = (axis == CS_NONE) ? 0.0 : joystick_at(d, strokes, axis, (double)ms / 1000.0);
+            out[JOYSTICK + i][k] = (axis == CS_NONE) ? 0.0 : joystick_at(&hands[axis], (double)ms / 1000.0);
             out[SENT + i][k] = (axis == CS_NONE) ? 0.0 : cs_velocity(&cs_tables.axis[axis], held[i]);
             out[SPEED + i][k] = (axis == CS_NONE) ? 0.0 : (a[i].speed / d->valve[i].nominal);
             out[FASTEST][k] = fmax(out[FASTEST][k], fabs(out[SPEED + i][k]));
@@ -376,7 +371,6 @@ void cs_drive(const plant_drive *d, const plant_grapple *empty, const plant_load
         out[TIP_X][k] = a[NEAR_FAR].position * cos(a[SLEW].position);
         out[TIP_Y][k] = a[NEAR_FAR].position * sin(a[SLEW].position);
         out[SWING][k] = cs_hypot(x[0] * (180.0 / PI), x[1] * (180.0 / PI));
-        out[ONE][k] = 1.0;
     }
     const drive_look look = {{d->valve[SLEW].axis, d->valve[NEAR_FAR].axis, d->valve[LIFT].axis},
                              d->tick_ms, d->dwell_s, d->still_deg};

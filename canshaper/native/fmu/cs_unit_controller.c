@@ -1,6 +1,7 @@
 /* The controller as a unit: values to joystick frames, valve frames to values. The controller is that of the export. */
 #include "cs_fmu.h"
 #include "cs_internal.h"
+#include "cs_number.h"
 
 const size_t cs_unit_size = sizeof(cs_controller);
 
@@ -8,14 +9,6 @@ const char *cs_unit_begin(void *state)
 {
     cs_init(state, &cs_tables);
     return cs_arithmetic() ? NULL : "expected IEEE 754 arithmetic without contraction: compile with -ffp-contract=off";
-}
-
-/* The raw value nearest to a value; what the field does not hold is the end of it. */
-static void write_value(const cs_number_config *c, uint8_t *data, double value)
-{
-    double least = c->field.is_signed ? -ldexp(1.0, c->field.length - 1) : 0.0;
-    double raw = rint(((value * (double)c->full) - (double)c->offset) / (double)c->scale);
-    cs_field_write(&c->field, data, (int64_t)fmin(fmax(raw, least), (least + ldexp(1.0, c->field.length)) - 1.0));
 }
 
 static void send(cs_controller *s, const cs_message_config *c, uint8_t *data, int64_t tick, int64_t now_ns)
@@ -36,7 +29,7 @@ const char *cs_unit_tick(void *state, int64_t tick, double *value)
         cs_field_write(&c->enable, data, *in++ != 0.0);
         cs_field_write(&c->reset, data, *in++ != 0.0);
         cs_field_write(&c->off, data, *in++ != 0.0);
-        for (int32_t k = 0; k < c->numbers_n; k++) { write_value(&c->number[k], data, *in++); }
+        for (int32_t k = 0; k < c->numbers_n; k++) { cs_number_write(&c->number[k], data, *in++); }
         send(s, &c->message, data, tick, now_ns);
     }
     for (int32_t i = 0; i < cs_tables.motions_n; i++) {
@@ -44,7 +37,7 @@ const char *cs_unit_tick(void *state, int64_t tick, double *value)
         uint8_t data[CS_BYTES] = {0};
         double radius = c->measured ? *in++ : 0.0;
         if (radius > 0.0) { /* otherwise no one measures it */
-            write_value(&c->radius, data, radius);
+            cs_number_write(&c->radius, data, radius);
             send(s, &c->message, data, tick, now_ns);
         }
     }

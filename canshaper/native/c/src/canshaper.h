@@ -40,7 +40,8 @@ typedef double cs_real;
 
 #define CS_NONE (-1)
 #define CS_NEVER INT64_MIN
-#define CS_BYTES 8 /* of a frame: classical CAN */
+#define CS_BYTES 8  /* of a frame: classical CAN */
+#define CS_PARTS 24 /* of a sum: each has digits of its own, so that so many hold every sum of numbers up to 2^140 */
 
 /* States of an axis, and the reasons for them that the program names: numbers of docs/states.md. From 32 on a reason
    stops an axis through its filter, from 64 on it makes it neutral at once, latched. */
@@ -82,12 +83,15 @@ typedef struct {
     int32_t bus, length; uint32_t id; bool extended; uint8_t start[CS_BYTES]; cs_field counter; int32_t counts;
 } cs_valve_config;
 
+/* Equal taps of a FIR, one after the other; end: how many taps stand before the next ones. */
+typedef struct { int32_t end; cs_real tap; } cs_run;
+
 typedef struct {
     /* in: a number of a joystick; out: steps in the frame of a valve, which leaves with the axis that sends */
     int32_t joystick, number, valve, period_ticks; bool sends; cs_field setpoint; int32_t zero, sign;
-    /* sway model; filter: taps of a FIR, share, rate and change of rate of the others */
+    /* sway model; filter: runs of taps of a FIR, share, rate and change of rate of the others */
     int32_t kind; bool sways; cs_real f11, f12, f21, f22, k1, k2, share, rate, change, tick_s, fade;
-    const cs_real *taps; int32_t taps_n;
+    const cs_run *runs; int32_t runs_n, taps_n;
     /* limits: docs/deployment.md; the curve stands in place of the dead band */
     cs_real neutral_band, maximum, minimum, rise, fall, fall_per_s, deadband, run_on, small_least, small_most;
     const cs_real *curve_command, *curve_speed; int32_t curve_n;
@@ -124,6 +128,8 @@ typedef struct {
 } cs_joystick;
 typedef struct { uint8_t data[CS_BYTES]; int32_t count; } cs_valve;
 typedef struct { cs_real command; int32_t fault, trip; bool enabled, bypass, reset; } cs_input;
+/* A sum without an error, as parts that do not overlap, the smallest first. */
+typedef struct { cs_real part[CS_PARTS]; int32_t n; } cs_sum;
 /* Smallest and largest of the demands within the tail, 0 included, and how many of them count. */
 typedef struct { cs_real low, high; int32_t low_n, high_n; } cs_extremes;
 /* Steps in the frame, the velocity of them, the part that is added, the rest; both ramps, what rounding left out. */
@@ -134,8 +140,8 @@ typedef struct {
 typedef struct {
     int32_t state, reason, stopping; bool was_enabled, was_reset;
     /* sway model and its twin; what the filter remembers; transfer to and from bypass */
-    cs_real angle, rate, twin_angle, twin_rate, unlimited, value, slope, offset, history[CS_TAPS];
-    int32_t newest; bool joins, bypassed;
+    cs_real angle, rate, twin_angle, twin_rate, unlimited, value, slope, offset, history[CS_TAPS + 1];
+    cs_sum sum; int32_t newest; bool joins, bypassed;
     /* commanded: the operator demanded motion within the tail */
     cs_output out; cs_real command, ran, side, due, left; bool commanded, asked, unattended, aged;
     int32_t no_run_on, crossed, added_left, rested, demand_at; cs_real demands[CS_WINDOW];

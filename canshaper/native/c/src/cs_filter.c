@@ -14,11 +14,24 @@ void cs_sway_step(cs_real *angle, cs_real *rate, const cs_axis_config *c, cs_rea
     *rate += (c->f21 * before) + (c->f22 * swing);
 }
 
+/* Exact sum of the rounded products of taps and commands, rounded once, as math.fsum. From tick to tick only the command
+   that a run of equal taps begins with, and the one that it has left, change it. */
 static cs_real fir(cs_axis *a, const cs_axis_config *c, cs_real command)
 {
-    a->newest = (a->newest == 0) ? (c->taps_n - 1) : (a->newest - 1);
+    int32_t n = c->taps_n + 1; /* with the command that has left the last run */
+    cs_real begins = command;
+    a->newest = (a->newest == 0) ? c->taps_n : (a->newest - 1);
     a->history[a->newest] = command;
-    return cs_sum_of_products(c->taps, a->history, a->newest, c->taps_n);
+    for (int32_t i = 0; i < c->runs_n; i++) {
+        int32_t at = a->newest + c->runs[i].end;
+        cs_real left = a->history[(at < n) ? at : (at - n)];
+        if (begins != left) {
+            cs_sum_add(&a->sum, c->runs[i].tap * begins);
+            cs_sum_add(&a->sum, -c->runs[i].tap * left);
+        }
+        begins = left;
+    }
+    return cs_sum_value(&a->sum);
 }
 
 /* A FIR; the model is driven by what was sent, its twin by what the FIR asked for: the difference is what limits made. */

@@ -3,38 +3,38 @@
 
 /* -- fields */
 
-static int32_t next_bit(const cs_field *f, int32_t bit)
+/* The bytes in which a field of up to 24 bits stands, and how far its lowest bit is from that of them all. */
+typedef struct { int32_t first, n; uint32_t shift, mask; } place;
+
+static place place_of(const cs_field *f)
 {
-    int32_t motorola = ((bit % 8) == 0) ? (bit + 15) : (bit - 1); /* down in a byte, then the highest of the next one */
-    return f->motorola ? motorola : (bit + 1);
+    int32_t before = f->motorola ? (7 - (f->start % 8)) : (f->start % 8); /* bits of the first byte */
+    int32_t n = (before + f->length + 7) / 8;
+    int32_t shift = f->motorola ? ((8 * n) - before - f->length) : before;
+    return (place){f->start / 8, n, (uint32_t)shift, (1u << (uint32_t)f->length) - 1u};
 }
 
-/* Raw value of a field of up to 24 bits; 0 where there is none. */
-static int32_t field_read(const cs_field *f, const uint8_t *data)
+/* Raw value of a field; 0 where there is none. */
+int32_t cs_field_read(const cs_field *f, const uint8_t *data)
 {
-    int32_t value = 0;
-    int32_t weight = 1;
-    int32_t bit = f->start;
-    for (int32_t i = 0; i < f->length; i++) {
-        int32_t one = ((data[bit / 8] & (1u << (uint32_t)(bit % 8))) != 0u) ? 1 : 0;
-        value = f->motorola ? ((value * 2) + one) : (value + (weight * one));
-        weight *= 2;
-        bit = next_bit(f, bit);
-    }
-    return (f->is_signed && (value >= (weight / 2))) ? (value - weight) : value;
+    const place p = place_of(f);
+    uint32_t all = 0;
+    for (int32_t i = 0; i < p.n; i++) { all = (all << 8u) | data[p.first + (f->motorola ? i : ((p.n - 1) - i))]; }
+    int32_t value = (int32_t)((all >> p.shift) & p.mask);
+    int32_t half = (int32_t)((p.mask / 2u) + 1u);
+    return (f->is_signed && (value >= half)) ? (value - (2 * half)) : value;
 }
 
 void cs_field_write(const cs_field *f, uint8_t *data, int32_t value)
 {
-    uint32_t raw = (uint32_t)value;
-    int32_t bit = f->start;
-    for (int32_t i = 0; i < f->length; i++) {
-        uint32_t from = (uint32_t)(f->motorola ? ((f->length - 1) - i) : i);
-        uint32_t mask = 1u << (uint32_t)(bit % 8);
-        uint32_t byte = data[bit / 8];
-        byte = (((raw >> from) & 1u) != 0u) ? (byte | mask) : (byte & ~mask);
-        data[bit / 8] = (uint8_t)(byte & 0xFFu);
-        bit = next_bit(f, bit);
+    const place p = place_of(f);
+    uint32_t all = ((uint32_t)value & p.mask) << p.shift;
+    uint32_t mask = p.mask << p.shift;
+    for (int32_t i = 0; i < p.n; i++) {
+        int32_t at = p.first + (f->motorola ? ((p.n - 1) - i) : i);
+        data[at] = (uint8_t)(((data[at] & ~mask) | all) & 0xFFu);
+        all >>= 8u;
+        mask >>= 8u;
     }
 }
 
@@ -63,7 +63,7 @@ static void requalify(cs_message *m)
 /* Whether the counter of a frame follows the last one; after silence any other one does. */
 static bool in_sequence(cs_message *m, const cs_message_config *c, const uint8_t *data)
 {
-    int32_t count = field_read(&c->counter, data);
+    int32_t count = cs_field_read(&c->counter, data);
     int32_t step = (m->last == CS_NONE) ? 1 : (((count - m->last) + c->counts) % c->counts);
     bool jump = (step > c->max_step) && !m->resynced;
     bool ok = (step != 0) && !jump; /* repeated: no news */
@@ -96,7 +96,7 @@ static bool accepts(cs_message *m, const cs_message_config *c, const uint8_t *da
 /* Value of a number; why it is no measurement, or CS_NONE. */
 static int32_t number_read(const cs_number_config *c, const uint8_t *data, cs_real *value)
 {
-    int32_t code = field_read(&c->field, data);
+    int32_t code = cs_field_read(&c->field, data);
     int32_t why = CS_NONE;
     for (int32_t i = 0; i < c->codes_n; i++) {
         if (code == c->codes[i].code) { why = c->codes[i].reason; }
@@ -141,7 +141,7 @@ static void take_numbers(cs_joystick *j, const cs_joystick_config *c, const uint
 void cs_joystick_receive(cs_joystick *j, const cs_joystick_config *c, const uint8_t *data, int64_t now_ns)
 {
     bool accepted = accepts(&j->message, &c->message, data, now_ns);
-    int32_t enable = field_read(&c->enable, data);
+    int32_t enable = cs_field_read(&c->enable, data);
     if (enable == 0) {
         j->releases++;
         j->released = true;
@@ -150,8 +150,8 @@ void cs_joystick_receive(cs_joystick *j, const cs_joystick_config *c, const uint
     if (accepted) {
         j->released = enable == 0;
         j->enable = enable;
-        j->reset = field_read(&c->reset, data);
-        j->off = field_read(&c->off, data);
+        j->reset = cs_field_read(&c->reset, data);
+        j->off = cs_field_read(&c->off, data);
         take_numbers(j, c, data, now_ns);
     }
 }

@@ -30,7 +30,8 @@ cs_real cs_max(cs_real a, cs_real b);
 int32_t cs_later(int32_t ticks, int32_t passed);
 int64_t cs_periods(int64_t now, int32_t period);
 bool cs_within(cs_real velocity, cs_real low, cs_real high, cs_real minimum, cs_real *out);
-cs_real cs_sum_of_products(const cs_real *taps, const cs_real *history, int32_t newest, int32_t n);
+void cs_sum_add(cs_sum *s, cs_real x);
+cs_real cs_sum_value(const cs_sum *s);
 cs_real cs_hypot(cs_real a, cs_real b);
 
 /* cs_filter.c */
@@ -66,6 +67,7 @@ void cs_axis_advance(cs_axis *a, const cs_axis_config *c);
 void cs_axis_hold(cs_axis *a, const cs_axis_config *c, int32_t ticks);
 
 /* cs_input.c */
+int32_t cs_field_read(const cs_field *f, const uint8_t *data);
 void cs_field_write(const cs_field *f, uint8_t *data, int32_t value);
 bool cs_fresh(int64_t since_ns, int64_t now_ns, int64_t timeout_ns);
 void cs_message_init(cs_message *m);

@@ -30,14 +30,15 @@ static void count(cs_extremes *e, const cs_axis_config *c)
     e->high_n += (e->high_n <= c->tail) ? 1 : 0;
 }
 
-/* Take the newest demand; all are looked at again only where the extreme so far has left. */
+/* Take the newest demand; all are looked at again only where an extreme may have left with the oldest one. */
 static void follow(cs_extremes *e, const cs_axis *a, const cs_axis_config *c, cs_real leaving)
 {
     cs_real demand = a->demands[a->demand_at];
+    cs_real oldest = a->demands[(a->demand_at >= c->tail) ? 0 : (a->demand_at + 1)];
     count(e, c);
-    bool again = (e->high != 0) && (a->aged || (leaving == e->high));
+    bool again = (demand < e->high) && (a->aged || ((leaving == e->high) && (oldest != e->high)));
     e->high = again ? extreme(a, c, e->high_n, true) : cs_max(e->high, demand);
-    again = (e->low != 0) && (a->aged || (leaving == e->low));
+    again = (demand > e->low) && (a->aged || ((leaving == e->low) && (oldest != e->low)));
     e->low = again ? extreme(a, c, e->low_n, false) : cs_min(e->low, demand);
 }
 

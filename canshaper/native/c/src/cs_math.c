@@ -1,8 +1,6 @@
 /* Sums and roots that are right to the last bit, and comparisons with the answers of Python's. */
 #include "cs_internal.h"
 
-#define PARTS 48 /* of a sum: each has digits of its own, so that so many hold every sum of doubles */
-
 cs_real cs_min(cs_real a, cs_real b) { return (b < a) ? b : a; }
 cs_real cs_max(cs_real a, cs_real b) { return (b > a) ? b : a; }
 
@@ -26,54 +24,46 @@ bool cs_within(cs_real velocity, cs_real low, cs_real high, cs_real minimum, cs_
     return ok;
 }
 
-/* Sum of parts, rounded once: half-way cases look at the sign of the part below. */
-static cs_real rounded(const cs_real *parts, int32_t parts_n)
+/* Add without an error (Shewchuk 1997). */
+void cs_sum_add(cs_sum *s, cs_real x)
 {
-    int32_t n = parts_n - 1;
-    cs_real high = (n >= 0) ? parts[n] : CS_R(0);
+    int32_t kept = 0;
+    for (int32_t i = 0; i < s->n; i++) {
+        cs_real part = s->part[i];
+        bool swap = CS_ABS(x) < CS_ABS(part);
+        cs_real large = swap ? part : x;
+        cs_real small = swap ? x : part;
+        x = large + small;
+        small -= x - large;
+        if (small != 0) {
+            s->part[kept] = small;
+            kept++;
+        }
+    }
+    if ((x != 0) && (kept < CS_PARTS)) {
+        s->part[kept] = x;
+        kept++;
+    }
+    s->n = kept;
+}
+
+/* A sum, rounded once: half-way cases look at the sign of the part below. */
+cs_real cs_sum_value(const cs_sum *s)
+{
+    int32_t n = s->n - 1;
+    cs_real high = (n >= 0) ? s->part[n] : CS_R(0);
     cs_real low = 0;
     while ((n > 0) && (low == 0)) {
         cs_real before = high;
         n--;
-        high = before + parts[n];
-        low = parts[n] - (high - before);
+        high = before + s->part[n];
+        low = s->part[n] - (high - before);
     }
-    if ((n > 0) && (((low < 0) && (parts[n - 1] < 0)) || ((low > 0) && (parts[n - 1] > 0)))) {
+    if ((n > 0) && (((low < 0) && (s->part[n - 1] < 0)) || ((low > 0) && (s->part[n - 1] > 0)))) {
         cs_real next = high + (low * 2);
         if ((low * 2) == (next - high)) { high = next; }
     }
     return high;
-}
-
-/* Exact sum of rounded products, rounded once (Shewchuk 1997), as math.fsum: the order of a ring changes with every
-   tick, and with the order the last bit of any other sum. */
-cs_real cs_sum_of_products(const cs_real *taps, const cs_real *history, int32_t newest, int32_t n)
-{
-    cs_real parts[PARTS];
-    int32_t parts_n = 0;
-    int32_t at = newest;
-    for (int32_t k = 0; k < n; k++) {
-        cs_real x = taps[k] * history[at];
-        int32_t kept = 0;
-        at = ((at + 1) == n) ? 0 : (at + 1);
-        for (int32_t j = 0; j < parts_n; j++) {
-            bool swap = CS_ABS(x) < CS_ABS(parts[j]);
-            cs_real large = swap ? parts[j] : x;
-            cs_real small = swap ? x : parts[j];
-            x = large + small;
-            small -= x - large;
-            if (small != 0) {
-                parts[kept] = small;
-                kept++;
-            }
-        }
-        parts_n = kept;
-        if ((x != 0) && (parts_n < PARTS)) {
-            parts[parts_n] = x;
-            parts_n++;
-        }
-    }
-    return rounded(parts, parts_n);
 }
 
 /* a * a as high + low, without an error (Dekker 1971). */
