@@ -31,6 +31,7 @@ from canshaper.errors import DesignError, InfeasibleError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import OnProgress
 from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.recorder import dwell_s
 
 # Seeds of the drives that choose and of those that judge; a campaign begins with 0.
 CHOOSING = range(1_000_000, 1_000_400)
@@ -43,6 +44,7 @@ _OPTIONS = {ROBUST: "--duration", GFF: "--max-run-on"}
 # which a G_FF that its run-on holds does not depend.
 _MIDDLES = (0.15, 0.3, 0.45)
 _RANGES = {ROBUST: (0.1, 0.2, 0.3), GFF: (0.2,)}
+_BEFORE = 0.9  # of the time from which on swing is left: what runs on longer swings then
 _DURATIONS = (0.8, 0.9, 1.0, 1.1, 1.2)  # of the front, of the run-on that is asked for
 
 
@@ -106,7 +108,7 @@ def design_fleet(
         deployment: the machine.
         kind: of the filters, robust or gff.
         duration_s: see ``Candidate``; None for that of the file's responses, or one swing, and of
-            G_FF for the tail of the file.
+            G_FF a little less than the time from which on swing counts as left.
         workers: drive the candidates.
         on_progress: called with the part that is done.
         front: quicker and slower ones too.
@@ -120,8 +122,8 @@ def design_fleet(
     axes, option = swinging(deployment), _OPTIONS[kind]
     NativeCrane(deployment)  # its faults are named before anything begins
     longest_s = min(deployment.axes[name].config.limits.tail_s for name in axes)
-    usual_s = longest_s if kind == GFF else min(longest_s, _duration_s(deployment, axes))
-    asked_s = duration_s or usual_s
+    usual_s = _BEFORE * dwell_s(deployment) if kind == GFF else _duration_s(deployment, axes)
+    asked_s = duration_s or min(longest_s, usual_s)
     if asked_s > longest_s:
         text = f"expected up to the tail_s of the file, {longest_s:g} s, got {asked_s:g} s"
         raise UsageError(f"{option}: {text}")

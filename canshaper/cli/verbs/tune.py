@@ -75,7 +75,7 @@ def tune(
     where more than half of the swing is left, 2 where nothing fits, with what conflicts.
 
     With --fleet all swinging axes are tuned as canshaper robust --fleet designs them, within the
-    run-on of --max-run-on (tail_s), and stand next to its robust shapers of that length.
+    run-on of --max-run-on (2.25 s), and stand next to its robust shapers of that length.
 
     Examples:
 
