@@ -73,21 +73,10 @@ class Driven:
         return math.fsum(sorted(self.left_deg)[-count:]) / count
 
 
-@dataclass(frozen=True)
-class FleetDesign:
-    """A design for a fleet.
-
-    Attributes:
-        asked: it, and the drives that judge it.
-        rows: those of the file, of the box of all lengths, of the best of each run-on, and next to
-            G_FF of the best robust shapers; some may be none.
-    """
-
-    asked: Driven
-    rows: Mapping[str, Sequence[Driven]]
-
-
 FILE, BOX, FLEET, OTHER = "the file", "box of lengths", "for the fleet", "fleet, robust"
+Rows = Mapping[str, Sequence[Driven]]
+"""Of the file, of the box of all lengths, of the best of each run-on, and next to G_FF of the best
+robust shapers; some may be none."""
 Known = Mapping[Candidate | None, Sequence[FleetFilter]]
 
 
@@ -99,7 +88,7 @@ def design_fleet(
     on_progress: OnProgress,
     *,
     front: bool = True,
-) -> FleetDesign:
+) -> tuple[Driven, Rows]:
     """Design the filters of all swinging axes for the fleet of the file.
 
     G_FF stands next to robust shapers of the run-on that is asked for.
@@ -112,6 +101,9 @@ def design_fleet(
         workers: drive the candidates.
         on_progress: called with the part that is done.
         front: quicker and slower ones too.
+
+    Returns:
+        The design, and all rows, as the drives judge them that it has not seen.
 
     Raises:
         ConfigError: the C has no part for the machine.
@@ -158,10 +150,8 @@ def design_fleet(
     judged = drive(JUDGING, jobs, {one: chosen[one].filters for one in best})
     rows: dict[str, list[Candidate | None]] = {FILE: [None], BOX: [box], FLEET: [*own]}
     rows[OTHER] = [one for one in best if one.kind != kind]
-    return FleetDesign(
-        judged[asked[0]],
-        {name: [judged[one] for one in of if not judged[one].why] for name, of in rows.items()},
-    )
+    shown = {name: [judged[one] for one in of if not judged[one].why] for name, of in rows.items()}
+    return judged[asked[0]], shown
 
 
 def _grid(kind: str, low: float, high: float, duration_s: float) -> Iterator[Candidate]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from canshaper.campaign.fleet import BOX, FILE, FLEET, JUDGING, OTHER, Driven, FleetDesign
+from canshaper.campaign.fleet import BOX, FILE, FLEET, JUDGING, OTHER, Driven, Rows
 from canshaper.campaign.fleet_filters import FleetFilter
 from canshaper.campaign.statistics import quantile
 from canshaper.campaign.summary import bounded
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def table(design: FleetDesign) -> Table:
+def table(asked: Driven, rows: Rows) -> Table:
     """Swing left by each row, in degrees; its lengths are parts of those in the file."""
     made = new_table("left, deg", "run-on, s", "lengths", "worst 5 %", "p50", "p99")
-    for name, row in ((name, row) for name, rows in design.rows.items() for row in rows):
+    for name, row in ((name, row) for name, own in rows.items() for row in own):
         of = row.candidate
         made.add_row(
             name,
@@ -30,16 +30,16 @@ def table(design: FleetDesign) -> Table:
             f"{row.worst_deg:.1f}",
             f"{quantile(row.left_deg, 0.5).value:.1f}",
             bounded(quantile(row.left_deg, 0.99)),
-            style="bold" if row is design.asked else None,
+            style="bold" if row is asked else None,
         )
     return made
 
 
-def verdict(design: FleetDesign) -> str:
+def verdict(asked: Driven, rows: Rows) -> str:
     """How much less the worst drives leave than with the others, and which drives those are."""
-    chosen, count = design.asked.worst_deg, len(design.asked.left_deg)
+    chosen, count = asked.worst_deg, len(asked.left_deg)
     named = {FILE: "the file", BOX: "a box of all lengths", OTHER: "robust shapers for the fleet"}
-    left = {name: [row.worst_deg for row in design.rows[name]] for name in named}
+    left = {name: [row.worst_deg for row in rows[name]] for name in named}
     texts = [f"with {text} {deg:.1f}" for name, text in named.items() for deg in left[name]]
     text = f"The worst twentieth of {count} drives that it has not seen leaves {chosen:.1f} deg"
     text += f"; {', '.join(texts)}"
@@ -61,20 +61,20 @@ def write_fleet(deployment: Deployment, filters: Sequence[FleetFilter], verb: st
     return [*change(deployment.path, changes), *notes]
 
 
-def figure(design: FleetDesign) -> "Figure":
+def figure(rows: Rows) -> "Figure":
     """The front of run-on against what the worst drives leave."""
     from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, new_figure  # noqa: PLC0415
 
     drawn = new_figure(700, 450)
     axes = drawn.subplots()
     drawn.subplots_adjust(left=0.1, bottom=0.18, right=0.97, top=0.96)
-    front = design.rows[FLEET]
+    front = rows[FLEET]
     x = [*map(_run_on, front)]
     for style, what, of in (("-", "p99", _p99), ("--", "worst 5 %", _worst)):
         axes.plot(x, [*map(of, front)], f"o{style}", color=SHAPED_COLOUR, label=f"fleet, {what}")
     for name, mark in ((FILE, "o"), (BOX, "s"), (OTHER, "D")):
         colour = RAW_COLOUR if name == FILE else "black"
-        for row in design.rows[name]:
+        for row in rows[name]:
             axes.plot(_run_on(row), _p99(row), mark, color=colour, label=f"{name}, p99")
     axes.set(xlabel="run-on, s", ylabel="swing left, deg", ylim=(0, None))
     axes.legend()

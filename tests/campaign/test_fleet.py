@@ -6,12 +6,14 @@ from typing import Any
 import pytest
 
 from canshaper.campaign import fleet, fleet_filters, fleet_report
-from canshaper.campaign.fleet import BOX, FILE, FLEET, OTHER, Driven, FleetDesign, design_fleet
+from canshaper.campaign.fleet import BOX, FILE, FLEET, OTHER, Driven, design_fleet
 from canshaper.campaign.fleet_filters import GFF, ROBUST, Candidate, FleetFilter, fitted, swinging
 from canshaper.campaign.measure import measured_drive
 from canshaper.campaign.run import Source
+from canshaper.cli.verbs import compare
 from canshaper.commissioning.filter_file import filter_changes
 from canshaper.commissioning.robust import design_robust
+from canshaper.design.comparison.manoeuvres import with_candidate
 from canshaper.design.parallel import Processes
 from canshaper.errors import DesignError, UsageError
 from canshaper.machine.binding import load_deployment
@@ -76,18 +78,18 @@ def test_the_best_of_each_duration_is_judged_by_other_drives(
     """The chosen designs are in force in what is judged, and each is made once."""
     monkeypatch.setattr(fleet, "_DURATIONS", (1.0, 1.2, 1.3))
     deployment, done = load_deployment(PATH), list[float]()
-    design = design_fleet(
+    asked, rows = design_fleet(
         deployment, ROBUST, None, Processes(1), lambda part, _=None: done.append(part)
     )
     assert done[-1] == 1.0 and len(done) == 8
     assert len(designs) == 2 * len({*designs}) == 2 * (4 + 1)
-    of = [row.candidate for rows in design.rows.values() for row in rows]
+    of = [row.candidate for own in rows.values() for row in own]
     assert of[0] is None and of[1] and of[2] and of[3] and len(of) == 4  # 1.3 is past the tail
     assert (of[2].duration_s, of[3].duration_s) == pytest.approx((1.8, 2.16))
     assert of[1].low < of[2].low < of[2].high < of[1].high  # no length twice as wrong
-    assert design.asked is design.rows[FLEET][0]
-    assert design.asked.worst_deg == judged(deployment, of[2])
-    machine = fitted(deployment, design.asked.filters).axes["near_far"].config
+    assert asked is rows[FLEET][0]
+    assert asked.worst_deg == judged(deployment, of[2])
+    machine = fitted(deployment, asked.filters).axes["near_far"].config
     design_of = machine.filter.design()
     assert design_of and machine.sway
     assert design_of.length_range_pct == pytest.approx(10.0)
@@ -106,17 +108,17 @@ def test_gff_keeps_the_run_on_and_stands_next_to_robust_shapers(
     text = WITH_GFF.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     path.write_text(text, encoding="utf-8")
     deployment = load_deployment(path)
-    design = design_fleet(deployment, GFF, 2.3, Processes(1), lambda _, __=None: None)
-    assert [len(rows) for rows in design.rows.values()] == [1, 1, 1, 1]  # none settles in 1.84 s
-    assert design.asked.worst_deg == judged(deployment, design.asked.candidate)
-    fleet_report.write_fleet(deployment, design.asked.filters, "tune")
-    assert judged(load_deployment(path), None) == design.asked.worst_deg
+    asked, rows = design_fleet(deployment, GFF, 2.3, Processes(1), lambda _, __=None: None)
+    assert [len(own) for own in rows.values()] == [1, 1, 1, 1]  # none settles in 1.84 s
+    assert asked.worst_deg == judged(deployment, asked.candidate)
+    fleet_report.write_fleet(deployment, asked.filters, "tune")
+    assert judged(load_deployment(path), None) == asked.worst_deg
     of = load_deployment(path).axes["slew"].config.filter.design()
     assert of and of.objective and of.objective.max_run_on_s == 2.3 and of.objective.third_pole
-    said = fleet_report.verdict(design)
-    robust_deg = design.rows[OTHER][0].worst_deg
+    said = fleet_report.verdict(asked, rows)
+    robust_deg = rows[OTHER][0].worst_deg
     assert f"with robust shapers for the fleet {robust_deg:.1f}" in said
-    assert ("buys nothing" in said) == (robust_deg <= design.asked.worst_deg)
+    assert ("buys nothing" in said) == (robust_deg <= asked.worst_deg)
 
 
 @pytest.mark.slow
@@ -124,6 +126,23 @@ def test_gff_keeps_the_run_on_and_stands_next_to_robust_shapers(
 def test_a_run_on_that_no_poles_keep_is_refused() -> None:
     with pytest.raises(UsageError, match=r"^--max-run-on: no poles of .* run-on at most 1\.5 s"):
         design_fleet(load_deployment(WITH_GFF), GFF, 1.5, Processes(1), lambda _, __=None: None)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("compiler", "few")
+def test_a_comparison_has_rows_of_the_file_and_of_the_fleet() -> None:
+    deployment = load_deployment(PATH)
+    own, made = compare._for_fleet(deployment, 1)
+    of_file, of_fleet = (with_candidate(deployment, one).axes for one in (own, made))
+    for name in ("slew", "near_far"):
+        was, is_now = deployment.axes[name].config, of_fleet[name].config
+        assert of_file[name].config.filter == was.filter != is_now.filter
+        assert of_file[name].config.sway == was.sway != is_now.sway
+
+
+def test_a_comparison_of_ropes_has_none() -> None:
+    done = invoke("compare", str(ROOT / "config/bridge-crane.yaml"), "--fleet")
+    assert done.exit_code == 2 and "--fleet: expected slew and near-far" in done.output
 
 
 @pytest.mark.usefixtures("compiler")
@@ -166,10 +185,8 @@ def test_all_axes_are_written_or_none(tmp_path: Path, monkeypatch: pytest.Monkey
         for name in ("slew", "near_far")
     ]
     row = Driven(Candidate(ROBUST, 0.9, 1.1, 1.0), made, [1.0], [1.0])
-    design = FleetDesign(
-        row, {FILE: [Driven(None, (), [1.0], [1.0])], BOX: [], FLEET: [row], OTHER: []}
-    )
-    monkeypatch.setattr(fleet, "design_fleet", lambda *_: design)
+    rows = {FILE: [Driven(None, (), [1.0], [1.0])], BOX: [], FLEET: [row], OTHER: []}
+    monkeypatch.setattr(fleet, "design_fleet", lambda *_: (row, rows))
     changes = filter_changes
 
     def fails(deployment: Deployment, axis: str, *given: Any, **own: Any) -> Any:

@@ -105,7 +105,7 @@ def campaign(
             others = "--processes, --scheduler, --cluster or --engine native"
             raise UsageError(f"--plant: expected one process of Python, without {others}")
         native, processes = "python", 1
-        _begin(files, plant)
+        echo(f"engine: python, in one process: the crane is {plant}", err=True)
     results = Results("Campaign", deployment, report)
     ranges = deployment.config.uncertainty
     engine_name = native or ("native" if has_compiler() else "python")
@@ -141,17 +141,6 @@ def campaign(
         raise typer.Exit(EXIT_INTERRUPTED)
     if not accepted:
         raise typer.Exit(EXIT_NOT_ACCEPTED)
-
-
-def _begin(files: "list[Deployment]", plant: Path) -> None:
-    """Begin once with a unit in place of the crane, whose faults are named before anything else."""
-    from canshaper.campaign.draw import driven_axes
-    from canshaper.design.lockstep import Simulation
-    from canshaper_sim.strokes import Script
-
-    for one in files:
-        Simulation(one, Script("still", (), 1.0), crane=driven_axes(one)[0], unit=plant)
-    echo(f"engine: python, in one process: the crane is {plant}", err=True)
 
 
 def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "list[Store]") -> bool:

@@ -99,7 +99,7 @@ def compare(
     results = Results("Comparison of filters", deployment, report, picture, quiet=as_json)
     if on_rope(deployment):
         if work or fleet:
-            raise UsageError("--work, --fleet: expected an axis slew and near-far, got a rope")
+            raise UsageError("--work, --fleet: expected slew and near-far, got a rope")
         _ropes(deployment, results, out, processes, as_json=as_json)
         return
     out.mkdir(parents=True, exist_ok=True)  # reported before minutes of driving
@@ -187,13 +187,13 @@ def _for_fleet(deployment: "Deployment", processes: int | None) -> "list[Candida
 
     with progress_bar("for the fleet") as on_progress:
         workers = Processes(processes)
-        design = design_fleet(deployment, ROBUST, None, workers, on_progress, front=False)
-    made = {one.axis: filter_of(**one.section) for one in design.asked.filters if one.axis in AXES}
-    sway = {one.axis: one.sway for one in design.asked.filters}
-    own = {axis: deployment.axes[axis].config.filter for axis in made}
+        made, _ = design_fleet(deployment, ROBUST, None, workers, on_progress, front=False)
+    fleet = {one.axis: filter_of(**one.section) for one in made.filters if one.axis in AXES}
+    sway = {one.axis: one.sway for one in made.filters}
+    own = {axis: deployment.axes[axis].config.filter for axis in fleet}
     return [
         Candidate("the file's", own, ours=True),
-        Candidate(FLEET, made, ours=True, sway=sway),
+        Candidate(FLEET, fleet, ours=True, sway=sway),
     ]
 
 
