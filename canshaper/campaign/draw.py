@@ -8,6 +8,7 @@ meet the same crane and the same operator.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -134,6 +135,15 @@ def draw_drive(
     factors |= of_places
     factors |= {"sway_across_deg": swing[0], "sway_along_deg": swing[1], **of_loads}
     return Setting(operator, fault.name, factors, script, options, rest_s)
+
+
+def on_unit(setting: Setting, unit: Path, nominal: CraneParameters) -> Setting:
+    """The drive of a unit: operator and faults are drawn, the crane is its own."""
+    drawn = setting.options["parameters"]
+    assert drawn
+    parameters = replace(nominal, sway_sensor=drawn.sway_sensor)
+    own: DriveOptions = {"unit": unit, "parameters": parameters, "sway": None, "loads": ()}
+    return replace(setting, factors={}, options={**setting.options, **own})
 
 
 def _crane(

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from canshaper.campaign.draw import Setting, draw_drive, driven_axes
+from canshaper.campaign.draw import Setting, draw_drive, driven_axes, on_unit
 from canshaper.campaign.native import NativeCrane
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
@@ -37,6 +38,7 @@ def measured_drive(
     *,
     both: bool = False,
     longest_s: float = 0.0,
+    unit: Path | None = None,
 ) -> Row:
     """Draw a drive, drive it and measure it; see ``draw_drive``.
 
@@ -51,12 +53,15 @@ def measured_drive(
         native: drives what it can; one drive in ``BOTH_OF`` is driven by both.
         both: this one is.
         longest_s: see ``draw_drive``.
+        unit: FMU in place of the crane.
 
     Raises:
         CampaignError: both drive it, and not alike.
     """
     setting = draw_drive(deployment, seed, ranges, nominal, longest_s)
     nominal = nominal or changed_parameters([], deployment)
+    if unit:
+        setting = on_unit(setting, unit, nominal)
     if not (native and native.has(setting)):
         return _row(deployment, seed, setting, nominal)
     row = _row(deployment, seed, setting, nominal, native)

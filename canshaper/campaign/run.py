@@ -36,6 +36,7 @@ class Source:
         changes: parameters of the nominal crane, NAME=VALUE.
         engine: native or python; what C has no part for is Python's.
         longest_s: longest ``dwell_s`` of the files that are compared; see ``draw_drive``.
+        unit: FMU in place of the crane.
     """
 
     path: str
@@ -44,6 +45,7 @@ class Source:
     changes: tuple[str, ...] = ()
     engine: str = "python"
     longest_s: float = 0.0
+    unit: Path | None = None
 
     @classmethod
     def of(
@@ -75,12 +77,13 @@ class Source:
     @property
     def about(self) -> dict[str, Any]:
         """Identity of the drives: only drives with the same identity go together."""
+        unit = [sha256(self.unit.read_bytes()).hexdigest()] if self.unit else []
         content = sha256(b"".join(sha256(data).digest() for _, data in self.files)).hexdigest()
         return {
             "file": f"{Path(self.path).name} sha256:{content[:16]}",
             "program": f"sha256:{program_sha256()[:16]}",
             "ranges": self.ranges.model_dump(),
-            "crane": [*self.changes],
+            "crane": [*self.changes, *unit],
             "residual_from_s": self.longest_s,
         }
 
@@ -117,9 +120,9 @@ def drive_all(source: Source, seeds: Seeds, *, both: int = -1) -> list[Row]:
     native = source.native()
     c = native if isinstance(native, NativeCrane) else None
     about = source.ranges, nominal, c
+    options: Any = {"longest_s": source.longest_s, "unit": source.unit}
     return [
-        measured_drive(deployment, seed, *about, both=seed == both, longest_s=source.longest_s)
-        for seed in seeds
+        measured_drive(deployment, seed, *about, both=seed == both, **options) for seed in seeds
     ]
 
 

@@ -46,6 +46,7 @@ EXTRAS = {
     **dict.fromkeys(("canopen", "casadi", "matplotlib", "numpy", "scipy"), "tools"),
     **dict.fromkeys(("starlette", "uvicorn", "websockets"), "studio"),
     "pyarrow": "campaign",
+    "fmpy": "fmi",
     "prometheus_client": "metrics",
     **dict.fromkeys(("dask_jobqueue", "distributed"), "cluster"),
 }
@@ -68,6 +69,9 @@ SENSOR: bool = typer.Option(
 )
 SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
+)
+PLANT = typer.Option(
+    None, "--plant", metavar="FMU", help="A crane of yours, in place of the simulated one."
 )
 PROCESSES = typer.Option(None, "--processes", min=1, help="Processes; by default one a processor.")
 SCHEDULER = typer.Option(

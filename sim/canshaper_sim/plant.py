@@ -15,10 +15,11 @@ from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.machines import AXES_OF, build_machine, machine_for
+from canshaper_sim.machines import AXES_OF, Machine, ValveDrivenCrane, build_machine, machine_for
 from canshaper_sim.overhead import OverheadBoom
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.sensor_messages import sensor_messages
+from canshaper_sim.unit import Unit
 from canshaper_sim.valve_frames import CommandReader
 
 # Feedback messages and their signals, in the order they are sent; they close with the sway.
@@ -161,6 +162,7 @@ class PlantNode:
         parameters: the crane; by default the nominal one.
         machine: one of `machines.MACHINES`.
         sway: swing of the grapple at the start; by default it hangs still.
+        unit: a crane of someone else in place of ours.
         listeners: whether others than the controller listen; without them pose, speeds and sway
             are only sent where the controller receives them.
 
@@ -177,6 +179,7 @@ class PlantNode:
         machine: str | None = None,
         sway: Sway | None = None,
         *,
+        unit: Unit | None = None,
         listeners: bool = True,
     ) -> None:
         parameters = parameters or changed_parameters([], deployment)
@@ -208,7 +211,12 @@ class PlantNode:
                 for message, signals in self._feedback.items()
                 if received(self._senders[message].key)
             }
-        self._machine = build_machine(name, parameters, sway)
+        if unit:
+            tick_s = deployment.config.tick_ms / 1000.0
+            crane = unit.crane(deployment.by_coordinate, tick_s, parameters)
+            self._machine: Machine = ValveDrivenCrane(crane)
+        else:
+            self._machine = build_machine(name, parameters, sway)
         self._valve_feedback = [
             _ValveFeedback(deployment.coordinates.get(axis, axis), bound.feedback)
             for axis, bound in deployment.axes.items()

@@ -27,7 +27,7 @@ BUDGET = {
     "docs/api.md": 150,
     "docs/architecture.md": 330,
     "docs/calibration.md": 420,
-    "docs/campaign.md": 1135,
+    "docs/campaign.md": 1195,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 790,
@@ -36,7 +36,7 @@ BUDGET = {
     "docs/deployment.md": 2245,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
-    "docs/export.md": 516,
+    "docs/export.md": 556,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
@@ -67,11 +67,11 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (66_078, "a new ability takes the room of an old one"),
-    "tests": (100_259, "one level for each behaviour"),
+    "canshaper": (66_280, "a new ability takes the room of an old one"),
+    "tests": (100_519, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (344, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:
