@@ -105,16 +105,14 @@ class TwoAxisMotion:
         self.unattended = slew.unattended and (near_far is None or near_far.unattended)
         if near_far is not None:
             self._moved(near_far, elapsed_s)
-        self._bend(elapsed_s, tip_m if circle_m is None else circle_m)
+        if luffing is not None and not luffing.ahead_s:
+            self._bend(luffing, elapsed_s, tip_m if circle_m is None else circle_m)
         if not commanded or not weight:
             self._rest(over=not commanded)
             return
-        if near_far is None:
-            radius_m = None
-        elif circle_m is None:
+        radius_m = circle_m
+        if near_far is not None and circle_m is None:
             radius_m = self._carried_m(near_far, elapsed_s, tip_m)
-        else:
-            radius_m = circle_m
         turn = slew.path(slew.period_s)
         if near_far is None or radius_m is None:
             if not slew.ahead_s:  # the grapple stays on its circle, of whatever radius
@@ -148,11 +146,9 @@ class TwoAxisMotion:
                 axis.damps = False
                 axis.joins = not over
 
-    def _bend(self, elapsed_s: float, tip_m: float | None) -> None:
+    def _bend(self, luffing: MovingAxis, elapsed_s: float, tip_m: float | None) -> None:
         """Let the boom make up for the arc in which it moves the tip."""
-        luffing, radius_m = self.luffing, self._tip_m
-        if luffing is None or luffing.ahead_s:
-            return
+        radius_m = self._tip_m
         if tip_m is not None:
             last_m = tip_m if radius_m is None else radius_m
             self._tip_m = radius_m = last_m + (tip_m - last_m) * min(1.0, elapsed_s / RADIUS_S)
@@ -169,10 +165,10 @@ class TwoAxisMotion:
             target += across / max(radius_m, _LEAST_RADIUS_M)
         luffing.add(target, self._weight)
 
-    def _luffed(self, after_s: float) -> GrapplePath:
+    def _luffed(self, luffing: MovingAxis, after_s: float) -> GrapplePath:
         """How luffing alone moves tip and grapple outwards; see ``MovingAxis.path``."""
-        luffing, height_m = self.luffing, self.height_m
-        if luffing is None or not luffing.commanded:
+        height_m = self.height_m
+        if not luffing.commanded:
             return _REST
         lead, rate, speed, acceleration = luffing.path(after_s)
         return -height_m * lead, -height_m * rate, -height_m * speed, -height_m * acceleration
@@ -196,7 +192,7 @@ class TwoAxisMotion:
     ) -> float | None:
         """Radius of the grapple: carried on by the near-far model, corrected by the tip's."""
         sway, full = near_far.sway, near_far.full_speed
-        luffed_m, _, luffed_m_s, _ = self._luffed(0.0)
+        luffed_m, _, luffed_m_s, _ = self._luffed(self.luffing, 0.0) if self.luffing else _REST
         ahead_m = full * sway.angle + near_far.reached + luffed_m
         if self._radius_m is None:
             self._radius_m = None if tip_m is None else tip_m - ahead_m
@@ -220,12 +216,10 @@ class TwoAxisMotion:
         """
         lead, lead_rate, speed, acceleration = turn
         out, _, out_rate, out_acceleration = near_far.path(after_s) if near_far.commanded else _REST
-        luffed_m, _, luffed_m_s, luffed_m_s2 = self._luffed(after_s)
-        out, out_rate, out_acceleration = (
-            out + luffed_m,
-            out_rate + luffed_m_s,
-            out_acceleration + luffed_m_s2,
-        )
+        if self.luffing is not None:
+            luffed_m, _, luffed_m_s, luffed_m_s2 = self._luffed(self.luffing, after_s)
+            out, out_rate = out + luffed_m, out_rate + luffed_m_s
+            out_acceleration += luffed_m_s2
         slew = self._slew
         across_2, along_2 = slew.stiffness, near_far.stiffness
         radius_m += after_s * out_rate
