@@ -74,6 +74,8 @@ def measured(**changes: str) -> str:
         ),
         (f"{FIXED}, radius: {{ {TIP} }}", ": expected one of radius and radius_m, got both"),
         ("slew: slew, radius_m: 3", ": expected near_far with a radius or an aim, got none"),
+        (f"{FIXED}, luffing: lift", ": expected luffing, luffing_rad_s and a radius together, got"),
+        (f"{FIXED}, luffing: lift, luffing_rad_s: 0.1", "expected an axis with sway, got 'lift'"),
         (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "expected 0.5 to 120 m, got 0.4"),
         (f"{FIXED}, max_pct: 51", ".max_pct: expected 1 to 50 % of full speed, got 51"),
         (f"{FIXED}, speed: 1", ".speed: expected one of the keys slew, near_far, radius"),
