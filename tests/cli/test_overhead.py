@@ -45,11 +45,6 @@ def test_compare_has_no_work_with_a_rope() -> None:
     assert "--work: its operator works with slew and near-far" in said
 
 
-def test_a_crane_that_is_moved_by_its_joints_is_not_compared(tmp_path: Path) -> None:
-    said = run("compare", str(FILE.with_stem("excavator")), "--out", str(tmp_path), code=2)
-    assert "expected axes slew and near_far, or a crane with a rope, got slew, boom, arm" in said
-
-
 def test_a_parameter_is_judged_by_the_crane_of_the_file(tmp_path: Path) -> None:
     kind = "kind: cartesian,"
     file = changed(tmp_path, (kind, f"{kind} simulated: {{ overhead.rope_max_m: 50 }},"))
