@@ -42,7 +42,7 @@ def test_a_script_that_moves_nothing_of_it_is_refused() -> None:
 
 def test_compare_has_no_work_with_a_rope() -> None:
     said = run("compare", str(FILE), "--work", code=2)
-    assert "--work: its operator works with slew and near-far" in said
+    assert "--work, --fleet: expected slew and near-far, got a rope" in said
 
 
 def test_a_parameter_is_judged_by_the_crane_of_the_file(tmp_path: Path) -> None:
