@@ -10,6 +10,7 @@ from tests.cli.test_overhead import run
 from tests.rigs.files import CONFIG, machine_file, read
 from tests.rigs.overhead import FILE as BRIDGE
 
+HOOK = BRIDGE.with_stem("bridge-crane-hook")
 TOWER, TELEHANDLER = CONFIG / "tower-crane.yaml", CONFIG / "telehandler.yaml"
 ROPES = pytest.mark.parametrize("file", [TOWER, TELEHANDLER, BRIDGE], ids=lambda one: one.stem)
 FILES = pytest.mark.parametrize("file", [TOWER, TELEHANDLER], ids=["tower", "telehandler"])
@@ -17,7 +18,8 @@ FILES = pytest.mark.parametrize("file", [TOWER, TELEHANDLER], ids=["tower", "tel
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("file", "moves"), [(TOWER, "trolley"), (TELEHANDLER, "telescope"), (BRIDGE, None)]
+    ("file", "moves"),
+    [(TOWER, "trolley"), (TELEHANDLER, "telescope"), (BRIDGE, None), (HOOK, None)],
 )
 def test_check_finds_nothing(file: Path, moves: str | None) -> None:
     said = run("check", str(file))
