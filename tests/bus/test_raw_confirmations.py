@@ -3,8 +3,8 @@
 import pytest
 
 from canshaper.bus import raw
+from canshaper.bus.interface import PROBE_NS
 from canshaper.bus.packet import SIZE
-from canshaper.bus.raw import PROBE_NS
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.raw_line import IDS, MARK_AT, OTHER, SENT_BACK, STATUS, TICK_NS, VALVE, Line, message
 

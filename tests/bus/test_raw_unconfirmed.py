@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.bus import raw, socketcan
+from canshaper.bus import interface, socketcan
 from canshaper.bus.device import has_echo
-from canshaper.bus.raw import MOST_ERRORS, PROBE_NS, QUIET_NS, REOPEN_NS
+from canshaper.bus.interface import MOST_ERRORS, PROBE_NS, QUIET_NS, REOPEN_NS
 from canshaper.bus.socketcan import ERROR_CLASSES, STATE_CLASSES, carrier, open_sockets, renamed
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.fake_sockets import BUS, IDS, Made
@@ -101,7 +101,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
         return answer
 
     for what in given:
-        monkeypatch.setattr(raw, what, look(what))
+        monkeypatch.setattr(interface, what, look(what))
     return given
 
 
@@ -249,7 +249,7 @@ def test_a_flood_of_error_frames_is_left_to_the_kernel_for_a_while(
     asked: list[tuple[int, int]] = []
     line = make_line(ids)
     monkeypatch.setattr(
-        raw, "receive_errors", lambda one, classes: asked.append((one.fileno(), classes))
+        interface, "receive_errors", lambda one, classes: asked.append((one.fileno(), classes))
     )
     number = line.near[len(line.near) // 2].fileno()
     for _ in range(MOST_ERRORS - 1):
