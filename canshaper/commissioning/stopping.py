@@ -122,10 +122,9 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
     config, limits = bound.config, bound.config.limits
     tick_s = deployment.config.tick_ms / 1000.0
     times = {"timeout_s": bound.timeout_ms / 1000.0, "period_s": tick_s * bound.period_ticks}
-    senders = {one.key: one.sender() for one in deployment.sent()}
 
     def axis(one: BoundAxis) -> ShapedAxis:
-        return AxisControl(one, tick_s, JoystickInput(joystick), senders).axis
+        return AxisControl(one, tick_s, JoystickInput(joystick), one.valve.message.sender()).axis
 
     unbounded = limits.model_copy(update={"stop_distance_m": None})
     free = replace(bound, config=config.model_copy(update={"limits": unbounded}))

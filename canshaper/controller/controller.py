@@ -13,7 +13,8 @@ from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
 from canshaper.controller.status import AimPoint, SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
-from canshaper.inputs.input import EnableGate, Key, Part, carry_over
+from canshaper.inputs.input import Key, Part, carry_over
+from canshaper.inputs.stops import EnableGate
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.named_codes import values_of_schedules
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
@@ -52,7 +53,10 @@ class Controller:
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
             name: AxisControl(
-                bound, tick_s, inputs.joysticks[bound.config.command.joystick], self._senders
+                bound,
+                tick_s,
+                inputs.joysticks[bound.config.command.joystick],
+                self._senders[bound.valve.message.key],
             )
             for name, bound in deployment.axes.items()
         }
@@ -91,7 +95,7 @@ class Controller:
         self._overrun.copy_state(before._overrun)
         if before._stop is not None:
             for runner in before.axes.values():
-                runner.see(before._stop)
+                runner.stops.see(before._stop)
         carry_over(before._parts(), self._parts())
         open_before = before.deployment.config.buses.values()
         for name, bus in self.deployment.config.buses.items():
@@ -157,7 +161,7 @@ class Controller:
                     return None
                 if (stop := self._stop) is not None:
                     for runner in self.axes.values():
-                        runner.see(stop)
+                        runner.stops.see(stop)
                 stopped = stop is not None and stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
                 self.moves = rule.moves
@@ -264,7 +268,7 @@ class Controller:
             self._load = parameter_sets.Load(inputs.load_state, [*values])
         for runner in self.axes.values():
             if switches := inputs.gates.get(runner.bound.config.command.joystick):
-                runner.add_interlock(EnableGate(switches))
+                runner.stops.interlocks.append(EnableGate(switches))
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
                 runner.add_chooser(self._load, inputs.profile)
         for name, message in inputs.sway_sensors.items():
@@ -309,7 +313,7 @@ class Controller:
         for protocol in self._protocols:
             protocol.stalled()
         for runner in self.axes.values():
-            runner.invalidate()
+            runner.stops.invalid = True
             runner.trip_in_motion(Reason.LOOP_STALLED)
 
     def _invalidate(self, bus: str | None = None) -> None:

@@ -80,7 +80,7 @@ class RopeControl:
         self._rope = RopeLength(config.lowest_m, config.highest_m, config.lost)
         self._followed_m = 0.0
         self._axis.prepare(*(end.period_s / self._period_s for end in ends))
-        runner.add_interlock(self._objection)
+        runner.stops.interlocks.append(self._objection)
         self._follow()
 
     def step(self, now_ns: int) -> ValueEvent | None:

@@ -92,7 +92,11 @@ class StatusMessages:
         senders: Mapping[MessageKey, Sender],
     ) -> None:
         self._deployment, self._senders = deployment, senders
-        self._axes = [one for one in axes if one.bound.status]
+        self._axes = [
+            (one, status, senders[status.message.key])
+            for one in axes
+            if (status := one.bound.status)
+        ]
         self.aims: list[AimPoint] = []
 
     def frames(
@@ -106,19 +110,17 @@ class StatusMessages:
             last: number of the deadline of the tick before.
             now: number of this one.
         """
-        for runner in self._axes:
+        for runner, status, sender in self._axes:
             ticks = runner.bound.status_ticks
-            if (runner in changed or now // ticks > last // ticks) and (
-                frame := runner.status_frame()
-            ):
-                yield frame
+            if runner in changed or now // ticks > last // ticks:
+                yield sender.frame(status.values(runner))
         for aim in self.aims:
             if now // aim.ticks > last // aim.ticks:
                 aim.update()
                 yield self._senders[aim.codec.message.key].frame(aim.codec.values(aim))
-        status, ticks = self._deployment.status, self._deployment.status_ticks
-        if status and now // ticks > last // ticks:
-            yield self._senders[status.message.key].frame(status.values(counters.status()))
+        service, ticks = self._deployment.status, self._deployment.status_ticks
+        if service and now // ticks > last // ticks:
+            yield self._senders[service.message.key].frame(service.values(counters.status()))
 
     def identity(self, status: StatusCodec[int]) -> Frame:
         """Return the digest of what runs, in the message that carries it."""

@@ -43,7 +43,7 @@ class ValveOutputs:
     def foreign_sender(self, key: MessageKey, arrived_ns: int) -> None:
         """Trip the axes of a message that another sender has sent."""
         for runner in self._axes.get(key, ()):
-            runner.foreign_sender(arrived_ns)
+            runner.stops.foreign_sender(arrived_ns)
 
     def send_failed(self, key: MessageKey) -> None:
         """Trip the axes in motion of a message that did not reach its bus."""
@@ -69,7 +69,7 @@ class ValveOutputs:
         """
         runners = self._axes[frame[:3]]
         for runner in runners:
-            runner.trip(Reason.OUTPUT_REFUSED)
+            runner.stops.trip = Reason.OUTPUT_REFUSED
             runner.put(0)
         return runners[0].valve.instead(frame)
 
