@@ -44,7 +44,7 @@ class RawPort(Interface):
         name: name of the bus in the deployment file.
         config: its section.
         on_fault, ids, open_sockets, has_echo: see ``Interface``.
-        fd: what is sent in frames of CAN FD, on a bus of CAN FD.
+        fd: what is sent in frames of CAN FD.
 
     Attributes:
         arrived_ns: when the frame arrived that ``frames`` has just handed out, by
@@ -67,7 +67,7 @@ class RawPort(Interface):
         self.name = name
         self.arrived_ns = self.waited = 0
         self._size = FD_SIZE if config.fd else SIZE
-        self._fd = kernel_ids(fd if config.fd else ())
+        self._fd = kernel_ids(fd)
         self._fd_flags = FDF | BRS if config.data_bitrate is not None else FDF
         self._valves = kernel_ids(ids.valves if ids else ())
         self._claims = kernel_ids(ids.claims if ids else ())

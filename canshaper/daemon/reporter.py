@@ -91,6 +91,8 @@ class Reporter:
             if port.waited != self._waited[name]:
                 self._waited[name] = port.waited
                 log.warning("bus=%s waited=%d: valve frames, in a queue", name, port.waited)
+            if news := port.look():
+                log.warning("bus=%s %s", name, news)
         self._manager.status(self._summary(trouble()))
         self._latest_ns = 0
         return True

@@ -71,7 +71,7 @@ def port_on(
         Bus(interface="socketcan", channel="can0", **options),
         on_fault,
         ids,
-        ids.fd if ids else {(0x200, False)},
+        (ids.fd if ids else {(0x200, False)}) if options.get("fd") else (),
         open_sockets=lambda _bus, routes: open_sockets(routes),
         has_echo=lambda channel: echo and channel == "can0",
     )

@@ -101,6 +101,13 @@ def test_of_several_frames_under_way_a_confirmation_confirms_one(line: Line) -> 
     assert line.unconfirmed() == 2
 
 
+def test_valve_frames_that_waited_for_longer_than_their_cycle_are_counted(line: Line) -> None:
+    for frame in (VALVE, STATUS):
+        for _ in range(3):
+            assert line.port.send(frame)
+    assert line.port.waited == 1
+
+
 def test_a_bus_that_takes_no_frames_gets_no_more(line: Line) -> None:
     assert line.unconfirmed() == 3
     assert line.port.state is BusState.NOT_CONFIRMED

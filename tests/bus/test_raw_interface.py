@@ -77,7 +77,7 @@ def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
         assert not line.port.send(VALVE)
     else:
         assert line.received() == []
-    assert line.port.state is BusState.GONE
+    assert (line.port.state, line.port.why) == (BusState.GONE, "")
     assert line.faults[1:] == [FrameFault.BUS_GONE]
     assert [end.fileno() for end in ends] == [-1] * 3
     assert line.port.fileno() == -1

@@ -10,7 +10,7 @@ from canshaper.controller.guarded import Guarded
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
 from tests.rigs.files import ROOT
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.forwarder import Rig
 from tests.rigs.sent import status_frame
 
 Make = Callable[..., Rig]
