@@ -59,7 +59,7 @@ class _Member:
         moving.room_m = full * back, full * ahead
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
         moving.commanded, moving.able = axis.output.commanded, axis.state in ABLE
-        moving.unattended = axis.unattended
+        moving.unattended = axis.added_time.unattended
 
 
 class MotionRunner:

@@ -290,23 +290,43 @@ def range_with_added(
     return max(min(own, low), -maximum), min(max(own, high), maximum)
 
 
+# Ticks beyond the tail until an axis counts as unattended. The gate counts them by the tail alone:
+# what it gives back, it never gives back later than the axis does.
+UNATTENDED_TICKS = 3
+
+
 class AddedTime:
     """How long a motion may move an axis that no one commands.
 
     Args:
         ticks: longest time in motion, in ticks of the axis.
+        tail: ticks for which the output may run on.
+
+    Attributes:
+        asked: whether the motion asked for something in the last tick.
+        unattended: whether the joystick rested longer than the tail, in whatever state.
     """
 
-    __slots__ = ("_left", "_ticks")
+    __slots__ = ("_left", "_rested", "_tail", "_ticks", "asked", "unattended")
 
-    def __init__(self, ticks: int) -> None:
+    def __init__(self, ticks: int, tail: int) -> None:
         self._ticks = self._left = ticks
+        self._tail = tail
+        self.asked = self.unattended = False
+        self._rested = 0  # ticks since the joystick was deflected
 
     def renew(self) -> None:
         """Give the axis its full time back: neither of its motion's operators is at work."""
         self._left = self._ticks
 
-    def allows(self, asked: bool, commanded: bool, moved: bool, ticks: int = 1) -> bool:
+    def allows(
+        self,
+        asked: bool,
+        commanded: bool,
+        moved: bool,
+        deflected: bool = False,
+        ticks: int = 1,
+    ) -> bool:
         """Count time, and say whether the motion may move the axis now.
 
         Args:
@@ -314,8 +334,12 @@ class AddedTime:
             commanded: the operator demanded motion within the tail. The axis gets its full time
                 back.
             moved: the valve was open. An axis that stands uses up no time, and gets none back.
+            deflected: the joystick is.
             ticks: how many ticks have passed.
         """
+        self.asked = asked
+        self._rested = 0 if deflected else self._rested + ticks
+        self.unattended = self._rested > self._tail + UNATTENDED_TICKS
         if commanded:
             self._left = self._ticks
         elif moved:

@@ -88,29 +88,6 @@ class OutputStage:
         tail: ticks for which the output may run on.
     """
 
-    __slots__ = (
-        "_carry",
-        "_crossed",
-        "_demanded",
-        "_dropped_at",
-        "_grid_steps",
-        "_no_run_on",
-        "_own_ramp",
-        "_ran",
-        "_rates",
-        "_recent",
-        "_reversal",
-        "_side",
-        "_small",
-        "_spreads",
-        "_tick_s",
-        "largest_added",
-        "limits",
-        "output",
-        "ramp",
-        "tail",
-    )
-
     def __init__(
         self, limits: OutputLimits, grid_steps: int, tick_s: float, *, spreads: bool
     ) -> None:
@@ -148,8 +125,7 @@ class OutputStage:
             held: velocity at which the operator holds the joystick.
             demand: what the filter gets of it.
             reference: velocity that the filter asks for; it may be anything.
-            path: velocity that is added for the path, see ``Output``.
-            damping: velocity that is added for damping, see ``Output``.
+            path, damping: velocities that are added, see ``Output``.
             sensor_damps: a trusted sensor shows the swing, and the filter damps it. That takes more
                 than the one movement of a small stroke.
 
@@ -215,15 +191,10 @@ class OutputStage:
         out of it is carried, and corrected in the next ticks by at most one step in each. The carry
         starts no movement: the operator would see a twitch.
         """
-        limits = self.limits
+        limits, demanded = self.limits, (self._demanded.low, self._demanded.high)
+        largest, maximum = self.largest_added if added else 0.0, limits.maximum
         low, high = range_with_added(
-            held,
-            self._demanded.low,
-            self._demanded.high,
-            own,
-            self.largest_added if added else 0.0,
-            maximum=limits.maximum,
-            no_run_on=no_run_on,
+            held, *demanded, own, largest, maximum=maximum, no_run_on=no_run_on
         )
         target = total = own
         if added:
@@ -248,7 +219,7 @@ class OutputStage:
         """
         recent = self._recent
         if held * self._side < 0.0:
-            self._reverse()
+            self._side, self._crossed = -self._side, 0
         if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
             recent.clear_against(self._side)
         self._crossed += 1
@@ -272,17 +243,13 @@ class OutputStage:
         self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
         self._carry = 0.0
 
-    def _reverse(self) -> None:
-        """Begin a reversal: the joystick is deflected to the other side than it was last."""
-        self._side, self._crossed = -self._side, 0
-
     def stop_against(self, held: float) -> None:
         """End the run-on of a stop where the joystick is held against it.
 
         By the fall, and then in neutral; or after the time that a reversal has.
         """
         if held * self._side < 0.0:
-            self._reverse()
+            self._side, self._crossed = -self._side, 0
         if not self._reversal and held * self.ramp < 0.0:
             self._recent.clear()
             self.output.commanded = False
