@@ -32,8 +32,7 @@ from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.reloads import Reloads
 from canshaper.daemon.reporter import Reporter, flush
 from canshaper.errors import BusError, InternalError, raised
-from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.gate.loop import boottime_ns, run_at_deadlines
+from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 

@@ -9,7 +9,7 @@ from canshaper.codec.frame import BusState, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.daemon.notify import ServiceManager
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 from canshaper.machine.filters import unfit
 from canshaper.shaping.states import State
 

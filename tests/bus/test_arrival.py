@@ -16,7 +16,7 @@ from canshaper.bus import interface, packet, raw
 from canshaper.bus.interface import REOPEN_NS
 from canshaper.bus.packet import SO_TIMESTAMPNS, Arrivals, stamp_ns
 from canshaper.bus.port import ListeningPort
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 from tests.bus.clocks import START_NS, WALL_NS, Clocks, arrivals_of
 from tests.bus.raw_line import IDS, RECEIVED, TICK_NS, Line, message
 

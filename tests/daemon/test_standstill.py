@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from canshaper.gate import loop
-from canshaper.gate.cycle import Standstill, longest_gap_ns
-from canshaper.gate.loop import run_at_deadlines
+from canshaper.gate import cycle
+from canshaper.gate.cycle import Standstill, longest_gap_ns, run_at_deadlines
 from canshaper.shaping.states import State
 from tests.rigs.emergency import DBC, LAST, STOP
 from tests.rigs.files import ROOT
@@ -85,8 +84,8 @@ def test_a_loop_that_is_held_up_in_its_sleep_trips_by_the_time_that_was(
         machine.tick(0, missed)
         return len(calls) < 2
 
-    monkeypatch.setattr(loop, "time", Sleeper())
-    monkeypatch.setattr(loop, "boottime_ns", lambda: machine.now_ns)
+    monkeypatch.setattr(cycle, "time", Sleeper())
+    monkeypatch.setattr(cycle, "boottime_ns", lambda: machine.now_ns)
     run_at_deadlines(20 * MS, body)
     assert calls == [0, (20 + held_ms) * MS]
     assert (machine.rig.reason() == "LOOP_STALLED") is trips

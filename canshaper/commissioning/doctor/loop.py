@@ -16,8 +16,7 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
-from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.gate.loop import boottime_ns, run_at_deadlines
+from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
