@@ -183,7 +183,7 @@ class Controller:
         overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
         changed = self._missed(last, now) if missed else []
         if self._couplings.any:
-            self.events += self._couplings.step(now_ns, last, now)
+            self._couplings.step(now_ns, last, now, self.events)
         silent = self.silent_buses if self._protocols else NOWHERE
         for name, runner, message, rule in self._outputs.turns:
             period = runner.period_ticks

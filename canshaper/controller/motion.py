@@ -1,6 +1,6 @@
 """What acts on axes before any of them moves: two-axis motions, load, ends, ropes, shared oil."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.config.crane import Motion
@@ -235,24 +235,25 @@ class Couplings:
         self._followed = [(runner, runner.run_on) for runner in axes.values() if runner.run_on]
         self.any = bool(self._load or self._ends or self._flow or self.motions)
 
-    def step(self, now_ns: int, last: int, now: int) -> Iterator[Event]:
-        """Look at load, ends and ropes, add motions, share the oil; yield what is reported.
+    def step(self, now_ns: int, last: int, now: int, events: list[Event]) -> None:
+        """Look at load, ends and ropes, add motions, share the oil.
 
         Args:
             now_ns: monotonic time.
             last: number of the deadline of the tick before.
             now: number of this one.
+            events: gets what is reported.
         """
         for runner, run_on in self._followed:  # it held its last demand until now
             if ticks := now // runner.period_ticks - last // runner.period_ticks:
                 run_on.add(runner.axis.command, ticks)
         if self._load and (load := self._load.step(now_ns)):
-            yield load
+            events.append(load)
         for end in self._ends:
             if (change := end.step(now_ns)) is not None:
-                yield change
+                events.append(change)
         for motion in self.motions:
             if (event := motion.step(now_ns, last, now)) is not None:
-                yield event
+                events.append(event)
         if self._flow:
-            yield from self._flow.step(now_ns, now - last)
+            events += self._flow.step(now_ns, now - last)

@@ -92,7 +92,7 @@ class StatusMessages:
     ) -> None:
         self._deployment, self._senders = deployment, senders
         self._axes = [
-            (one, status, senders[status.message.key])
+            (one, one.bound.status_ticks, status, senders[status.message.key])
             for one in axes.values()
             if (status := one.bound.status)
         ]
@@ -110,8 +110,7 @@ class StatusMessages:
             last: number of the deadline of the tick before.
             now: number of this one.
         """
-        for runner, status, sender in self._axes:
-            ticks = runner.bound.status_ticks
+        for runner, ticks, status, sender in self._axes:
             if runner in changed or now // ticks > last // ticks:
                 yield sender.frame(status.values(runner))
         for aim in self.aims:

@@ -307,11 +307,11 @@ class AddedTime:
         unattended: whether the joystick rested longer than the tail, in whatever state.
     """
 
-    __slots__ = ("_left", "_rested", "_tail", "_ticks", "asked", "unattended")
+    __slots__ = ("_left", "_rested", "_ticks", "_unattended", "asked", "unattended")
 
     def __init__(self, ticks: int, tail: int) -> None:
         self._ticks = self._left = ticks
-        self._tail = tail
+        self._unattended = tail + UNATTENDED_TICKS
         self.asked = self.unattended = False
         self._rested = 0  # ticks since the joystick was deflected
 
@@ -339,7 +339,7 @@ class AddedTime:
         """
         self.asked = asked
         self._rested = 0 if deflected else self._rested + ticks
-        self.unattended = self._rested > self._tail + UNATTENDED_TICKS
+        self.unattended = self._rested > self._unattended
         if commanded:
             self._left = self._ticks
         elif moved:

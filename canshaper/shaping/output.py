@@ -79,7 +79,6 @@ class OutputStage:
         spreads: whether the filter spreads the demand over time, see ``Shaper``.
 
     Attributes:
-        limits: limits of the axis.
         output: the output of the last tick: one object, which every tick overwrites.
         ramp: the velocity of the last tick before it was rounded. If the ramp went on from the
             rounded one, it would stick on a coarse grid.
@@ -88,15 +87,20 @@ class OutputStage:
         tail: ticks for which the output may run on.
     """
 
+    # fmt: off
+    __slots__ = (
+        "_carry", "_crossed", "_demanded", "_dropped_at", "_grid_steps", "_no_run_on", "_own_ramp",
+        "_ran", "_rates", "_recent", "_reversal", "_side", "_small", "_spreads", "_tick_s",
+        "largest_added", "limits", "output", "ramp", "tail",
+    )
+    # fmt: on
+
     def __init__(
         self, limits: OutputLimits, grid_steps: int, tick_s: float, *, spreads: bool
     ) -> None:
         self.output = Output()
-        self.ramp = 0.0
-        self.largest_added = 0.0
-        self._grid_steps = grid_steps
-        self._tick_s = tick_s
-        self._spreads = spreads
+        self.ramp = self.largest_added = 0.0
+        self._grid_steps, self._tick_s, self._spreads = grid_steps, tick_s, spreads
         self.tail = round(limits.tail_s / tick_s)  # ticks
         self._recent = RecentCommand(self.tail)
         self._demanded = RecentCommand(self.tail)  # the same, but no rest ends it
@@ -191,10 +195,10 @@ class OutputStage:
         out of it is carried, and corrected in the next ticks by at most one step in each. The carry
         starts no movement: the operator would see a twitch.
         """
-        limits, demanded = self.limits, (self._demanded.low, self._demanded.high)
-        largest, maximum = self.largest_added if added else 0.0, limits.maximum
+        limits, asked = self.limits, self._demanded
+        largest = self.largest_added if added else 0.0
         low, high = range_with_added(
-            held, *demanded, own, largest, maximum=maximum, no_run_on=no_run_on
+            held, asked.low, asked.high, own, largest, maximum=limits.maximum, no_run_on=no_run_on
         )
         target = total = own
         if added:
@@ -224,8 +228,7 @@ class OutputStage:
             recent.clear_against(self._side)
         self._crossed += 1
         beyond, limits = self._beyond(held), self.limits
-        over = self._ran + 0.5 * beyond * beyond / limits.fall_per_s > limits.run_on
-        if over:
+        if over := self._ran + 0.5 * beyond * beyond / limits.fall_per_s > limits.run_on:
             recent.clear()
         return over
 
@@ -255,10 +258,7 @@ class OutputStage:
             self.output.commanded = False
 
     def hold_run_on(self) -> None:
-        """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.
-
-        Anti-sway was switched on in motion, or a motion was cut off.
-        """
+        """Let nothing run on for a tail: the filter remembers what it did not drive, or was cut."""
         self._no_run_on = self.tail
 
     def rest(self) -> None:
