@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from canshaper.errors import raised
 from canshaper.shaping.limits import OutputLimits, within
-from canshaper.shaping.motion import AddedTime
+from canshaper.shaping.moving_axis import AddedTime
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.shapers.kind import Shaper, spreads
 from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, STOPPING, TRIPPED, StateMachine
@@ -274,8 +274,7 @@ class ShapedAxis:
 
     def _clamped_demand(self) -> float:
         """The last demand as the filter got it."""
-        maximum = self._stage.limits.maximum
-        return within(self.command, -maximum, maximum, 0.0)
+        return within(self.command, -self._stage.limits.maximum, self._stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:
         """Trip for an error of the filter, or an output that no frame carries.

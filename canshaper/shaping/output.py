@@ -247,10 +247,7 @@ class OutputStage:
         self._carry = 0.0
 
     def stop_against(self, held: float) -> None:
-        """End the run-on of a stop where the joystick is held against it.
-
-        By the fall, and then in neutral; or after the time that a reversal has.
-        """
+        """End the run-on of a stop held against: by the fall, or after the time of a reversal."""
         if held * self._side < 0.0:
             self._side, self._crossed = -self._side, 0
         if not self._reversal and held * self.ramp < 0.0:

@@ -3,7 +3,8 @@
 import pytest
 
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.motion import UNATTENDED_TICKS, AddedTime, range_with_added
+from canshaper.shaping.motion import range_with_added
+from canshaper.shaping.moving_axis import UNATTENDED_TICKS, AddedTime
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.states import CommandInput, Reason, State
 from tests.shaping.added_pair import SLACK, TICK_S, pair

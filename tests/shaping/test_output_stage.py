@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.motion import UNATTENDED_TICKS
+from canshaper.shaping.moving_axis import UNATTENDED_TICKS
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.transfer import Off
