@@ -73,7 +73,15 @@ def count(*, guarded: bool = False) -> Counted:
     with tempfile.TemporaryDirectory() as name:
         deployment = load_deployment(slew_only(Path(name), "vcan0", 1))
     controller, hand, counted = Controller(deployment), Hand(deployment), Counted()
-    port = Traced("crane", lambda _ids: [near], None, lambda _fault: None, confirms=False)
+    port = Traced(
+        "crane",
+        deployment.config.buses["crane"],
+        lambda _fault: None,
+        None,
+        (),
+        open_sockets=lambda _bus, _ids: [near],
+        has_echo=bool,
+    )
     processor = Guarded(controller) if guarded else controller
     standstill = Standstill(deployment)
     standstill.clock = lambda: 0

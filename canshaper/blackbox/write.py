@@ -16,7 +16,7 @@ from typing import Any
 
 from canshaper.blackbox.file import SUFFIX, chunks
 from canshaper.blackbox.ring import Segment
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 from canshaper.machine.deployment import Deployment
 
 ABOUT, FOLDER, OUTSIDE = "about.json", "deployment", "outside"

@@ -19,7 +19,7 @@ from select import select
 import can
 
 from canshaper.bus.python_can import receive
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 
 # A frame may leave so late after it was given to an adapter, and an adapter may take so long for
 # one: half a tick of the slowest loop, ten frames on a serial line of 115200 baud.

@@ -17,7 +17,7 @@ from canshaper.codec.frame import (
     id_of,
     new_frame,
 )
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 
 CAN_FRAME = struct.Struct("=IB3x8s")
 SIZE = CAN_FRAME.size

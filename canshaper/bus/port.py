@@ -8,7 +8,6 @@ import errno
 import socket
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from typing import Protocol
 
 from canshaper.bus.device import has_echo, whereabouts
@@ -94,16 +93,7 @@ def open_port(
 
             return PythonCanPort(name, config, on_fault, fd)
         return RawPort(
-            name,
-            partial(open_sockets, config),
-            ids,
-            on_fault,
-            confirms=ids is not None,
-            echo=partial(has_echo, config.channel),
-            channel=config.channel,
-            matched=config.match is not None,
-            fd=fd if config.fd else None,
-            brs=config.data_bitrate is not None,
+            name, config, on_fault, ids, fd, open_sockets=open_sockets, has_echo=has_echo
         )
     except WrongDeviceError as error:
         raise WrongBusError(name, f"{error}{whereabouts(config)}") from error

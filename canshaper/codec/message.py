@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cantools.database.can import Message, Signal
 
-from canshaper.checksums.kinds import Checksum
 from canshaper.codec.frame import Frame, FrameFault, new_frame, with_source
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import raw_limits
 
 if TYPE_CHECKING:
+    from canshaper.checksums.kinds import Checksum
     from canshaper.codec.e2e import E2e
 
 # Two frames may be lost in a row; more is no longer the noise of a bus.

@@ -122,10 +122,9 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
     config, limits = bound.config, bound.config.limits
     tick_s = deployment.config.tick_ms / 1000.0
     times = {"timeout_s": bound.timeout_ms / 1000.0, "period_s": tick_s * bound.period_ticks}
-    senders = {one.key: one.sender() for one in deployment.sent()}
 
     def axis(one: BoundAxis) -> ShapedAxis:
-        return AxisControl(one, tick_s, JoystickInput(joystick), senders).axis
+        return AxisControl(one, tick_s, JoystickInput(joystick), one.valve.message.sender()).axis
 
     unbounded = limits.model_copy(update={"stop_distance_m": None})
     free = replace(bound, config=config.model_copy(update={"limits": unbounded}))
@@ -136,7 +135,7 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
         full_speed(config),
         limits.max_pct / 100.0,
         Travel.worst([travel(partial(axis, one), **times) for one in _variants(bound)]),
-        max(needed_s(partial(axis, one), **times) for one in _variants(free)),
+        max(needed_s(partial(axis, one), limits.tail_s, **times) for one in _variants(free)),
         allowed,
         limits.stop_distance_m,
     )
@@ -254,18 +253,21 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
     )
 
 
-def needed_s(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> float:
+def needed_s(
+    new_axis: Callable[[], ShapedAxis], tail_s: float, *, timeout_s: float, period_s: float
+) -> float:
     """Travel to which an axis can be bounded without cutting the run-on of its filter short.
 
     Of all strokes at full speed the worst one counts, and the wait for a lost joystick.
 
     Args:
         new_axis: makes the axis, with ``OutputLimits.run_on`` that bounds nothing.
+        tail_s: how long its output may run on.
         timeout_s, period_s: as of ``travel``.
     """
     most = 0.0
     ticks = max(round(RELEASES_S / period_s), 1)
-    longest_s = max(LONGEST_PULSE_S, new_axis().tail_s)
+    longest_s = max(LONGEST_PULSE_S, tail_s)
     for sign in (1.0, -1.0):
         axis, way = new_axis(), 0.0
         axis.tick(CommandInput())

@@ -7,14 +7,21 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from canshaper.checksums.kinds import checksum_names, known_checksum
 from canshaper.config.section import Origin, Section, number
 from canshaper.shaping.sway import Measured
 
 
 def _kinds(schema: dict[str, Any]) -> None:
     """Names of the kinds into the JSON schema, when that is made."""
+    from canshaper.checksums.kinds import checksum_names
+
     schema["enum"] = checksum_names()
+
+
+def _known(kind: object) -> str:
+    from canshaper.checksums.kinds import known_checksum
+
+    return known_checksum(kind)
 
 
 class Checksum(Section):
@@ -23,7 +30,7 @@ class Checksum(Section):
     signal: str
     """Signal that holds it, unsigned: half a byte, a byte, or two bytes in the byte order of the
     DBC."""
-    kind: Annotated[str, BeforeValidator(known_checksum)] | None = Field(
+    kind: Annotated[str, BeforeValidator(_known)] | None = Field(
         None,
         description="how it is computed",
         examples=["crc8_sae_j1850"],

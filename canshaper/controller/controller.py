@@ -4,25 +4,20 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.motion import motion_runners
+from canshaper.controller.motion import Couplings
 from canshaper.controller.received import MachineInputs, parts, received_by
 from canshaper.controller.runner import AxisControl
-from canshaper.controller.status import AimPoint, SensorReport, StatusMessages
+from canshaper.controller.status import SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
-from canshaper.inputs.input import EnableGate, Key, Part, carry_over
+from canshaper.inputs.input import Key, Part, carry_over
+from canshaper.inputs.stops import EnableGate
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.named_codes import values_of_schedules
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason, State, Transition
-
-if TYPE_CHECKING:
-    from canshaper.controller.demands import AxisEnds, RopeControl, SharedFlow
-    from canshaper.controller.parameter_sets import Load
 
 NOWHERE: frozenset[str] = frozenset()
 
@@ -52,31 +47,33 @@ class Controller:
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
             name: AxisControl(
-                bound, tick_s, inputs.joysticks[bound.config.command.joystick], self._senders
+                bound,
+                tick_s,
+                inputs.joysticks[bound.config.command.joystick],
+                self._senders[bound.valve.message.key],
             )
             for name, bound in deployment.axes.items()
         }
-        self.status = StatusMessages(deployment, self.axes.values(), self._senders)
+        self.status = StatusMessages(deployment, self.axes, self._senders)
+        for runner in self.axes.values():
+            if switches := inputs.gates.get(runner.bound.config.command.joystick):
+                runner.stops.interlocks.append(EnableGate(switches))
+            if runner.bound.feedback and runner.feedback:
+                inputs.bound.append((runner.bound.feedback, runner.feedback))
         self._sensors: dict[str, SensorReport] = {}
-        self._connect(inputs, tick_s)
-        bound = inputs.bound + [
-            (runner.bound.feedback, runner.feedback)
-            for runner in self.axes.values()
-            if runner.bound.feedback and runner.feedback
-        ]
-        routing = deployment.routing
-        self.inputs = received_by(bound)
-        self._sent, self._others = routing.sent, routing.others
-        self._protocols = protocols(deployment, self.axes, inputs.joysticks, bound)
+        for name, message in inputs.sway_sensors.items():
+            self.axes[name].add_sway_sensor(message)
+            self._sensors[name] = SensorReport(name, self.axes[name])
+        self._couplings = Couplings(deployment, self.axes, inputs, tick_s)
+        self.motions = self._couplings.motions
+        self.inputs = received_by(inputs.bound)
+        self._sent, self._others = deployment.routing.sent, deployment.routing.others
+        self._protocols = protocols(deployment, self.axes, inputs.joysticks, inputs.bound)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}
         for protocol in self._protocols:
             self.inputs |= protocol.inputs
             self._forwarding |= protocol.forwarding
-        by_message = {
-            key: [self.axes[name] for name in names] for key, names in routing.valves.items()
-        }
-        self._outputs = ValveOutputs(by_message, self._forwarding)
-        self._turns = self._outputs.turns(self.axes.items())
+        self._outputs = ValveOutputs(self.axes, deployment.routing.valves, self._forwarding)
         self._last = -1  # number of the last deadline
         self._overrun = OverrunDetector()
         self._stood_still = False
@@ -91,7 +88,7 @@ class Controller:
         self._overrun.copy_state(before._overrun)
         if before._stop is not None:
             for runner in before.axes.values():
-                runner.see(before._stop)
+                runner.stops.see(before._stop)
         carry_over(before._parts(), self._parts())
         open_before = before.deployment.config.buses.values()
         for name, bus in self.deployment.config.buses.items():
@@ -126,8 +123,7 @@ class Controller:
             The frame for the other bus of a gateway, to be sent at once; else None.
         """
         key = frame[:3]
-        entry = self.inputs.get(key)
-        if entry is not None:
+        if (entry := self.inputs.get(key)) is not None:
             fault = entry.receive(frame.data, arrived_ns)
         elif key in self._sent:  # a bus never hands back what was sent by us
             fault = FrameFault.SECOND_SENDER
@@ -157,7 +153,7 @@ class Controller:
                     return None
                 if (stop := self._stop) is not None:
                     for runner in self.axes.values():
-                        runner.see(stop)
+                        runner.stops.see(stop)
                 stopped = stop is not None and stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
                 self.moves = rule.moves
@@ -185,10 +181,11 @@ class Controller:
             self._stood_still = False
             self._invalidate()
         overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
-        together = missed or self.motions or self._flow or self._ends or self._load
-        changed = self._before_axes(now_ns, last, now) if together else []
+        changed = self._missed(last, now) if missed else []
+        if self._couplings.any:
+            self._couplings.step(now_ns, last, now, self.events)
         silent = self.silent_buses if self._protocols else NOWHERE
-        for name, runner, message, rule in self._turns:
+        for name, runner, message, rule in self._outputs.turns:
             period = runner.period_ticks
             if now // period - last // period:
                 transition = runner.tick(now_ns, self._stop, overrun)
@@ -226,67 +223,15 @@ class Controller:
             yield from protocol.frames(now_ns)
             self.events += protocol.changes()
 
-    def _before_axes(self, now_ns: int, last: int, now: int) -> list[AxisControl]:
-        """Count missed ticks of every axis, look for ends and ropes, add motions, share the oil.
-
-        Returns:
-            The axes whose state has changed: their filters failed in a missed tick.
-        """
+    def _missed(self, last: int, now: int) -> list[AxisControl]:
+        """Count missed deadlines; return the axes whose filters failed in them."""
+        self.counters.add(FrameFault.MISSED_DEADLINE, now - last - 1)
         changed = []
-        if now > last + 1:
-            self.counters.add(FrameFault.MISSED_DEADLINE, now - last - 1)
-            for name, runner in self.axes.items():
-                if (transition := runner.hold(last, now)) is not None:
-                    self._changed(name, runner, transition)
-                    changed.append(runner)
-        for runner, run_on in self._followed:  # it held its last demand until now
-            if ticks := now // runner.period_ticks - last // runner.period_ticks:
-                run_on.add(runner.axis.command, ticks)
-        if self._load and (load := self._load.step(now_ns)):
-            self.events.append(load)
-        for end in self._ends:
-            if (change := end.step(now_ns)) is not None:
-                self.events.append(change)
-        for motion in self.motions:
-            if (event := motion.step(now_ns, last, now)) is not None:
-                self.events.append(event)
-        if self._flow:
-            self.events += self._flow.step(now_ns, now - last)
+        for name, runner in self.axes.items():
+            if (transition := runner.hold(last, now)) is not None:
+                self._changed(name, runner, transition)
+                changed.append(runner)
         return changed
-
-    def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
-        """Connect load state, profile, sway sensors, ends and two-axis motions to the axes."""
-        values = values_of_schedules(self.deployment.config).values()
-        self._load: Load | None = None
-        if inputs.load_state and values:
-            from canshaper.controller import parameter_sets
-
-            self._load = parameter_sets.Load(inputs.load_state, [*values])
-        for runner in self.axes.values():
-            if switches := inputs.gates.get(runner.bound.config.command.joystick):
-                runner.add_interlock(EnableGate(switches))
-            if runner.bound.config.gain_schedule or runner.bound.config.profiles:
-                runner.add_chooser(self._load, inputs.profile)
-        for name, message in inputs.sway_sensors.items():
-            self.axes[name].add_sway_sensor(message)
-            self._sensors[name] = SensorReport(name, self.axes[name])
-        self._ends: list[AxisEnds | RopeControl] = []
-        self._flow: SharedFlow | None = None
-        oil = self.deployment.config.hydraulics
-        if oil or inputs.positions or inputs.ropes:
-            from canshaper.controller import demands
-
-            self._ends = [demands.AxisEnds(self.axes[n], p) for n, p in inputs.positions.items()]
-            self._ends += [demands.RopeControl(n, self.axes[n], v) for n, v in inputs.ropes.items()]
-            others = inputs.other_flow
-            if oil:
-                self._flow = demands.SharedFlow(oil, self.axes, inputs.joysticks, others, tick_s)
-        self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
-        for motion in self.deployment.motions.values():
-            if motion.aim:
-                self.status.aims.append(AimPoint(motion, self.axes))
-        axes = self.axes.values()
-        self._followed = [(runner, runner.run_on) for runner in axes if runner.run_on]
 
     def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
         """Report changes of the valve's feedback and of the sway sensor."""
@@ -309,7 +254,7 @@ class Controller:
         for protocol in self._protocols:
             protocol.stalled()
         for runner in self.axes.values():
-            runner.invalidate()
+            runner.stops.invalid = True
             runner.trip_in_motion(Reason.LOOP_STALLED)
 
     def _invalidate(self, bus: str | None = None) -> None:

@@ -1,15 +1,23 @@
-"""The two-axis motion of a crane at work: it adds to both axes before either of them moves."""
+"""What acts on axes before any of them moves: two-axis motions, load, ends, ropes, shared oil."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from canshaper.config.crane import Motion
 from canshaper.controller.events import MotionEvent
+from canshaper.controller.received import MachineInputs
 from canshaper.controller.runner import AxisControl
 from canshaper.inputs.value import Value
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.named_codes import values_of_schedules
+from canshaper.protocols.interface import Event
 from canshaper.shaping.motion import TwoAxisMotion, farthest_m
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.states import State
+
+if TYPE_CHECKING:
+    from canshaper.controller.demands import AxisEnds, RopeControl, SharedFlow
+    from canshaper.controller.parameter_sets import Load
 
 # An axis at rest in READY may be moved by the other one.
 ABLE = (State.READY, State.ACTIVE)
@@ -51,7 +59,7 @@ class _Member:
         moving.room_m = full * back, full * ahead
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
         moving.commanded, moving.able = axis.output.commanded, axis.state in ABLE
-        moving.unattended = axis.unattended
+        moving.unattended = axis.added_time.unattended
 
 
 class MotionRunner:
@@ -172,27 +180,80 @@ def _full_speed_m_s(near_far: AxisControl) -> float:
     return sway.full_speed_m_s
 
 
-def motion_runners(
-    deployment: Deployment,
-    axes: Mapping[str, AxisControl],
-    radii: Mapping[str, Value],
-    tick_s: float,
-) -> list[MotionRunner]:
-    """Motions of a deployment.
+class Couplings:
+    """All that acts on the axes of a machine before any of them moves in a tick.
 
     Args:
-        deployment: the deployment.
-        axes: all of its axes by name.
-        radii: measured radii of the tip by name of the motion, where there are any.
+        deployment: the machine.
+        axes: its axes by name.
+        inputs: what it receives.
         tick_s: time between two ticks of the controller.
+
+    Attributes:
+        motions: the two-axis motions.
+        any: whether there is anything to do.
     """
-    motions = []
-    for name, bound in deployment.motions.items():
-        config = bound.config
-        near_far = axes[config.near_far] if config.near_far else None
-        slew, radius = axes[config.slew], radii.get(name)
-        luffing = axes[config.luffing] if config.luffing else None
-        motions.append(
-            MotionRunner(name, config, slew, near_far, radius, luffing=luffing, tick_s=tick_s)
-        )
-    return motions
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        axes: Mapping[str, AxisControl],
+        inputs: MachineInputs,
+        tick_s: float,
+    ) -> None:
+        config = deployment.config
+        self._load: Load | None = None
+        if inputs.load_state and (values := values_of_schedules(config).values()):
+            from canshaper.controller import parameter_sets
+
+            self._load = parameter_sets.Load(inputs.load_state, [*values])
+        for runner in axes.values():
+            if runner.bound.config.gain_schedule or runner.bound.config.profiles:
+                runner.add_chooser(self._load, inputs.profile)
+        self._ends: list[AxisEnds | RopeControl] = []
+        self._flow: SharedFlow | None = None
+        if (oil := config.hydraulics) or inputs.positions or inputs.ropes:
+            from canshaper.controller import demands
+
+            self._ends = [demands.AxisEnds(axes[n], p) for n, p in inputs.positions.items()]
+            self._ends += [demands.RopeControl(n, axes[n], v) for n, v in inputs.ropes.items()]
+            if oil:
+                others = inputs.other_flow
+                self._flow = demands.SharedFlow(oil, axes, inputs.joysticks, others, tick_s)
+        self.motions = [
+            MotionRunner(
+                name,
+                one.config,
+                axes[one.config.slew],
+                axes[one.config.near_far] if one.config.near_far else None,
+                inputs.radii.get(name),
+                luffing=axes[one.config.luffing] if one.config.luffing else None,
+                tick_s=tick_s,
+            )
+            for name, one in deployment.motions.items()
+        ]
+        self._followed = [(runner, runner.run_on) for runner in axes.values() if runner.run_on]
+        self.any = bool(self._load or self._ends or self._flow or self.motions)
+
+    def step(self, now_ns: int, last: int, now: int, events: list[Event]) -> None:
+        """Look at load, ends and ropes, add motions, share the oil.
+
+        Args:
+            now_ns: monotonic time.
+            last: number of the deadline of the tick before.
+            now: number of this one.
+            events: gets what is reported.
+        """
+        for runner, run_on in self._followed:  # it held its last demand until now
+            if ticks := now // runner.period_ticks - last // runner.period_ticks:
+                run_on.add(runner.axis.command, ticks)
+        if self._load and (load := self._load.step(now_ns)):
+            events.append(load)
+        for end in self._ends:
+            if (change := end.step(now_ns)) is not None:
+                events.append(change)
+        for motion in self.motions:
+            if (event := motion.step(now_ns, last, now)) is not None:
+                events.append(event)
+        if self._flow:
+            events += self._flow.step(now_ns, now - last)

@@ -143,7 +143,7 @@ class SetChooser:
         if not axis.output.commanded:
             self._driven = []
         elif driven is not None:
-            driven.append(axis.applied)
+            driven.append(axis.output.applied)
             if axis.command == 0.0 or len(driven) > self._late:
                 self._driven = None
 
@@ -153,7 +153,7 @@ class SetChooser:
         if axis.neutral:
             return True
         speed = min(abs(axis.command), self._maximum)
-        off = abs(axis.applied - math.copysign(speed, axis.command))
+        off = abs(axis.output.applied - math.copysign(speed, axis.command))
         if off > STEADY or self._restless_ns is None:
             self._restless_ns = now_ns
         return now_ns - self._restless_ns >= STEADY_NS

@@ -7,8 +7,9 @@ from canshaper.codec.message import Sender
 from canshaper.config.crane import Radius
 from canshaper.config.limits import Ends, OtherFlow, RopeSection
 from canshaper.controller.runner import AxisControl
-from canshaper.inputs.input import EmergencyStopInput, Key, MessageInput, Part, Switch, SwitchInput
+from canshaper.inputs.input import Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
+from canshaper.inputs.stops import EmergencyStopInput
 from canshaper.inputs.value import (
     PositionInput,
     ProfileButtons,

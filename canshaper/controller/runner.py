@@ -1,28 +1,23 @@
 """One axis of a deployment at work."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
-from canshaper.codec.frame import Frame
 from canshaper.codec.message import Sender
 from canshaper.config.schema import AxisSection
-from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.joystick import CommandSource
+from canshaper.inputs.stops import EmergencyStopInput, StopCauses
 from canshaper.inputs.value import Feedback, ProfileChoice, Value
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
-from canshaper.protocols.interface import Interlock, MessageKey
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.demands import RunOn
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.states import (
-    REACTION_OF,
     CommandInput,
-    Reaction,
     Reason,
     State,
     Transition,
@@ -34,9 +29,6 @@ if TYPE_CHECKING:
     from canshaper.controller.parameter_sets import Load, SetChooser
     from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 
-# How long another sender must be silent before a trip for it can be reset: ten periods of a slow
-# valve message.
-FOREIGN_NS = 1_000_000_000
 # Least radius for the speed of a tip: at the pillar it has none, and shows no swing.
 LEAST_RADIUS_M = 0.5
 
@@ -52,12 +44,12 @@ class AxisControl:
             seconds.
         displaced: how far the motion has moved it from where its own commands lead, in the same
             unit.
+        stops: why it stops or may not begin, besides what its joystick says.
         added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
         radius: measured radius of the tip of an axis that slews, where that is known.
         other: the axis that makes this one swing, where both have sway sensors of one kind.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
-        fault: what was wrong with the last setpoint that could not be encoded; for the log.
         run_on: what its filter lets run on, where that is followed.
         chooser: which sway data and filter are in force, where there is a choice.
     """
@@ -67,14 +59,14 @@ class AxisControl:
         bound: BoundAxis,
         tick_s: float,
         joystick: CommandSource,
-        senders: Mapping[MessageKey, Sender],
+        valve: Sender,
     ) -> None:
         config = bound.config
         self.bound = bound
-        self.valve = senders[bound.valve.message.key]
-        self._status = senders[bound.status.message.key] if bound.status else None
+        self.valve = valve
         self._joystick = joystick
-        self._releases = self._presses = 0  # as this axis knows them
+        self._releases = 0  # of the joystick, as this axis knows them
+        self.stops = StopCauses()
         self._signal = config.command.signal
         self._put = bound.valve.put
         self._neutral_band = config.command.neutral_pct / 100.0
@@ -91,16 +83,12 @@ class AxisControl:
             grid_steps=bound.valve.steps,
         )
         self._full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0
-        self._trip: Reason | None = None  # noted since the last tick
-        self._invalid = False  # the input was lost since the last tick, though it may be back
-        self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.added, self.damps = 0.0, False
         self.room = -math.inf, math.inf
         self.displaced = 0.0
         self.run_on: RunOn | None = None
         self.other: AxisControl | None = None
         self.alone = False
-        self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
         self.radius: Value | None = None
         self._sway_signal: SwaySignal | None = None
@@ -110,28 +98,10 @@ class AxisControl:
         """Limits of this axis with such a configuration."""
         return output_limits(config, timeout_ms=self.bound.timeout_ms, period_s=self.period_s)
 
-    @property
-    def tripping(self) -> bool:
-        """Whether the next tick trips the axis: what it sent last no longer holds."""
-        return self._trip is not None
-
-    def trip(self, reason: Reason) -> None:
-        """Trip with the next tick: neutral at once, latched; a later cause replaces this one."""
-        self._trip = reason
-
     def trip_in_motion(self, reason: Reason) -> None:
-        """Trip like ``trip``, unless the axis is neutral."""
+        """Trip with the next tick, unless the axis is neutral."""
         if not self.axis.neutral:
-            self._trip = reason
-
-    def invalidate(self) -> None:
-        """Take note that the input was lost, though it may be back by the next tick."""
-        self._invalid = True
-
-    def foreign_sender(self, now_ns: int) -> None:
-        """Trip, because another sender has sent a frame with the id of this valve."""
-        self._trip = self._trip or Reason.SECOND_SENDER
-        self._foreign_ns = now_ns
+            self.stops.trip = reason
 
     def drop_added(self) -> None:
         """Add nothing from now on; the next output is not faster for what was added."""
@@ -150,10 +120,6 @@ class AxisControl:
             tail_s = self.bound.config.limits.tail_s
             self.run_on = RunOn(*self.new_filter(), self.period_s, tail_s)
         return self.run_on
-
-    def add_interlock(self, interlock: Interlock) -> None:
-        """Add an interlock: it has to agree before the axis may move."""
-        self._interlocks.append(interlock)
 
     def add_chooser(self, load: "Load | None", profile: ProfileChoice | None) -> None:
         """Let load and operator choose sway data and filter."""
@@ -191,18 +157,12 @@ class AxisControl:
         if axis is not None:
             self.axis, self.chooser = axis, None
 
-    def see(self, emergency: EmergencyStopInput) -> None:
-        """Trip for a press that came since the last tick, though it may be over by now."""
-        if emergency.presses != self._presses:
-            self._trip = self._trip or Reason.EMERGENCY_STOP
-
     def copy_state(self, before: Self) -> None:
         """Stay latched, and trip for what the same axis has not acted on: a reload is no reset."""
         latched = before.axis
         if latched.state is State.TRIPPED:
             self.axis.restore(latched.state, latched.reason)
-        self._trip = before._trip or self._trip
-        self._foreign_ns = before._foreign_ns or self._foreign_ns
+        self.stops.copy_state(before.stops)
 
     def adjust(self, config: AxisSection) -> None:
         """Go on with another configuration of sway, filter and limits, all else as before.
@@ -241,10 +201,10 @@ class AxisControl:
             overrun: too many deadlines were missed lately.
         """
         fault = None
-        if emergency or self._interlocks or self._invalid or self._foreign_ns is not None:
-            fault = self._objections(now_ns, emergency)
-        axis, joystick = self.axis, self._joystick
-        trip, self._trip = self._trip, None
+        axis, joystick, stops = self.axis, self._joystick, self.stops
+        if emergency or stops.interlocks or stops.invalid or stops.foreign_ns is not None:
+            fault = stops.fault(now_ns, emergency, neutral=axis.neutral)
+        trip, stops.trip = stops.trip, None
         command, self._releases = joystick.command(
             self._signal, now_ns, self._releases, trip, self._neutral_band
         )
@@ -281,34 +241,6 @@ class AxisControl:
         """Put a setpoint into the message of the valve."""
         self.bound.valve.put(self.valve.raw, steps)
 
-    def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
-        """Return why the axis has to stop or may not begin; note causes for neutral at once."""
-        trip = self._trip
-        if self._foreign_ns is not None:
-            if now_ns - self._foreign_ns <= FOREIGN_NS:
-                trip = trip or Reason.SECOND_SENDER
-            else:
-                self._foreign_ns = None
-        neutral, fault = self.axis.neutral, None
-        for interlock in self._interlocks:
-            objection = interlock(neutral, now_ns)
-            if objection is not None and REACTION_OF[objection] is Reaction.NEUTRAL:
-                trip = trip or objection
-            else:
-                fault = fault or objection
-        if emergency is not None:
-            stop = emergency.stop(now_ns, self._presses)
-            self._presses = emergency.presses
-            if stop is Reason.EMERGENCY_STOP or (stop and not neutral):
-                trip = trip or stop
-            else:  # nothing received yet: nothing to trip, but nothing may begin
-                fault = fault or stop
-        if self._invalid:
-            self._invalid = False
-            fault = fault or Reason.JOYSTICK_TIMEOUT
-        self._trip = trip
-        return fault
-
     def _scale(self, now_ns: int) -> float:
         """Swing in rad of a model angle of 1, see ``SwayModel``, at the tip's full speed now."""
         if self.radius is not None and (radius_m := self.radius.fresh(now_ns)):
@@ -322,11 +254,6 @@ class AxisControl:
         """Return the swing by its own motion as its sensor would show it, rad or rad/s."""
         sensed = self.axis.sensed
         return sensed.own(self._scale(now_ns)) if sensed else None
-
-    def status_frame(self) -> Frame | None:
-        """Status of the axis, where it has a message for it."""
-        status, sender = self.bound.status, self._status
-        return sender.frame(status.values(self)) if status and sender else None
 
     @property
     def sway_deg(self) -> float:

@@ -1,12 +1,11 @@
 """Status messages: of every axis, of the service, and where the tip of a crane still goes."""
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.message import Sender
-from canshaper.codec.status import StatusCodec
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
 from canshaper.controller.runner import AxisControl
 from canshaper.controller.valve_messages import Counters
@@ -78,7 +77,7 @@ class StatusMessages:
 
     Args:
         deployment: the machine.
-        axes: its axes.
+        axes: its axes by name.
         senders: what sends each of its messages.
 
     Attributes:
@@ -88,12 +87,17 @@ class StatusMessages:
     def __init__(
         self,
         deployment: Deployment,
-        axes: Iterable[AxisControl],
+        axes: Mapping[str, AxisControl],
         senders: Mapping[MessageKey, Sender],
     ) -> None:
         self._deployment, self._senders = deployment, senders
-        self._axes = [one for one in axes if one.bound.status]
-        self.aims: list[AimPoint] = []
+        self._axes = [
+            (one, one.bound.status_ticks, status, senders[status.message.key])
+            for one in axes.values()
+            if (status := one.bound.status)
+        ]
+        motions = deployment.motions.values()
+        self.aims = [AimPoint(motion, axes) for motion in motions if motion.aim]
 
     def frames(
         self, changed: Collection[AxisControl], counters: Counters, last: int, now: int
@@ -106,22 +110,22 @@ class StatusMessages:
             last: number of the deadline of the tick before.
             now: number of this one.
         """
-        for runner in self._axes:
-            ticks = runner.bound.status_ticks
-            if (runner in changed or now // ticks > last // ticks) and (
-                frame := runner.status_frame()
-            ):
-                yield frame
+        for runner, ticks, status, sender in self._axes:
+            if runner in changed or now // ticks > last // ticks:
+                yield sender.frame(status.values(runner))
         for aim in self.aims:
             if now // aim.ticks > last // aim.ticks:
                 aim.update()
                 yield self._senders[aim.codec.message.key].frame(aim.codec.values(aim))
-        status, ticks = self._deployment.status, self._deployment.status_ticks
-        if status and now // ticks > last // ticks:
-            yield self._senders[status.message.key].frame(status.values(counters.status()))
+        service, ticks = self._deployment.status, self._deployment.status_ticks
+        if service and now // ticks > last // ticks:
+            yield self._senders[service.message.key].frame(service.values(counters.status()))
 
-    def identity(self, status: StatusCodec[int]) -> Frame:
-        """Return the digest of what runs, in the message that carries it."""
+    def identity(self, silent: frozenset[str]) -> Frame | None:
+        """Return the digest of what runs; None without a message for it, or on a silent bus."""
+        status = self._deployment.identity_status
+        if not status or status.message.key[0] in silent:
+            return None
         values = status.values(self._deployment.identity.digest)
         return self._senders[status.message.key].frame(values)
 

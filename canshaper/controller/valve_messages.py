@@ -1,6 +1,6 @@
 """Valve messages: their axes, counters of faults, and frames that come too late."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
@@ -17,33 +17,34 @@ class ValveOutputs:
     """All valve messages.
 
     Args:
-        axes: the axes that command each message, by its identifier.
+        axes: the axes by name, in their order.
+        valves: names of the axes that command each message, by its identifier.
         forwarding: rules by which frames leave in place of a message, by its identifier.
+
+    Attributes:
+        turns: the axes in their order; a message goes out with the last one of its axes.
     """
 
     def __init__(
         self,
-        axes: Mapping[MessageKey, Sequence[AxisControl]],
+        axes: Mapping[str, AxisControl],
+        valves: Mapping[MessageKey, Sequence[str]],
         forwarding: Mapping[MessageKey, ForwardingRule],
     ) -> None:
-        self._axes = axes
+        self._axes = {key: [axes[name] for name in names] for key, names in valves.items()}
         self._forwarding = forwarding
-
-    def turns(self, order: Iterable[tuple[str, AxisControl]]) -> list[Turn]:
-        """Return the axes in their order; a message goes out with the last one of its axes."""
-        turns: list[Turn] = []
-        for name, runner in order:
+        self.turns: list[Turn] = []
+        for name, runner in axes.items():
             key = runner.valve.key
             if self._axes[key][-1] is runner:
-                turns.append((name, runner, runner.valve, self._forwarding.get(key)))
+                self.turns.append((name, runner, runner.valve, forwarding.get(key)))
             else:
-                turns.append((name, runner, None, None))
-        return turns
+                self.turns.append((name, runner, None, None))
 
     def foreign_sender(self, key: MessageKey, arrived_ns: int) -> None:
         """Trip the axes of a message that another sender has sent."""
         for runner in self._axes.get(key, ()):
-            runner.foreign_sender(arrived_ns)
+            runner.stops.foreign_sender(arrived_ns)
 
     def send_failed(self, key: MessageKey) -> None:
         """Trip the axes in motion of a message that did not reach its bus."""
@@ -69,7 +70,7 @@ class ValveOutputs:
         """
         runners = self._axes[frame[:3]]
         for runner in runners:
-            runner.trip(Reason.OUTPUT_REFUSED)
+            runner.stops.trip = Reason.OUTPUT_REFUSED
             runner.put(0)
         return runners[0].valve.instead(frame)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.blackbox.recorder import Recorder
+from canshaper.bus.interface import AWAY
 from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
@@ -21,31 +22,28 @@ from canshaper.daemon.ports import (
     close_ports,
     new_ports,
     open_ports,
+    opened_line,
     opened_ports,
-    received_at_first,
     seen_sent,
     send_neutral,
-    waiting,
+    taken_over,
 )
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.reloads import Reloads
 from canshaper.daemon.reporter import Reporter, flush
 from canshaper.errors import BusError, InternalError, raised
-from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.gate.loop import boottime_ns, run_at_deadlines
+from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 
 if TYPE_CHECKING:
     from canshaper.daemon.control import Control
-    from canshaper.daemon.gateway import InlineGateway
 
 log = logging.getLogger("canshaper")
 
-# States in which no one receives our frames, or we receive none.
-_AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE, BusState.UNFIT)
 INTERNAL_ERROR = "INTERNAL_ERROR"
-OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))
+# States in which no one receives our frames, or we receive none.
+OFF_BUS = AWAY | {BusState.BUS_OFF, BusState.NOT_CONFIRMED}
 
 
 class Daemon:
@@ -72,11 +70,10 @@ class Daemon:
         deployment = load()
         program_sha256()  # kept from now on: to read the program takes longer than a tick
         self._ports = opened_ports(deployment, self._on_fault, self._manager)
-        self._line = self._in_line(deployment)
+        self._line = opened_line(deployment, self._on_fault)
         self._standstill = Standstill(deployment)
         self._recorder: Recorder
         self._use(deployment)
-        self._control = self._open_control(deployment)
 
     def run(self) -> None:
         """Run until SIGTERM or SIGINT; then every valve is sent neutral and the buses close.
@@ -92,14 +89,14 @@ class Daemon:
         if self._controller.deployment.listen_only:
             log.warning("listen-only=yes valves=none: nothing is sent but status")
         refuse_huge_pages()
-        why = lock_memory()
-        log.info("memory=%s", f"not-locked ({why})" if why else "locked")
+        log.info("memory=%s", f"not-locked ({why})" if (why := lock_memory()) else "locked")
         self._collector.freeze()
         # Most valves want to see it before they listen to anything else.
         valves = self._send_neutral(wait=True)
         self._black_box.begin(boottime_ns())
-        path = self._controller.deployment.path
-        log.info("started file=%s axes=%s valves=%s", path, names, valves)
+        log.info(
+            "started file=%s axes=%s valves=%s", self._controller.deployment.path, names, valves
+        )
         self._reporter.identity()
         self._manager.ready(f"started, axes {names}")
         try:
@@ -131,19 +128,15 @@ class Daemon:
     # -- one tick ------------------------------------------------------------------------------
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        """Take all waiting frames, tick the axes, send, then housekeeping.
-
-        A reload, refused or not, has taken its time as all else has: the next tick sees it.
-        """
-        controller = self._controller
+        """Take all waiting frames, tick the axes, send, then housekeeping."""
         io_cycle(self._recorder, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
         self._reporter.late(late_ns)
         self._housekeeping(now_ns)
-        applied = False
-        if self._reloads.ready and controller.neutral and not self._stop:
-            applied = self._apply(self._reloads.ready)
+        # Refused or not, a reload has taken its time as all else has: the next tick sees it.
+        ready = self._reloads.ready if self._controller.neutral else None
+        applied = ready and not self._stop and self._apply(ready)
         return not (self._stop or applied)
 
     def _wait(self, seconds: float) -> None:
@@ -171,9 +164,6 @@ class Daemon:
         if self._control:
             self._control.serve(now_ns)
         if self._reporter.status(now_ns, self._trouble):
-            for name, port in self._ports.items():
-                if news := port.look():
-                    log.warning("bus=%s %s", name, news)
             self._send_identity()
             flush()  # a reader that was slow may be back
         self._collector.pause(now_ns)
@@ -194,40 +184,26 @@ class Daemon:
             self._controller.carry_over(before)
             guarded.carry_over(self._guarded)
         self._guarded: Guarded = guarded
-        kind = Recorder
-        if deployment.config.control and deployment.config.control.rehearse_faults:
+        kind, control = Recorder, deployment.config.control
+        if control and control.rehearse_faults:
             from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
             kind = Rehearsal
         self._recorder = self._black_box.around(guarded, self._controller, kind)
         self._reporter.use(self._controller, self._ports)
+        self._control: Control | None = None
+        if control:
+            from canshaper.daemon.control import open_control
+
+            parts = self._controller, self._recorder, self._black_box, self._reporter
+            self._control = open_control(deployment, *parts)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._follower = tick_follower(deployment, self._controller)
 
-    def _in_line(self, deployment: Deployment) -> "InlineGateway | None":
-        """Return the gateway that forwards frames, if this machine stands in a line."""
-        if not deployment.config.gateway or deployment.listen_only:
-            return None
-        from canshaper.daemon.gateway import InlineGateway
-
-        return InlineGateway(deployment, self._on_fault)
-
-    def _open_control(self, deployment: Deployment) -> "Control | None":
-        """Open the control socket, if the file has one; a machine works without it too."""
-        if deployment.config.control is None:
-            return None
-        from canshaper.daemon.control import open_control
-
-        parts = self._controller, self._recorder, self._black_box, self._reporter
-        return open_control(deployment, *parts)
-
     def _apply(self, deployment: Deployment) -> bool:
-        """Replace the deployment, if its buses can be opened; else go on as before.
+        """Replace the deployment, if its buses can be opened; whether a loop has to begin.
 
         Called with every axis neutral and behind a tick, so a bus may take its time.
-
-        Returns:
-            Whether it was replaced; a loop with its tick has to begin.
         """
         self._manager.reloading()
         self._reloads.ready = None
@@ -236,21 +212,14 @@ class Daemon:
         ports: dict[str, Port] = {}
         try:
             ports = open_ports(deployment, opened, self._on_fault)
-            line = self._in_line(deployment)
+            line = opened_line(deployment, self._on_fault)
         except BusError as error:
             close_ports(new_ports(ports, opened))
             self._manager.ready("as before")
             self._reporter.refused(str(error))
             return False
         self._send_neutral()
-        closed = [port for port in opened.values() if port not in ports.values()]
-        if closed:
-            self._read(waiting(closed))
-            close_ports(closed)
-        new = new_ports(ports, opened)
-        waited = received_at_first(new, deployment) if new else []
-        for name, port in ports.items():
-            port.watch(name, deployment.routing.buses[name])
+        waited = taken_over(ports, opened, deployment, self._read)
         self._ports = ports
         if self._line:
             self._line.close()
@@ -258,11 +227,10 @@ class Daemon:
         if self._control:
             self._control.close()
         self._use(deployment, before=self._controller)
-        if new:
+        if waited is not None:
             self._read(waited)
         self._black_box.begin(boottime_ns())
         self._standstill = Standstill(deployment, before=self._standstill)
-        self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
         self._reporter.identity()
         self._manager.ready("reload applied")
@@ -280,10 +248,7 @@ class Daemon:
     # -- ends ----------------------------------------------------------------------------------
 
     def _send_neutral(self, *, wait: bool = False) -> str:
-        """Send every valve neutral.
-
-        Args:
-            wait: a moment for the frames to get onto the buses.
+        """Send every valve neutral; ``wait`` a moment for the frames to get onto the buses.
 
         Returns:
             What is known of these frames: see ``seen_sent``; ``not-sent`` where one was not.
@@ -307,13 +272,11 @@ class Daemon:
         )
 
     def _send_identity(self) -> None:
-        """Send the digest of what runs, where a message carries it and its bus may be used."""
-        status = self._controller.deployment.identity_status
-        if status and status.message.key[0] not in self._controller.silent_buses:
-            frame = self._controller.status.identity(status)
-            passes = self._guarded.passes(frame, boottime_ns())
-            if passes and not self._ports[frame.bus].send(frame):
-                self._recorder.send_failed(frame)
+        """Send the digest of what runs, where there is a message for it."""
+        frame = self._controller.status.identity(self._controller.silent_buses)
+        passes = frame and self._guarded.passes(frame, boottime_ns())
+        if frame and passes and not self._ports[frame.bus].send(frame):
+            self._recorder.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:
         self._recorder.fault(fault)

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
 from canshaper.bus.device import check_device
+from canshaper.bus.interface import GONE, REOPEN_NS
 from canshaper.bus.packet import FD_SIZE
 from canshaper.bus.port import Port
-from canshaper.bus.raw import GONE, REOPEN_NS
 from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus

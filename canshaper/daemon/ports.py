@@ -4,6 +4,7 @@ import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from canshaper.bus.port import ListeningPort, Port, open_port
 from canshaper.codec.frame import Frame, FrameFault
@@ -11,6 +12,9 @@ from canshaper.config.bus import Bus
 from canshaper.daemon.notify import ServiceManager
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.deployment import Deployment
+
+if TYPE_CHECKING:
+    from canshaper.daemon.gateway import InlineGateway
 
 log = logging.getLogger("canshaper")
 
@@ -81,23 +85,58 @@ def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Por
 
 
 def waiting(ports: Iterable[Port]) -> list[Frame]:
-    """Return the frames that wait in ports that are about to be closed."""
+    """Return the frames that wait in ports."""
     return [frame for port in ports for frame in (*port.frames(), *port.background())]
 
 
-def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame]:
-    """Return the first frames of new ports, without our own from the ports before.
+def taken_over(
+    ports: Mapping[str, Port],
+    opened: Mapping[Bus, Port],
+    deployment: Deployment,
+    read: Callable[[list[Frame]], None],
+) -> list[Frame] | None:
+    """Go over to the ports of another deployment: those that it does not have are closed.
 
-    They cannot know it for ours, and it would look like a second sender of every valve's id.
+    Args:
+        ports: its ports by name.
+        opened: the ports before.
+        deployment: the other deployment.
+        read: gets what waits in ports that are closed.
+
+    Returns:
+        What waits in new ports, without our own frames from the ports before: they cannot know
+        them for ours, and they would look like a second sender of every valve's id. None where no
+        port is new.
     """
-    time.sleep(ON_THE_BUS_S)
-    ours = deployment.routing.buses
-    return [
+    if closed := [port for port in opened.values() if port not in ports.values()]:
+        read(waiting(closed))
+        close_ports(closed)
+    new, ours = new_ports(ports, opened), deployment.routing.buses
+    if new:
+        time.sleep(ON_THE_BUS_S)
+    waited = [
         frame
-        for port in new
-        for frame in (*port.frames(), *port.background())
-        if frame[1:3] not in ours[port.name].sent | ours[port.name].claims
+        for frame in waiting(new)
+        if frame[1:3] not in ours[frame.bus].sent | ours[frame.bus].claims
     ]
+    for name, port in ports.items():
+        port.watch(name, ours[name])
+    return waited if new else None
+
+
+def opened_line(
+    deployment: Deployment, on_fault: Callable[[FrameFault], None]
+) -> "InlineGateway | None":
+    """Open the gateway that forwards frames, if this machine stands in a line.
+
+    Raises:
+        BusError: an interface cannot be opened.
+    """
+    if not deployment.config.gateway or deployment.listen_only:
+        return None
+    from canshaper.daemon.gateway import InlineGateway
+
+    return InlineGateway(deployment, on_fault)
 
 
 def close_ports(ports: Iterable[Port]) -> None:

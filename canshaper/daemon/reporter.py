@@ -9,7 +9,7 @@ from canshaper.codec.frame import BusState, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.daemon.notify import ServiceManager
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 from canshaper.machine.filters import unfit
 from canshaper.shaping.states import State
 
@@ -91,6 +91,8 @@ class Reporter:
             if port.waited != self._waited[name]:
                 self._waited[name] = port.waited
                 log.warning("bus=%s waited=%d: valve frames, in a queue", name, port.waited)
+            if news := port.look():
+                log.warning("bus=%s %s", name, news)
         self._manager.status(self._summary(trouble()))
         self._latest_ns = 0
         return True

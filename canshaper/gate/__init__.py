@@ -20,8 +20,7 @@ log, or nothing where that is refused too.
     axis.py      an axis: is it armed, what was asked of it, what left for its valve
     rules.py     the ten rules, each a function of what was received, what left before, and now
     gate.py      frames come in, a tick begins, a frame wants to leave; a reload
-    cycle.py     one tick between buses and controller; after a standstill nothing leaves
-    loop.py      the clock, and a loop at its deadlines
+    cycle.py     the clock, a loop at its deadlines, its tick; after a standstill nothing leaves
 
 An axis is *armed* when its joystick was seen in neutral, valid and enabled, since the last reason
 to stop. A soft reason (rule 2) leaves it ``stop_s`` in which it may fall; a hard one (rule 1)

@@ -1,7 +1,7 @@
 """A received message: its length, protection, sequence and age."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping
 from typing import Any, Protocol, Self
 
 from canshaper.codec.frame import FrameFault
@@ -212,71 +212,3 @@ class SwitchInput(Input):
         released = {one.agrees: one.released for one in before.switches.values()}
         for switch in self.switches.values():
             switch.released = released.get(switch.agrees, False)
-
-
-class EnableGate:
-    """Interlock by the switches that enable a joystick, except the one to press.
-
-    When they agree again, that is no press: it resets nothing.
-
-    Args:
-        switches: them.
-    """
-
-    def __init__(self, switches: Sequence[Switch]) -> None:
-        self._switches = tuple(switches)
-        self._releases = self._count()
-
-    def __call__(self, neutral: bool, now_ns: int) -> Reason | None:
-        """Return the reason, or None; a release since the last call counts, however short."""
-        releases, self._releases = self._releases, self._count()
-        agree = releases == self._releases
-        if agree and not any(one.released or one.lost(now_ns) for one in self._switches):
-            return None
-        return Reason.ENABLE_OFF if neutral else Reason.ENABLE_LOST
-
-    def _count(self) -> int:
-        return sum(switch.releases for switch in self._switches)
-
-
-class EmergencyStopInput(Input):
-    """The emergency stop of a deployment.
-
-    Attributes:
-        presses: how often it was seen pressed.
-    """
-
-    def __init__(self, bound: BoundInput, signal: str) -> None:
-        super().__init__(bound)
-        self._signal = signal
-        self.presses = 0
-        self._pressed = False
-
-    def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take a frame: any frame can show a press, only an accepted one ends it."""
-        if raw[self._signal] != 0:
-            self.presses += 1
-            self._pressed = True
-        elif accepted:
-            self._pressed = False
-        return GOOD
-
-    def copy_state(self, before: Self) -> None:
-        """A stop that is pressed stays so until a frame that counts says otherwise."""
-        super().copy_state(before)
-        self._pressed = before._pressed
-
-    def stops(self, now_ns: int) -> bool:
-        """Whether nothing may move now: it is pressed, or lost."""
-        return self._pressed or self.lost(now_ns) is not None
-
-    def stop(self, now_ns: int, presses: int) -> Reason | None:
-        """Why nothing may move now, or None.
-
-        Args:
-            now_ns: monotonic time.
-            presses: their number at the last call.
-        """
-        if self._pressed or self.presses > presses:
-            return Reason.EMERGENCY_STOP
-        return Reason.EMERGENCY_STOP_LOST if self.lost(now_ns) else None

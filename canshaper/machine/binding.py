@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from canshaper.checksums.kinds import package_line
 from canshaper.codec.frame import (
     ACKNOWLEDGE,
     CLAIMED,
@@ -168,8 +167,12 @@ def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
     axes = config.axes.values()
     filters = {axis.filter.kind for axis in axes}
     filters |= {profile.filter.kind for axis in axes for profile in axis.profiles.values()}
-    lines = (package_line(kind) for kind in sorted(checksums))
-    return (*(line for line in lines if line), *filter_lines(filters))
+    lines: tuple[str, ...] = ()
+    if checksums:
+        from canshaper.checksums.kinds import package_line
+
+        lines = tuple(line for kind in sorted(checksums) if (line := package_line(kind)))
+    return (*lines, *filter_lines(filters))
 
 
 def _check_values(

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Literal
 
 from cantools.database.can import Signal
 
-from canshaper.checksums.kinds import CHECKSUMS, CRC_WIDTHS, Checksum, crc_kind
 from canshaper.codec.message import UNPROTECTED, Protection
 from canshaper.config.inputs import Checksum as ChecksumConfig
 from canshaper.config.inputs import Protected
@@ -13,6 +12,7 @@ from canshaper.config.source import Place
 from canshaper.machine.used_message import UsedMessage
 
 if TYPE_CHECKING:
+    from canshaper.checksums.kinds import Checksum
     from canshaper.codec.e2e import E2e
 
 # What a checksum of so many bits has to fill.
@@ -32,7 +32,9 @@ def bind_protection(used: UsedMessage, config: Protected) -> Protection:
     )
 
 
-def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> Checksum | None:
+def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> "Checksum | None":
+    from canshaper.checksums.kinds import CHECKSUMS, CRC_WIDTHS, Checksum, crc_kind
+
     place: Place = (*used.place, "checksum", "signal")
     add, message = used.diagnostics.add, used.message
     signal = used.find(place, config.signal)

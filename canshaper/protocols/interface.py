@@ -1,23 +1,21 @@
 """Interface between controller and protocols, and between protocols and axes."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.message import Sender
 from canshaper.inputs.input import Key, MessageInput, Part
+from canshaper.inputs.stops import StopCauses
 from canshaper.inputs.value import Feedback
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.states import Reason
 
 if TYPE_CHECKING:
     from canshaper.inputs.sway_sensor import SensorNode
 
 MessageKey = tuple[str, int, bool]
 """Bus, identifier, and whether that has 29 bits."""
-Interlock = Callable[[bool, int], Reason | None]
-"""Called with whether the axis is neutral, and the time; why it may not move, or None."""
 
 
 class Event(Protocol):
@@ -48,20 +46,11 @@ class DrivenAxis(Protocol):
         """Feedback of its valve."""
 
     @property
-    def tripping(self) -> bool:
-        """Whether the next tick trips it."""
+    def stops(self) -> StopCauses:
+        """Why it stops or may not begin."""
 
     def put(self, steps: int) -> None:
         """Put a command into the message of its valve."""
-
-    def invalidate(self) -> None:
-        """Take note that its input was lost, though it may be back by the next tick."""
-
-    def foreign_sender(self, now_ns: int) -> None:
-        """Trip, because another sender has sent a frame with the id of its valve."""
-
-    def add_interlock(self, interlock: Interlock) -> None:
-        """Add an interlock, which has to agree before it may move; called after those before."""
 
     def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of its sway sensor only while this node works."""

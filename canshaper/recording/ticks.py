@@ -110,7 +110,7 @@ def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
         sway_deg = DEGREES * sway.sway_rad(full_speed_m_s) if sway is not None else 0.0
         command = 0.0 if type(command) is Reason else command
         sent, mode = axis.sent, sway.mode if sway is not None else None
-        added = sent - axis.applied
+        added = sent - axis.output.applied
         values = command, sent, sway_deg, added, axis.state, runner.active_set, mode
         return new_row(Row, values)
 

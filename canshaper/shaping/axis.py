@@ -9,9 +9,6 @@ reads from ``output`` what the valve frame shall carry:
    takes the operator's demand (``transfer.py``); the output stage bounds what the filter asks for
    (``output.py``). The valve frame can leave now.
 2. ``advance`` lets the sway model swing with that output. It can wait until the frame has left.
-
-The filter may come from another package, and may raise anything. Then the axis trips: its valve
-gets neutral in the same tick, and the transition keeps the error.
 """
 
 import math
@@ -20,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from canshaper.errors import raised
 from canshaper.shaping.limits import OutputLimits, within
-from canshaper.shaping.motion import AddedTime
+from canshaper.shaping.moving_axis import AddedTime
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.shapers.kind import Shaper, spreads
 from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, STOPPING, TRIPPED, StateMachine
@@ -34,9 +31,6 @@ if TYPE_CHECKING:
 # Missed ticks that the filter and the model go through at most: after so many of them nothing moves
 # any more, and the first neutral frame must not wait.
 MOST_HELD = 2000
-# Ticks beyond the tail until an axis counts as unattended. The gate counts them by the tail alone:
-# what it gives back, it never gives back later than the axis does.
-UNATTENDED_TICKS = 3
 
 
 class ShapedAxis:
@@ -44,9 +38,8 @@ class ShapedAxis:
 
     Args:
         tick_s: time between two calls of ``tick``.
-        limits: output limits.
+        limits, shaper: its output limits, and its filter.
         sway: sway model, or None where the axis has none.
-        shaper: the filter.
         neutral_band: largest |joystick| that counts as neutral.
         stop_s: longest duration of STOPPING.
         grid_steps: steps of the valve frame from zero to full command.
@@ -59,8 +52,6 @@ class ShapedAxis:
         scale: factor of the operator's demand in front of the filter, 0 to 1.
         bounds: smallest and largest demand in front of the filter and of that factor, and of what
             is added to damp a swing.
-        unattended: whether the joystick rested longer than the tail, where a motion may move the
-            axis.
         added_time: how long a motion may still move the axis.
         bends: whether it takes an added velocity into the range of its own demands: it never moves
             without them.
@@ -92,10 +83,7 @@ class ShapedAxis:
         self._transfer = BumplessTransfer(shaper, tick_s)
         self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
         self.output = self._stage.output
-        self.added_time = AddedTime(0)
-        self._asked = False  # the motion asked this axis for something in the last tick
-        self._rested = 0  # ticks since its joystick was deflected, in whatever state
-        self.unattended = False
+        self.added_time = AddedTime(0, self._stage.tail)
 
     @property
     def raw(self) -> int:
@@ -106,16 +94,6 @@ class ShapedAxis:
     def sent(self) -> float:
         """Velocity that these steps give, [-1, 1] of full speed."""
         return self.output.setpoint
-
-    @property
-    def tail_s(self) -> float:
-        """How long the output may run on."""
-        return self._stage.limits.tail_s
-
-    @property
-    def applied(self) -> float:
-        """Part of that velocity that drives the sway model."""
-        return self.output.applied
 
     @property
     def state(self) -> State:
@@ -155,41 +133,35 @@ class ShapedAxis:
             The change of state of this tick, or in TRIPPED the first error of the filter; or None.
         """
         states, stage = self._states, self._stage
-        old = states.state
+        old, size = states.state, abs(joystick.command)
         sensor_damps = self.sensed is not None and self.sensed.weight > 0.0
-        asked = damps_now = may_add = False
+        damps_now = may_add = False
         if stage.largest_added:
-            deflected = abs(joystick.command) > self._neutral_band
-            self._rested = 0 if deflected else self._rested + 1
-            self.unattended = self._rested > stage.tail + UNATTENDED_TICKS
-            commanded, moved = self.output.commanded, self.output.steps != 0
+            asked, commanded, moved = False, self.output.commanded, self.output.steps != 0
             if not joystick.bypass:
                 damps_now = damps and sensor_damps and not commanded
                 asked = added != 0.0 or damps_now
-            may_add = self.added_time.allows(asked, commanded, moved)
-        self._asked = asked
+            may_add = self.added_time.allows(asked, commanded, moved, size > self._neutral_band)
 
         at_rest = self.output.steps == 0 and not self.output.commanded
         state = states.step(joystick, at_rest, may_add)
         if state is not old:
             self._entered(state, old)
         try:
-            held = demand = path = damping = 0.0
+            held = demand = damping = 0.0
             if state is ACTIVE or state is BYPASS_ON:
-                size = abs(joystick.command)
                 if not size < math.inf:  # it would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
                 if size > self._neutral_band:
                     held, (low, high) = joystick.command, self.bounds
                     # In bypass the crane is as it is.
                     demand = self.scale * min(max(held, low), high) if state is ACTIVE else held
-            elif state is STOPPING and abs(joystick.command) > self._neutral_band:
+            elif state is STOPPING and size > self._neutral_band:
                 stage.stop_against(joystick.command)
             self.command = demand
 
             adds = may_add and state is ACTIVE
-            if adds or (self.bends and state is ACTIVE):
-                path = added
+            path = added if adds or (self.bends and state is ACTIVE) else 0.0
             reference = self._transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
             if adds and damps_now and not held:
                 largest, (low, high) = stage.largest_added, self.bounds
@@ -213,20 +185,15 @@ class ShapedAxis:
             self.sensed.step(output.applied, self.command, output.path)
 
     def hold(self, ticks: int) -> Transition | None:
-        """Count missed ticks, in which the valve kept the last output.
+        """Count missed ticks, in which the valve kept the last output; return as ``act`` does.
 
-        They count as time: they lengthen neither the run-on nor a stop, and in each of them the
-        filter saw the last demand. Only the ramp does not catch up.
-
-        Returns:
-            As ``act``; the state changes only if the filter failed.
+        They lengthen neither the run-on nor a stop, and in each of them the filter saw the last
+        demand. Only the ramp does not catch up.
         """
-        demand = self._clamped_demand()
+        demand, output, time = self._clamped_demand(), self.output, self.added_time
         self._states.hold(ticks)
         self._stage.hold(demand, ticks)
-        self._rested += ticks
-        self.unattended = self._rested > self._stage.tail + UNATTENDED_TICKS
-        self.added_time.allows(self._asked, self.output.commanded, self.output.steps != 0, ticks)
+        time.allows(time.asked, output.commanded, output.steps != 0, ticks=ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
                 self._transfer.hold(demand)
@@ -247,18 +214,15 @@ class ShapedAxis:
         Raises:
             ValueError: mode or filter does not suit the tick; model and filter stay as they were.
         """
-        if self.sway is None:
-            sway = SwayModel(mode, self._tick_s)
-        else:
-            sway = self.sway.retuned(mode, self.applied)
+        before = self.sway
+        applied = self.output.applied
+        sway = before.retuned(mode, applied) if before else SwayModel(mode, self._tick_s)
         if past:
             sway.angle = sway.rate = 0.0
-            for applied in past:
-                sway.step(applied)
+            for velocity in past:
+                sway.step(velocity)
         shaper = shaper_for(sway)
-        self._transfer.replace(shaper, self._clamped_demand())
-        if past and hasattr(shaper, "swing_anew"):
-            shaper.swing_anew()
+        self._transfer.replace(shaper, self._clamped_demand(), anew=bool(past))
         self._stage.change_filter(spreads=spreads(shaper))
         self.sway = sway
         if self.sensed is not None:
@@ -269,25 +233,15 @@ class ShapedAxis:
         self._transfer.prepare(least, most)
 
     def follow(self, mode: SwayMode, factor: float) -> None:
-        """Go on with the swing of a rope that has another length now, without a jump of the output.
-
-        Args:
-            mode: the swing.
-            factor: its period, of that which the filter was made for.
-        """
+        """Go on with the swing of another rope length; ``factor``: its period, of the filter's."""
         assert self.sway is not None  # checked with the deployment
         self.sway.follow(mode)
         self._transfer.follow(factor)
 
     def allow_added(self, largest: float, time_s: float) -> None:
-        """Let a motion of two axes move this one where no one commands it.
-
-        Args:
-            largest: largest |velocity|, 0 to 1.
-            time_s: longest time in motion.
-        """
+        """Let a motion of two axes move this one, up to so fast and so long, unless commanded."""
         self._stage.largest_added = largest
-        self.added_time = AddedTime(round(time_s / self._tick_s))
+        self.added_time = AddedTime(round(time_s / self._tick_s), self._stage.tail)
 
     def drop_added(self) -> None:
         """End what was added at once: the motion has lost the right to move this axis."""
@@ -320,8 +274,7 @@ class ShapedAxis:
 
     def _clamped_demand(self) -> float:
         """The last demand as the filter got it."""
-        maximum = self._stage.limits.maximum
-        return within(self.command, -maximum, maximum, 0.0)
+        return within(self.command, -self._stage.limits.maximum, self._stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:
         """Trip for an error of the filter, or an output that no frame carries.

@@ -288,36 +288,3 @@ def range_with_added(
         if high == 0.0:
             high = largest
     return max(min(own, low), -maximum), min(max(own, high), maximum)
-
-
-class AddedTime:
-    """How long a motion may move an axis that no one commands.
-
-    Args:
-        ticks: longest time in motion, in ticks of the axis.
-    """
-
-    __slots__ = ("_left", "_ticks")
-
-    def __init__(self, ticks: int) -> None:
-        self._ticks = self._left = ticks
-
-    def renew(self) -> None:
-        """Give the axis its full time back: neither of its motion's operators is at work."""
-        self._left = self._ticks
-
-    def allows(self, asked: bool, commanded: bool, moved: bool, ticks: int = 1) -> bool:
-        """Count time, and say whether the motion may move the axis now.
-
-        Args:
-            asked: the motion asks for it.
-            commanded: the operator demanded motion within the tail. The axis gets its full time
-                back.
-            moved: the valve was open. An axis that stands uses up no time, and gets none back.
-            ticks: how many ticks have passed.
-        """
-        if commanded:
-            self._left = self._ticks
-        elif moved:
-            self._left -= ticks
-        return asked and self._left > 0

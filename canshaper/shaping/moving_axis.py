@@ -1,4 +1,4 @@
-"""One axis of a two-axis motion: path of its grapple, and how far it may be moved."""
+"""One axis of a two-axis motion: path of its grapple, how far and how long it may be moved."""
 
 import math
 from dataclasses import dataclass, field
@@ -129,3 +129,60 @@ class MovingAxis:
         self.added = velocity
         # A velocity that fading leaves out is not added later.
         self.reached = target if weight < 1.0 else self.reached + velocity * way
+
+
+# Ticks beyond the tail until an axis counts as unattended. The gate counts them by the tail alone:
+# what it gives back, it never gives back later than the axis does.
+UNATTENDED_TICKS = 3
+
+
+class AddedTime:
+    """How long a motion may move an axis that no one commands.
+
+    Args:
+        ticks: longest time in motion, in ticks of the axis.
+        tail: ticks for which the output may run on.
+
+    Attributes:
+        asked: whether the motion asked for something in the last tick.
+        unattended: whether the joystick rested longer than the tail, in whatever state.
+    """
+
+    __slots__ = ("_left", "_rested", "_ticks", "_unattended", "asked", "unattended")
+
+    def __init__(self, ticks: int, tail: int) -> None:
+        self._ticks = self._left = ticks
+        self._unattended = tail + UNATTENDED_TICKS
+        self.asked = self.unattended = False
+        self._rested = 0  # ticks since the joystick was deflected
+
+    def renew(self) -> None:
+        """Give the axis its full time back: neither of its motion's operators is at work."""
+        self._left = self._ticks
+
+    def allows(
+        self,
+        asked: bool,
+        commanded: bool,
+        moved: bool,
+        deflected: bool = False,
+        ticks: int = 1,
+    ) -> bool:
+        """Count time, and say whether the motion may move the axis now.
+
+        Args:
+            asked: the motion asks for it.
+            commanded: the operator demanded motion within the tail. The axis gets its full time
+                back.
+            moved: the valve was open. An axis that stands uses up no time, and gets none back.
+            deflected: the joystick is.
+            ticks: how many ticks have passed.
+        """
+        self.asked = asked
+        self._rested = 0 if deflected else self._rested + ticks
+        self.unattended = self._rested > self._unattended
+        if commanded:
+            self._left = self._ticks
+        elif moved:
+            self._left -= ticks
+        return asked and self._left > 0

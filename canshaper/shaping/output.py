@@ -79,7 +79,6 @@ class OutputStage:
         spreads: whether the filter spreads the demand over time, see ``Shaper``.
 
     Attributes:
-        limits: limits of the axis.
         output: the output of the last tick: one object, which every tick overwrites.
         ramp: the velocity of the last tick before it was rounded. If the ramp went on from the
             rounded one, it would stick on a coarse grid.
@@ -88,38 +87,20 @@ class OutputStage:
         tail: ticks for which the output may run on.
     """
 
+    # fmt: off
     __slots__ = (
-        "_carry",
-        "_crossed",
-        "_demanded",
-        "_dropped_at",
-        "_grid_steps",
-        "_no_run_on",
-        "_own_ramp",
-        "_ran",
-        "_rates",
-        "_recent",
-        "_reversal",
-        "_side",
-        "_small",
-        "_spreads",
-        "_tick_s",
-        "largest_added",
-        "limits",
-        "output",
-        "ramp",
-        "tail",
+        "_carry", "_crossed", "_demanded", "_dropped_at", "_grid_steps", "_no_run_on", "_own_ramp",
+        "_ran", "_rates", "_recent", "_reversal", "_side", "_small", "_spreads", "_tick_s",
+        "largest_added", "limits", "output", "ramp", "tail",
     )
+    # fmt: on
 
     def __init__(
         self, limits: OutputLimits, grid_steps: int, tick_s: float, *, spreads: bool
     ) -> None:
         self.output = Output()
-        self.ramp = 0.0
-        self.largest_added = 0.0
-        self._grid_steps = grid_steps
-        self._tick_s = tick_s
-        self._spreads = spreads
+        self.ramp = self.largest_added = 0.0
+        self._grid_steps, self._tick_s, self._spreads = grid_steps, tick_s, spreads
         self.tail = round(limits.tail_s / tick_s)  # ticks
         self._recent = RecentCommand(self.tail)
         self._demanded = RecentCommand(self.tail)  # the same, but no rest ends it
@@ -148,8 +129,7 @@ class OutputStage:
             held: velocity at which the operator holds the joystick.
             demand: what the filter gets of it.
             reference: velocity that the filter asks for; it may be anything.
-            path: velocity that is added for the path, see ``Output``.
-            damping: velocity that is added for damping, see ``Output``.
+            path, damping: velocities that are added, see ``Output``.
             sensor_damps: a trusted sensor shows the swing, and the filter damps it. That takes more
                 than the one movement of a small stroke.
 
@@ -215,15 +195,10 @@ class OutputStage:
         out of it is carried, and corrected in the next ticks by at most one step in each. The carry
         starts no movement: the operator would see a twitch.
         """
-        limits = self.limits
+        limits, asked = self.limits, self._demanded
+        largest = self.largest_added if added else 0.0
         low, high = range_with_added(
-            held,
-            self._demanded.low,
-            self._demanded.high,
-            own,
-            self.largest_added if added else 0.0,
-            maximum=limits.maximum,
-            no_run_on=no_run_on,
+            held, asked.low, asked.high, own, largest, maximum=limits.maximum, no_run_on=no_run_on
         )
         target = total = own
         if added:
@@ -248,13 +223,12 @@ class OutputStage:
         """
         recent = self._recent
         if held * self._side < 0.0:
-            self._reverse()
+            self._side, self._crossed = -self._side, 0
         if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
             recent.clear_against(self._side)
         self._crossed += 1
         beyond, limits = self._beyond(held), self.limits
-        over = self._ran + 0.5 * beyond * beyond / limits.fall_per_s > limits.run_on
-        if over:
+        if over := self._ran + 0.5 * beyond * beyond / limits.fall_per_s > limits.run_on:
             recent.clear()
         return over
 
@@ -272,26 +246,16 @@ class OutputStage:
         self.ramp = within(self._own_ramp, min(0.0, ramp), max(0.0, ramp), 0.0)
         self._carry = 0.0
 
-    def _reverse(self) -> None:
-        """Begin a reversal: the joystick is deflected to the other side than it was last."""
-        self._side, self._crossed = -self._side, 0
-
     def stop_against(self, held: float) -> None:
-        """End the run-on of a stop where the joystick is held against it.
-
-        By the fall, and then in neutral; or after the time that a reversal has.
-        """
+        """End the run-on of a stop held against: by the fall, or after the time of a reversal."""
         if held * self._side < 0.0:
-            self._reverse()
+            self._side, self._crossed = -self._side, 0
         if not self._reversal and held * self.ramp < 0.0:
             self._recent.clear()
             self.output.commanded = False
 
     def hold_run_on(self) -> None:
-        """Let nothing run on for a tail: the filter remembers what was driven without it, or cut.
-
-        Anti-sway was switched on in motion, or a motion was cut off.
-        """
+        """Let nothing run on for a tail: the filter remembers what it did not drive, or was cut."""
         self._no_run_on = self.tail
 
     def rest(self) -> None:

@@ -95,8 +95,16 @@ class BumplessTransfer:
         assert isinstance(self._shaper, Following)
         self._shaper.follow(factor)
 
-    def replace(self, shaper: Shaper, command: float) -> None:
-        """Go on with another filter; ``command`` is the one that is in force."""
+    def replace(self, shaper: Shaper, command: float, *, anew: bool) -> None:
+        """Go on with another filter.
+
+        Args:
+            shaper: the filter.
+            command: the one that is in force.
+            anew: the axis has swung by its sway model since it was at rest.
+        """
         carry_over(self._shaper, shaper, command)
+        if anew and hasattr(shaper, "swing_anew"):
+            shaper.swing_anew()
         self._shaper = shaper
         self._joins = True

@@ -12,7 +12,7 @@ from canshaper.commissioning.doctor.processes import before_the_rest
 from canshaper.design.lockstep import driven_part
 from canshaper.design.processes import Transport, on_transport
 from canshaper.errors import ControlError
-from canshaper.gate.loop import run_at_deadlines
+from canshaper.gate.cycle import run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane, CraneSession

@@ -5,7 +5,7 @@ from types import FrameType
 
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
-from canshaper.gate.loop import run_at_deadlines
+from canshaper.gate.cycle import run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import JoystickNode

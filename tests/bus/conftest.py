@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus import device, port, raw, socketcan
+from canshaper.bus import device, interface, port, raw, socketcan
 from canshaper.config.bus import Bus
 from tests.bus.clocks import Clocks
 from tests.bus.fake_devices import HUB, PCI, USB, FakeDevices
@@ -22,7 +22,8 @@ def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
 
     def make(*arguments: Any, **options: Any) -> Line:
         made.append(Line(*arguments, **options))
-        monkeypatch.setattr(raw, "time", made[-1])
+        for module in (interface, raw):
+            monkeypatch.setattr(module, "time", made[-1])
         return made[-1]
 
     yield make

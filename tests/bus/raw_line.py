@@ -6,6 +6,7 @@ marked, and raises the errors of a network device.
 """
 
 import socket
+from collections.abc import Callable
 from typing import Any
 
 import can
@@ -14,6 +15,7 @@ from can.interfaces.socketcan.socketcan import build_can_frame
 from canshaper.bus.packet import FD_SIZE
 from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.config.bus import Bus, Match
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
@@ -55,6 +57,26 @@ class Near(socket.socket):
             raise self.fail
 
 
+def port_on(
+    open_sockets: Callable[[BusRoutes | None], list[socket.socket]],
+    ids: BusRoutes | None,
+    on_fault: Callable[[FrameFault], None],
+    *,
+    echo: bool = True,
+    **options: Any,
+) -> RawPort:
+    """A port on these sockets; ``options`` are those of the bus."""
+    return RawPort(
+        "crane",
+        Bus(interface="socketcan", channel="can0", **options),
+        on_fault,
+        ids,
+        (ids.fd if ids else {(0x200, False)}) if options.get("fd") else (),
+        open_sockets=lambda _bus, routes: open_sockets(routes),
+        has_echo=lambda channel: echo and channel == "can0",
+    )
+
+
 class Line:
     """A bus and the port on it.
 
@@ -81,15 +103,10 @@ class Line:
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
         self.now_ns = 10**12
-        options: dict[str, Any] = {"matched": True} if matched else {}
-        if not echo:
-            options |= {"echo": lambda: False, "channel": "can0"}
-        if fd:
-            options["fd"] = ids.fd if ids else {(0x200, False)}
-            options |= {"brs": True} if brs else {}
-        self.port = RawPort(
-            "crane", self._open, ids, self.faults.append, confirms=ids is not None, **options
-        )
+        options: dict[str, Any] = {"match": Match(serial="1")} if matched else {}
+        if brs:
+            options["data_bitrate"] = 2_000_000
+        self.port = port_on(self._open, ids, self.faults.append, echo=echo, fd=fd, **options)
 
     def _open(self, ids: BusRoutes | None) -> list[socket.socket]:
         self.opened_with.append(ids)

@@ -12,7 +12,7 @@ from canshaper.bus import apart
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 from tests.bus.lines import ANSWER_S, THEIR_BYTES, SerialLine, Socketcand, until
 
 FRAME = Frame("crane", 0x110, False, b"\1\2\3\4\5\6\7\x08")

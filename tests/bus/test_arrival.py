@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.bus import packet, raw
+from canshaper.bus import interface, packet, raw
+from canshaper.bus.interface import REOPEN_NS
 from canshaper.bus.packet import SO_TIMESTAMPNS, Arrivals, stamp_ns
 from canshaper.bus.port import ListeningPort
-from canshaper.bus.raw import REOPEN_NS
-from canshaper.gate.loop import boottime_ns
+from canshaper.gate.cycle import boottime_ns
 from tests.bus.clocks import START_NS, WALL_NS, Clocks, arrivals_of
 from tests.bus.raw_line import IDS, RECEIVED, TICK_NS, Line, message
 
@@ -120,7 +120,7 @@ def test_a_clock_set_by_a_second_is_no_second(clocks: Clocks, by_ns: int, set_fi
 @pytest.fixture
 def line(clocks: Clocks, monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
     made = Line()
-    monkeypatch.setattr(raw, "time", SimpleNamespace(monotonic_ns=clocks.boottime_ns))
+    monkeypatch.setattr(interface, "time", SimpleNamespace(monotonic_ns=clocks.boottime_ns))
     yield made
     made.end()
 

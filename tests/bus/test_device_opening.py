@@ -154,15 +154,3 @@ def test_sockets_of_another_device_are_closed_at_once(
         open_sockets(bus("can2", serial="0A17"), ids)
     assert [one.closed for one in made] == [True] * (3 if ids else 1)
     assert open_sockets(bus("can2"), ids)  # without match
-
-
-@pytest.mark.parametrize(("configured", "matched"), [(bus("can0"), False), (bus(serial="1"), True)])
-def test_a_port_knows_whether_its_device_is_named(
-    monkeypatch: pytest.MonkeyPatch, configured: Bus, matched: bool
-) -> None:
-    options: dict[str, Any] = {}
-    monkeypatch.setattr("canshaper.bus.port.RawPort", lambda *_, **given: options.update(given))
-    open_port("crane", configured, lambda _fault: None)
-    assert options.pop("channel") == configured.channel
-    assert options.pop("echo").args == (configured.channel,)
-    assert options == {"confirms": False, "matched": matched, "fd": None, "brs": False}

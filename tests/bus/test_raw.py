@@ -11,10 +11,11 @@ import pytest
 from can.interfaces.socketcan.socketcan import build_can_frame, dissect_can_frame
 
 from canshaper.bus import raw
-from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
+from canshaper.bus.interface import PROBE_NS
+from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, RawPort
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.machine.routing import BusRoutes
-from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, UNKNOWN, VALVE, Line, message
+from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, UNKNOWN, VALVE, Line, message, port_on
 
 # -- frames ----------------------------------------------------------------------------------------
 
@@ -163,7 +164,7 @@ def overflowing(number: int) -> tuple[list[FrameFault], RawPort]:
     pairs = [udp_pair() for _ in range(3)]
     near, far = [near for near, _ in pairs], [far for _, far in pairs]
     near[SENT_BACK].connect(far[SENT_BACK].getsockname())
-    port = RawPort("crane", lambda _ids: near, IDS, faults.append, confirms=True)
+    port = port_on(lambda _ids: near, IDS, faults.append)
     assert port.send(VALVE)
     for _ in range(100):
         far[number].send(build_can_frame(message(0x110)))
@@ -179,7 +180,7 @@ def test_a_queue_that_has_run_over_is_reported_once_for_each_time(number: int) -
     faults: list[FrameFault] = []
     pairs = [udp_pair() for _ in range(3)]
     near = [near for near, _ in pairs]
-    port = RawPort("crane", lambda _ids: near, IDS, faults.append, confirms=True)
+    port = port_on(lambda _ids: near, IDS, faults.append)
     frame = build_can_frame(message(0x110))
     far = pairs[number][1]
     for overflows in (1, 2):

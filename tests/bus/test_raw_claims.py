@@ -6,9 +6,8 @@ from collections.abc import Callable
 import can
 import pytest
 
-from canshaper.bus import raw
+from canshaper.bus.interface import MOST_CLAIMS, PROBE_NS, REOPEN_NS
 from canshaper.bus.packet import CLASS_BUS_OFF
-from canshaper.bus.socketcan import MOST_CLAIMS
 from canshaper.codec.frame import BusState, Frame
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, RECEIVED, Line, message
@@ -62,7 +61,7 @@ def test_a_claim_that_was_lost_with_its_interface_does_not_come_back(
     line.put(message(0x110))
     assert line.received() == []
     line.near[RECEIVED].fail = None
-    line.now_ns += raw.REOPEN_NS
+    line.now_ns += REOPEN_NS
     line.received()
     claimed(line)
     assert line.received() == [CLAIM]
@@ -87,7 +86,7 @@ def test_a_claim_that_comes_back_shows_that_the_bus_takes_frames(
     line.error(CLASS_BUS_OFF)
     line.received()
     assert line.port.state is BusState.BUS_OFF
-    line.now_ns += raw.PROBE_NS
+    line.now_ns += PROBE_NS
     assert line.port.send(CLAIM)
     claimed(line)
     assert line.received() == []

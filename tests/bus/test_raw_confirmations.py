@@ -3,8 +3,8 @@
 import pytest
 
 from canshaper.bus import raw
+from canshaper.bus.interface import PROBE_NS
 from canshaper.bus.packet import SIZE
-from canshaper.bus.raw import PROBE_NS
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.raw_line import IDS, MARK_AT, OTHER, SENT_BACK, STATUS, TICK_NS, VALVE, Line, message
 
@@ -99,6 +99,13 @@ def test_of_several_frames_under_way_a_confirmation_confirms_one(line: Line) -> 
     line.confirm(VALVE)
     line.received()
     assert line.unconfirmed() == 2
+
+
+def test_valve_frames_that_waited_for_longer_than_their_cycle_are_counted(line: Line) -> None:
+    for frame in (VALVE, STATUS):
+        for _ in range(3):
+            assert line.port.send(frame)
+    assert line.port.waited == 1
 
 
 def test_a_bus_that_takes_no_frames_gets_no_more(line: Line) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.bus.raw import PROBE_NS
+from canshaper.bus.interface import PROBE_NS
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.raw_line import VALVE, Line, message
 

@@ -6,11 +6,22 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.bus.raw import PROBE_NS, REOPEN_NS, RawPort
+from canshaper.bus.interface import PROBE_NS, REOPEN_NS
 from canshaper.codec.frame import BusState, FrameFault
+from canshaper.config.bus import Match
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
-from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, TICK_NS, UNKNOWN, VALVE, Line, message
+from tests.bus.raw_line import (
+    IDS,
+    RECEIVED,
+    SENT_BACK,
+    TICK_NS,
+    UNKNOWN,
+    VALVE,
+    Line,
+    message,
+    port_on,
+)
 
 
 def down(line: Line) -> None:
@@ -66,7 +77,7 @@ def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
         assert not line.port.send(VALVE)
     else:
         assert line.received() == []
-    assert line.port.state is BusState.GONE
+    assert (line.port.state, line.port.why) == (BusState.GONE, "")
     assert line.faults[1:] == [FrameFault.BUS_GONE]
     assert [end.fileno() for end in ends] == [-1] * 3
     assert line.port.fileno() == -1
@@ -115,7 +126,7 @@ def test_a_bus_that_cannot_be_opened_is_no_port() -> None:
         raise OSError(errno.ENODEV, "no such device")
 
     with pytest.raises(OSError, match="no such device"):
-        RawPort("crane", refuse, None, lambda _fault: None, confirms=False)
+        port_on(refuse, None, lambda _fault: None)
 
 
 # -- a deployment that names the device ------------------------------------------------------------
@@ -236,7 +247,7 @@ def test_a_wrong_device_at_the_start_is_no_port() -> None:
         raise WRONG
 
     with pytest.raises(WrongDeviceError, match="expected serial number 1"):
-        RawPort("crane", refuse, None, lambda _fault: None, confirms=False, matched=True)
+        port_on(refuse, None, lambda _fault: None, match=Match(serial="1"))
 
 
 def test_a_closed_port_does_nothing_more(line: Line) -> None:

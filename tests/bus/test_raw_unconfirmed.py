@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.bus import raw, socketcan
+from canshaper.bus import interface, socketcan
 from canshaper.bus.device import has_echo
-from canshaper.bus.raw import MOST_ERRORS, PROBE_NS, QUIET_NS, REOPEN_NS
+from canshaper.bus.interface import MOST_ERRORS, PROBE_NS, QUIET_NS, REOPEN_NS
 from canshaper.bus.socketcan import ERROR_CLASSES, STATE_CLASSES, carrier, open_sockets, renamed
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.fake_sockets import BUS, IDS, Made
@@ -65,6 +65,8 @@ def test_passive_is_seen_without_an_echo(silent: Line) -> None:
     silent.error(CONTROLLER, ERROR_PASSIVE)
     silent.received()
     assert silent.port.state is BusState.PASSIVE
+    assert silent.port.send(VALVE)  # says nothing
+    assert silent.port.state is BusState.PASSIVE
 
 
 def test_with_an_echo_bus_off_ends_as_before(line: Line) -> None:
@@ -76,7 +78,7 @@ def test_with_an_echo_bus_off_ends_as_before(line: Line) -> None:
 
 
 def test_valve_frames_are_confirmed_when_each_came_back(line: Line) -> None:
-    assert line.port.confirmed
+    assert (line.port.confirmed, line.port.why) == (True, "")
     line.port.send(VALVE)
     assert line.port.confirmed is False
     line.confirm(VALVE)
@@ -101,7 +103,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
         return answer
 
     for what in given:
-        monkeypatch.setattr(raw, what, look(what))
+        monkeypatch.setattr(interface, what, look(what))
     return given
 
 
@@ -125,8 +127,9 @@ def test_a_carrier_that_is_still_there_ends_no_bus_off(
     """It is up to a second late."""
     silent.error(BUS_OFF)
     silent.received()
-    silent.port.look()
-    assert silent.port.state is BusState.BUS_OFF
+    for _ in range(2):
+        silent.port.look()
+        assert silent.port.state is BusState.BUS_OFF
 
 
 def test_with_an_echo_the_carrier_does_not_matter(line: Line, seen: dict[str, object]) -> None:
@@ -249,7 +252,7 @@ def test_a_flood_of_error_frames_is_left_to_the_kernel_for_a_while(
     asked: list[tuple[int, int]] = []
     line = make_line(ids)
     monkeypatch.setattr(
-        raw, "receive_errors", lambda one, classes: asked.append((one.fileno(), classes))
+        interface, "receive_errors", lambda one, classes: asked.append((one.fileno(), classes))
     )
     number = line.near[len(line.near) // 2].fileno()
     for _ in range(MOST_ERRORS - 1):
@@ -267,6 +270,21 @@ def test_a_flood_of_error_frames_is_left_to_the_kernel_for_a_while(
     line.received()
     assert asked == [(number, STATE_CLASSES), (number, ERROR_CLASSES)]
     assert len(line.faults) == 2 * MOST_ERRORS + 4
+
+
+def test_a_flood_of_an_interface_that_goes_is_no_failure(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> None:
+        raise OSError(errno.ENODEV, "gone")
+
+    monkeypatch.setattr(interface, "receive_errors", gone)
+    for _ in range(MOST_ERRORS):
+        line.error(BERR)
+    line.received()
+    line.port.close()
+    line.now_ns += QUIET_NS
+    assert line.received() == []
 
 
 def test_carrier_by_the_kernel() -> None:

@@ -10,6 +10,7 @@ from canshaper.controller.adjust import Adjuster
 from tests.controller.adjustable import Make
 from tests.rigs.files import text_of
 from tests.rigs.forwarder import Rig
+from tests.rigs.sent import status_frame
 
 
 def test_limits_change_in_neutral_only(make: Make) -> None:
@@ -52,8 +53,8 @@ def test_the_sway_shown_follows_full_speed(make: Make) -> None:
     shown = []
     for one in (rig, other):
         one.run(20, Slew=1000)
-        frame = one.controller.axes["slew"].status_frame()
-        assert frame is not None
+        slew = one.controller.axes["slew"]
+        frame = status_frame(slew.bound.status, slew)
         shown.append(one.messages["SlewStatus"].decode(frame.data)["PredictedSway"])
     assert shown[0] == pytest.approx(2 * shown[1], rel=0.01)
 

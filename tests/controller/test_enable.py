@@ -119,7 +119,7 @@ def test_a_latched_emergency_stop_is_not_reset_by_a_seat(switched: Machine) -> N
     cab = Cab(switched)
     cab.drive(200)
     cab.drive(600, 0.8)
-    cab.controller.axes["slew"].trip(Reason.SECOND_SENDER)
+    cab.controller.axes["slew"].stops.trip = Reason.SECOND_SENDER
     cab.drive(100)
     cab.change = seat(0, 1)
     cab.drive(300)
@@ -148,7 +148,7 @@ def test_the_gate_does_not_need_the_controller_for_it(
     """A controller that has forgotten its switches: the gate lets nothing pass."""
     cab = Cab(switched)
     for runner in cab.controller.axes.values():
-        runner._interlocks.clear()
+        runner.stops.interlocks.clear()
     cab.drive(200)
     cab.drive(600, 0.8)
     assert cab.moves

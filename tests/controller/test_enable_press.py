@@ -48,7 +48,7 @@ def test_a_release_that_does_not_count_is_no_press(switched: Machine, enable: st
     cab = Cab(switched)
     cab.drive(200)
     cab.drive(600, 0.8)
-    cab.controller.axes["slew"].trip(Reason.SECOND_SENDER)
+    cab.controller.axes["slew"].stops.trip = Reason.SECOND_SENDER
     cab.drive(400)
     assert cab.slew == (State.TRIPPED, Reason.SECOND_SENDER)
     can_id = {"enable: Enable": 272, "enable: seat": 288}.get(enable, 273)

@@ -6,8 +6,9 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.inputs.input import EmergencyStopInput, EnableGate, Input, Switch, SwitchInput
+from canshaper.inputs.input import Input, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
+from canshaper.inputs.stops import EmergencyStopInput, EnableGate
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import MessageKey

@@ -11,6 +11,7 @@ from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
 from tests.rigs.files import ROOT
 from tests.rigs.forwarder import Rig
+from tests.rigs.sent import status_frame
 
 Make = Callable[..., Rig]
 FULL = {"Slew": 1000, "NearFar": 1000}
@@ -203,8 +204,7 @@ def test_its_reason_says_that_the_pump_gives_no_more(pump: Rig) -> None:
     axes = pump.controller.axes
     reasons = [axis.reason for axis in axes.values()]
     assert reasons == [Reason.FLOW_LIMITED, Reason.FLOW_LIMITED, Reason.JOYSTICK_NEUTRAL]
-    frame = axes["slew"].status_frame()
-    assert frame is not None
+    frame = status_frame(axes["slew"].bound.status, axes["slew"])
     sent = pump.message("SlewStatus").decode(frame.data, decode_choices=False)
     assert sent["Reason"] == Reason.FLOW_LIMITED
     pump.run(20)  # runs on

@@ -67,8 +67,8 @@ def swing_of_log(rig: Rig, seconds: float) -> float:
             if tick % 5 == 0:
                 say(rig, kg)
             rig.run(1, Slew=1000)
-            log.step(axis.applied)
-    return math.hypot(log.angle * log.mode.omega_rad_s, log.rate + axis.applied)
+            log.step(axis.output.applied)
+    return math.hypot(log.angle * log.mode.omega_rad_s, log.rate + axis.output.applied)
 
 
 @pytest.mark.parametrize("late_s", [0.5, 0.9])

@@ -55,7 +55,7 @@ def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make
     for tick in range(250):
         rig.run(1, Slew=1000 if tick < 125 else 0)
         added += slew.added * TICK_S * FULL_SPEED_RAD_S
-        assert slew.axis.sent - slew.axis.applied == pytest.approx(slew.added, abs=1e-12)
+        assert slew.axis.sent - slew.axis.output.applied == pytest.approx(slew.added, abs=1e-12)
         lead = sway.angle * FULL_SPEED_RAD_S
         speed = sway.rate * FULL_SPEED_RAD_S
         missing = math.atan2(lead, 1.0 - (speed / sway.mode.omega_rad_s) ** 2) - lead
@@ -120,7 +120,7 @@ def test_without_near_far_slew_keeps_its_part(changed_rig: Make) -> None:
     rig.run(3)
     assert set(near_far(rig, 60, Slew=1000)) == {0.0}
     slew = rig.controller.axes["slew"]
-    assert slew.axis.sent - slew.axis.applied == pytest.approx(slew.added, abs=1e-12)
+    assert slew.axis.sent - slew.axis.output.applied == pytest.approx(slew.added, abs=1e-12)
     assert slew.added != 0.0
     rig.controller.motions[0].adjust()
     rig.run(1, Slew=1000)

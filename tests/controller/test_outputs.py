@@ -56,8 +56,8 @@ def test_it_has_the_count_of_the_refused_one() -> None:
 def test_its_axes_trip_with_the_next_tick(changed_rig: Callable[..., Rig]) -> None:
     rig = changed_rig().moving()
     rig.controller.refused(rig.run(1, Slew=1000)["SlewCommand"][""])
-    assert rig.controller.axes["slew"].tripping
-    assert not rig.controller.axes["near_far"].tripping
+    assert rig.controller.axes["slew"].stops.trip
+    assert not rig.controller.axes["near_far"].stops.trip
     rig.run(1, Slew=1000)
     assert rig.reason() == Reason.OUTPUT_REFUSED.name
 

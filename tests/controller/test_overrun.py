@@ -185,7 +185,7 @@ def test_a_joystick_held_the_other_way_ends_the_run_on(rig: Rig, interlock: bool
     rig.moving()
     runner = rig.controller.axes["slew"]
     if interlock:
-        runner.add_interlock(lambda neutral, now_ns: Reason.NODE_FAULT)
+        runner.stops.interlocks.append(lambda neutral, now_ns: Reason.NODE_FAULT)
         late(rig, Slew=-1000)
     else:
         overrun(rig, Slew=1000)

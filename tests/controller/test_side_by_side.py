@@ -47,8 +47,8 @@ class Driven:
         frames = [*self._hand.frames(time_ms, held), *self._feedback]
         sent = [one for one in (self._guarded.receive(f, now_ns) for f in frames) if one]
         sent += self._guarded.tick(now_ns)
-        if time_ms % 1000 == 0 and (identity := self._deployment.identity_status):
-            sent.append(self.controller.status.identity(identity))
+        if time_ms % 1000 == 0 and (identity := self.controller.status.identity(frozenset())):
+            sent.append(identity)
         for frame in sent:
             self._plant.receive(frame)
         self._plant.advance(tick_ms / 1000.0)

@@ -14,7 +14,7 @@ from canshaper.daemon import daemon as module
 from canshaper.daemon import ports as service_ports
 from canshaper.daemon import reloads, reporter
 from canshaper.daemon.daemon import Daemon
-from canshaper.gate import cycle, loop
+from canshaper.gate import cycle
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import BusRoutes
@@ -104,9 +104,9 @@ class Bench:
         self.rig = Rig(self.file)  # for its joysticks
         self._tick = 0
         self._handlers: dict[int, Any] = {}
-        for one in (loop, service_ports):
+        for one in (cycle, service_ports):
             monkeypatch.setattr(one, "time", self)
-        for one in (module, reporter, loop, cycle):
+        for one in (module, reporter, cycle):
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
         leave = lambda code: pytest.fail(f"left with {code}")  # noqa: E731

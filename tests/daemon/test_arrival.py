@@ -10,7 +10,7 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import CanopenNode
-from canshaper.controller.runner import FOREIGN_NS
+from canshaper.inputs.stops import FOREIGN_NS
 from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import State
 from tests.rigs.canopen import OPERATIONAL

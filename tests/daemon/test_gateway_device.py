@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.bus.raw import REOPEN_NS
+from canshaper.bus.interface import REOPEN_NS
 from canshaper.cli.app import app
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus, Match

@@ -12,6 +12,7 @@ from canshaper.bus.packet import CAN_FRAME
 from canshaper.bus.port import open_port
 from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import FrameFault
+from canshaper.config.bus import Bus
 from canshaper.daemon import gateway
 from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InlineGateway
 from canshaper.errors import GatewayError
@@ -37,7 +38,13 @@ def ends() -> Iterator[tuple[dict[str, RawPort], dict[str, socket.socket], list[
         for one in (ours, others[name]):
             one.setblocking(False)
         ports[name] = RawPort(
-            name, lambda _ids, one=ours: [one], None, faults.append, confirms=False
+            name,
+            Bus(interface="socketcan", channel=""),
+            faults.append,
+            None,
+            (),
+            open_sockets=lambda _bus, _ids, one=ours: [one],
+            has_echo=bool,
         )
     yield ports, others, faults
     for port in ports.values():

@@ -169,7 +169,7 @@ def test_a_setpoint_beyond_full_trips_its_axis_only(rig: Rig) -> None:
     assert sent["SlewCommand"]["Velocity"] == 0
     assert sent["LiftCommand"]["Velocity"] > 50
     assert (axis.state, axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
-    assert (axis.raw, axis.sent, axis.applied) == (0, 0.0, 0.0)
+    assert (axis.raw, axis.sent, axis.output.applied) == (0, 0.0, 0.0)
 
 
 def test_run_ends_with_an_exit_code_after_which_it_is_started_again(

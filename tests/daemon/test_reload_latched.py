@@ -37,8 +37,8 @@ def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench)
 def test_whatever_was_latched_is_so_after_it_a_lost_address_too(rig: Rig) -> None:
     """Since the axis moved when the address was lost, other reasons to stop may have come."""
     axes = rig.controller.axes
-    axes["slew"].trip(Reason.EMERGENCY_STOP)
-    axes["near_far"].trip(Reason.ADDRESS_LOST)
+    axes["slew"].stops.trip = Reason.EMERGENCY_STOP
+    axes["near_far"].stops.trip = Reason.ADDRESS_LOST
     rig.run(3)
     assert [rig.state(axis) for axis in axes] == [State.TRIPPED, State.TRIPPED, State.READY]
     before, rig.controller = rig.controller, Controller(rig.deployment)
@@ -53,7 +53,7 @@ def test_whatever_was_latched_is_so_after_it_a_lost_address_too(rig: Rig) -> Non
 
 
 def test_a_reset_that_is_held_through_a_reload_is_no_press(rig: Rig) -> None:
-    rig.controller.axes["slew"].trip(Reason.EMERGENCY_STOP)
+    rig.controller.axes["slew"].stops.trip = Reason.EMERGENCY_STOP
     rig.run(3, Reset=1)
     before, rig.controller = rig.controller, Controller(rig.deployment)
     rig.controller.carry_over(before)

@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from canshaper.gate import loop
-from canshaper.gate.cycle import Standstill, longest_gap_ns
-from canshaper.gate.loop import run_at_deadlines
+from canshaper.gate import cycle
+from canshaper.gate.cycle import Standstill, longest_gap_ns, run_at_deadlines
 from canshaper.shaping.states import State
 from tests.rigs.emergency import DBC, LAST, STOP
 from tests.rigs.files import ROOT
@@ -85,8 +84,8 @@ def test_a_loop_that_is_held_up_in_its_sleep_trips_by_the_time_that_was(
         machine.tick(0, missed)
         return len(calls) < 2
 
-    monkeypatch.setattr(loop, "time", Sleeper())
-    monkeypatch.setattr(loop, "boottime_ns", lambda: machine.now_ns)
+    monkeypatch.setattr(cycle, "time", Sleeper())
+    monkeypatch.setattr(cycle, "boottime_ns", lambda: machine.now_ns)
     run_at_deadlines(20 * MS, body)
     assert calls == [0, (20 + held_ms) * MS]
     assert (machine.rig.reason() == "LOOP_STALLED") is trips
@@ -102,7 +101,7 @@ CLOCKED = ("bus", "inputs", "protocols", "controller", "daemon", "commissioning"
 def test_no_loop_has_a_clock_that_stands_still_in_a_suspend() -> None:
     """Times that are compared with that of a tick are of its clock."""
     monotonic = re.compile(r"monotonic_ns\(\)|= time\.monotonic_ns\b")
-    own = {"raw.py", "gateway.py", "notify.py"}  # of bus and service manager, which ask themselves
+    own = {"raw.py", "interface.py", "gateway.py", "notify.py"}  # of bus and service manager
     rooms = [ROOT / "canshaper" / name for name in CLOCKED]
     files = [file for room in rooms for file in room.rglob("*.py")]
     assert {"loop.py", "joysticks.py", "run.py", "daemon.py"} < {file.name for file in files}

@@ -21,8 +21,8 @@ from canshaper.daemon import gateway as gateway_module
 from canshaper.daemon import ports as ports_module
 from canshaper.daemon import reloads, reporter
 from canshaper.errors import ConfigError, GatewayError
+from canshaper.gate import cycle as cycle_module
 from canshaper.gate import cycle as io_cycle_module
-from canshaper.gate import loop as loop_module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.daemon.bench import Uncollected
@@ -237,7 +237,7 @@ class Bench:
 
     def _replaced(self) -> Iterator[tuple[Any, str, Any]]:
         yield time, "monotonic_ns", self.now_ns
-        for one in (module, reporter, loop_module, io_cycle_module):
+        for one in (module, reporter, cycle_module, io_cycle_module):
             yield one, "boottime_ns", self.now_ns
         yield time, "monotonic", lambda: self.now_ns() / 1e9
         yield time, "sleep", self.sleep

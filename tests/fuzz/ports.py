@@ -6,7 +6,7 @@ Unix sockets carry them; the kernel's own never hand over a structure of another
 import errno
 from unittest.mock import patch
 
-from canshaper.bus import raw
+from canshaper.bus import interface, raw
 from canshaper.codec.frame import BusState, Frame
 from tests.bus.raw_line import IDS, OTHER, STATUS, VALVE, Line
 from tests.fuzz.frames import Bytes
@@ -19,7 +19,7 @@ def run(data: bytes) -> set[BusState]:
     source = Bytes(data)
     line = Line(IDS if source.number() & 1 else None)
     seen = {line.port.state}
-    with patch.object(raw, "time", line):
+    with patch.object(raw, "time", line), patch.object(interface, "time", line):
         try:
             while source.left:
                 _step(line, source)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.gate import loop
+from canshaper.gate import cycle
 
 PERIOD_NS = 20_000_000
 START_NS = 1_000_000_000_000
@@ -47,9 +47,9 @@ def calls(clock: Clock, work_ns: list[int]) -> list[tuple[int, int, int]]:
         return work is not None
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "time", clock)
-        patch.setattr(loop, "boottime_ns", clock.boottime_ns)
-        loop.run_at_deadlines(PERIOD_NS, body)
+        patch.setattr(cycle, "time", clock)
+        patch.setattr(cycle, "boottime_ns", clock.boottime_ns)
+        cycle.run_at_deadlines(PERIOD_NS, body)
     return seen
 
 
@@ -135,7 +135,7 @@ def test_an_exception_of_the_body_ends_the_loop() -> None:
         raise RuntimeError("broken")
 
     with pytest.raises(RuntimeError, match="broken"):
-        loop.run_at_deadlines(PERIOD_NS, body)
+        cycle.run_at_deadlines(PERIOD_NS, body)
 
 
 @given(
@@ -163,9 +163,9 @@ def test_who_waits_otherwise_is_informed_for_how_long() -> None:
         clock.now_ns += round(seconds * 1e9)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "time", clock)
-        patch.setattr(loop, "boottime_ns", clock.boottime_ns)
-        loop.run_at_deadlines(PERIOD_NS, lambda *_: next(left), wait)
+        patch.setattr(cycle, "time", clock)
+        patch.setattr(cycle, "boottime_ns", clock.boottime_ns)
+        cycle.run_at_deadlines(PERIOD_NS, lambda *_: next(left), wait)
     assert waited == [0.02, 0.02]
     assert clock.slept == []
 
@@ -204,6 +204,6 @@ def test_deadlines_that_are_moved_are_counted_as_others(
         return work is not None
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "time", clock)
-        patch.setattr(loop, "boottime_ns", clock.boottime_ns)
-        loop.run_at_deadlines(PERIOD_NS, body, steer=steer)
+        patch.setattr(cycle, "time", clock)
+        patch.setattr(cycle, "boottime_ns", clock.boottime_ns)
+        cycle.run_at_deadlines(PERIOD_NS, body, steer=steer)

@@ -12,7 +12,7 @@ from canshaper.gate.checks import E2e
 from canshaper.gate.gate import Gate
 from canshaper.gate.received import Received
 from canshaper.gate.record import Protection
-from canshaper.inputs.input import EmergencyStopInput
+from canshaper.inputs.stops import EmergencyStopInput
 from canshaper.machine.deployment import Deployment
 from tests.faults import variants
 from tests.gate.bench import Bench, bench, load

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.input import EmergencyStopInput
+from canshaper.inputs.stops import EmergencyStopInput
 from canshaper.shaping.states import Reason
 from tests.rigs.emergency import Machine
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from canshaper.shaping.axis import UNATTENDED_TICKS
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.motion import AddedTime, range_with_added
+from canshaper.shaping.motion import range_with_added
+from canshaper.shaping.moving_axis import UNATTENDED_TICKS, AddedTime
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.states import CommandInput, Reason, State
 from tests.shaping.added_pair import SLACK, TICK_S, pair
@@ -42,7 +42,7 @@ def test_the_range_of_both_parts(
 
 
 def test_time_counts_while_the_axis_is_moved_and_no_one_commands_it() -> None:
-    time = AddedTime(3)
+    time = AddedTime(3, 20)
     for _ in range(5):  # below what the valve can: it does not move
         assert time.allows(asked=True, commanded=False, moved=False)
     assert time.allows(asked=True, commanded=False, moved=True)
@@ -56,7 +56,7 @@ def test_time_counts_while_the_axis_is_moved_and_no_one_commands_it() -> None:
 
 def test_a_pause_gives_no_time_back() -> None:
     """Only its operator does, or that no joystick of the motion was deflected for the tail."""
-    time = AddedTime(2)
+    time = AddedTime(2, 20)
     time.allows(asked=True, commanded=False, moved=True)
     time.allows(asked=False, commanded=False, moved=True)
     for _ in range(500):
@@ -74,19 +74,19 @@ def test_its_joystick_rests_for_longer_than_the_tail(fault: Reason | None) -> No
     axis.tick(CommandInput(0.02, fault=fault))
     axis.hold(3)
     for _ in range(20 + UNATTENDED_TICKS - 3):
-        assert not axis.unattended
+        assert not axis.added_time.unattended
         axis.tick(CommandInput(0.02, fault=fault))
-    assert axis.unattended
+    assert axis.added_time.unattended
     axis.tick(CommandInput(-0.5, fault=fault))
-    assert not axis.unattended
+    assert not axis.added_time.unattended
 
 
 def test_at_the_start_it_is_attended_for_as_long() -> None:
     axis, _ = pair(OutputLimits(tail_s=1.0))
     for _ in range(20 + UNATTENDED_TICKS):
-        assert not axis.unattended
+        assert not axis.added_time.unattended
         axis.tick(CommandInput())
-    assert axis.unattended
+    assert axis.added_time.unattended
 
 
 def test_time_is_used_up_in_the_bypass_too() -> None:
@@ -139,7 +139,7 @@ def test_a_joystick_that_is_pushed_the_other_way_ends_it_by_the_rate(
     for _ in range(5):
         axis.tick(CommandInput(sign * 0.5), -sign * 0.2)
     assert sign * axis.sent == pytest.approx(0.3, abs=0.02)
-    assert sign * axis.applied == pytest.approx(0.5, abs=0.02)
+    assert sign * axis.output.applied == pytest.approx(0.5, abs=0.02)
 
 
 def test_what_is_cut_of_the_sum_is_cut_from_the_own_part() -> None:
@@ -148,7 +148,7 @@ def test_what_is_cut_of_the_sum_is_cut_from_the_own_part() -> None:
     for _ in range(10):
         axis.tick(CommandInput(0.1), -0.2)
     assert axis.sent == 0.0
-    assert axis.applied == pytest.approx(0.2)
+    assert axis.output.applied == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -36,7 +36,7 @@ def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> No
     axis.tick(CommandInput(command), bad)
     assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
     assert axis.sway is not None
-    assert (axis.sway.angle, axis.sway.rate, axis.applied) == (0.0, 0.0, 0.0)
+    assert (axis.sway.angle, axis.sway.rate, axis.output.applied) == (0.0, 0.0, 0.0)
     axis.tick(CommandInput(enabled=False))
     axis.tick(CommandInput())
     axis.tick(CommandInput())

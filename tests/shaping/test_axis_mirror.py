@@ -47,7 +47,11 @@ def test_the_mirror_image_of_a_drive(limits: OutputLimits, seed: int) -> None:
     for joystick, added in busy(seed):
         changed = one.tick(joystick, added)
         assert other.tick(joystick._replace(command=-joystick.command), -added) == changed
-        assert (other.raw, other.sent, other.applied) == (-one.raw, -one.sent, -one.applied)
+        assert (other.raw, other.sent, other.output.applied) == (
+            -one.raw,
+            -one.sent,
+            -one.output.applied,
+        )
         assert (other.output.commanded, other.neutral) == (one.output.commanded, one.neutral)
         moved.add(one.raw > 0)
     assert moved == {True, False}

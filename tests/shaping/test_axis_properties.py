@@ -143,7 +143,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def miss(self, ticks: int) -> None:
         self.axis.hold(ticks)
         for _ in range(ticks):
-            self.shadow.step(self.axis.applied)
+            self.shadow.step(self.axis.output.applied)
         self.now += ticks
 
     @rule(mode=modes, pole=st.floats(-8.0, -0.5), ticks=durations)
@@ -151,7 +151,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
         known = self.axis.sway is not None
         self.axis.retune(mode, lambda model: self.shaper(model, (pole, 1.5 * pole)))
         fresh = SwayModel(mode, self.setup.tick_s)
-        self.shadow = self.shadow.retuned(mode, self.axis.applied) if known else fresh
+        self.shadow = self.shadow.retuned(mode, self.axis.output.applied) if known else fresh
         self.keep(self.joystick, ticks)
 
     @rule(says=st.one_of(joysticks, st.sampled_from([1e300, -1e300, math.nan, math.inf])))
@@ -174,13 +174,13 @@ class AxisUnderWatch(RuleBasedStateMachine):
         if twin is not None:  # nothing that may be added to
             twin.tick(joystick)
             assert (axis.state, axis.raw, axis.sent) == (twin.state, twin.raw, twin.sent)
-            assert axis.applied == twin.applied == axis.sent
+            assert axis.output.applied == twin.output.applied == axis.sent
         self.now += 1
         self.carried = self.added if adds and axis.state is State.ACTIVE else 0.0
-        assert axis.applied == axis.sent - self.carried
+        assert axis.output.applied == axis.sent - self.carried
         if axis.state is State.TRIPPED and axis.reason is Reason.OUTPUT_INVALID and transition:
             self.shadow = SwayModel(self.shadow.mode, self.setup.tick_s)
-        self.shadow.step(axis.applied)
+        self.shadow.step(axis.output.applied)
         self.remember()
         self.check_frame()
         self.check_way(old, transition, sent_before)

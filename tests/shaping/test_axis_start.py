@@ -37,11 +37,11 @@ def test_before_the_first_tick_an_axis_carries_neutral() -> None:
     """A frame may go out before the first tick: the first one sent is that of a neutral valve."""
     axis = new_axis()
     assert (axis.state, axis.reason) == (State.NEUTRAL_WAIT, Reason.START)
-    assert (axis.raw, axis.sent, axis.applied, axis.command) == (0, 0.0, 0.0, 0.0)
+    assert (axis.raw, axis.sent, axis.output.applied, axis.command) == (0, 0.0, 0.0, 0.0)
     assert isinstance(axis.raw, int)
     assert axis.output.commanded is False
     assert axis.neutral is True
-    assert axis.unattended is False
+    assert axis.added_time.unattended is False
 
 
 def test_ticks_missed_before_the_first_one_swing_nothing() -> None:
@@ -60,7 +60,7 @@ def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None
     assert (axis.sway.angle, axis.sway.rate) == (0.0, 0.0)
     for joystick in [CENTRED, CENTRED, *[CommandInput(0.7)] * 60, *[CENTRED] * 60]:
         assert axis.tick(joystick) == right.tick(joystick)
-        assert (axis.raw, axis.applied) == (right.raw, right.applied)
+        assert (axis.raw, axis.output.applied) == (right.raw, right.output.applied)
     assert axis.sway.angle == model.angle
     waiting = new_axis()
     waiting.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))

@@ -37,7 +37,7 @@ def test_it_is_damped_within_the_bound_of_what_may_be_added() -> None:
     for _ in range(round(2.5 / TICK_S)):
         rig.run(TICK_S, damps=True)
         seen = max(seen, abs(rig.axis.sent))
-        assert rig.axis.applied == rig.axis.sent
+        assert rig.axis.output.applied == rig.axis.sent
     assert 0.1 < seen <= LARGEST
     assert swing_deg(rig) < 1.0
     assert rig.sensed.state is Trust.TRUSTED
@@ -134,9 +134,9 @@ def test_the_path_of_the_other_axis_is_run_besides() -> None:
         rig.sensed.measure(angle, SCALE, commanded=False, damps=True)
         rig.axis.act(CommandInput(enabled=True), 0.1, damps=True)
         rig.axis.advance()
-        rig.real.step(rig.axis.applied)
+        rig.real.step(rig.axis.output.applied)
     assert rig.axis.sent == pytest.approx(0.1, abs=0.03)
-    assert rig.axis.applied == pytest.approx(rig.axis.sent - 0.1)
+    assert rig.axis.output.applied == pytest.approx(rig.axis.sent - 0.1)
 
 
 def test_with_a_path_at_full_speed_it_is_no_error() -> None:
@@ -145,7 +145,7 @@ def test_with_a_path_at_full_speed_it_is_no_error() -> None:
         rig.sensed.measure(rig.angle, SCALE, commanded=False, damps=True)
         rig.axis.act(CommandInput(enabled=True), sign, damps=True)
         rig.axis.advance()
-        rig.real.step(rig.axis.applied)
+        rig.real.step(rig.axis.output.applied)
         assert rig.axis.state is State.ACTIVE
         assert abs(rig.axis.sent) <= LARGEST
     rig.axis.act(CommandInput(enabled=True), -1.1, damps=True)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.shaping.axis import UNATTENDED_TICKS, ShapedAxis
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.moving_axis import UNATTENDED_TICKS
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.transfer import Off
@@ -117,8 +118,8 @@ def test_a_rest_forgets_what_was_commanded() -> None:
 def test_missed_ticks_make_an_axis_unattended_as_others_do() -> None:
     axis = ShapedAxis(TICK_S, LIMITS, sway=None, shaper=Off(), stop_s=5.0)
     axis.tick(CommandInput())
-    axis._rested = axis._stage.tail + UNATTENDED_TICKS - 3
+    axis.added_time._rested = axis._stage.tail + UNATTENDED_TICKS - 3
     axis.hold(3)
-    assert not axis.unattended
+    assert not axis.added_time.unattended
     axis.hold(1)
-    assert axis.unattended
+    assert axis.added_time.unattended

@@ -217,7 +217,7 @@ def test_what_a_filter_needs_cuts_nothing_of_it(kind: str) -> None:
     def axis(limits: OutputLimits) -> ShapedAxis:
         return axis_with(limits, kind, **parameters.get(kind, {}))
 
-    needed = needed_s(lambda: axis(free), **times)
+    needed = needed_s(lambda: axis(free), free.tail_s, **times)
     waits = 0.1 + 2 * TICK_S
     exact = replace(free, run_on=needed - waits + TICK_S)
     got, whole = (travel(lambda one=one: axis(one), **times) for one in (exact, free))
@@ -229,12 +229,12 @@ def test_what_a_filter_needs_cuts_nothing_of_it(kind: str) -> None:
 
 def test_a_slow_valve_needs_the_wait_for_its_command() -> None:
     times = {"timeout_s": 0.6, "period_s": 0.2}
-    needed = needed_s(lambda: axis_with(OutputLimits(), "off", period_s=0.2), **times)
+    needed = needed_s(lambda: axis_with(OutputLimits(), "off", period_s=0.2), 2.0, **times)
     assert needed == pytest.approx(1.0, abs=0.01)  # timeout and two periods; it falls in one
 
 
 @pytest.mark.parametrize("speeds", [[-1.0, 0.0, 0.0, 0.5], [-0.5, 0.0, 0.0, 1.0]])
 def test_the_quicker_side_of_a_valve_counts(speeds: list[float]) -> None:
     limits = OutputLimits(curve=ValveCurve([-1.0, -0.05, 0.05, 1.0], speeds))
-    needed = needed_s(lambda: axis_with(limits), timeout_s=0.1, period_s=TICK_S)
+    needed = needed_s(lambda: axis_with(limits), limits.tail_s, timeout_s=0.1, period_s=TICK_S)
     assert needed == pytest.approx(0.14 + 0.09, abs=1e-3)

@@ -139,7 +139,7 @@ def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
     before = last = axis.sent
     assert before == pytest.approx(0.8, abs=2e-3)
     assert axis.sway is not None
-    swing = math.hypot(axis.sway.angle * EMPTY.omega_rad_s, axis.sway.rate + axis.applied)
+    swing = math.hypot(axis.sway.angle * EMPTY.omega_rad_s, axis.sway.rate + axis.output.applied)
     axis.retune(FULL, lambda sway: make(new, sway))
     for _ in range(150):
         axis.tick(CommandInput(0.8))
@@ -169,8 +169,8 @@ def test_a_load_that_is_known_late_has_hung_there_since_the_press_began() -> Non
     for command in [0.0] + 25 * [0.9]:
         late.tick(CommandInput(command))
         known.tick(CommandInput(command))
-        past.append(late.applied)
-        own.step(late.applied)
+        past.append(late.output.applied)
+        own.step(late.output.applied)
     late.retune(FULL, lambda sway: make("robust", sway), past)
     assert late.sway is not None
     assert (late.sway.angle, late.sway.rate) == (own.angle, own.rate)

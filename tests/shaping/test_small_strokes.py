@@ -168,8 +168,8 @@ def test_what_is_added_for_the_path_is_no_part_of_the_stroke(path: float) -> Non
     own = added = 0.0
     for tick in range(200):
         axis.tick(CommandInput(0.1 if tick < 5 else 0.0), path if 10 <= tick < 40 else 0.0)
-        own += axis.applied
-        added += axis.sent - axis.applied
+        own += axis.output.applied
+        added += axis.sent - axis.output.applied
     assert added == pytest.approx(30 * path)
     assert own == pytest.approx(0.5, rel=0.05)
 
@@ -286,7 +286,7 @@ def test_missed_ticks_count_and_a_retune_and_a_stop_lose_the_travel() -> None:
         axis.tick(CommandInput(0.3))
     axis._stage._small = small = Mock(wraps=axis._stage._small)
     axis.hold(5)
-    small.hold.assert_called_once_with(axis.command, axis.applied, 5)
+    small.hold.assert_called_once_with(axis.command, axis.output.applied, 5)
     axis.tick(CommandInput(0.3))
     assert not small.lose.called
     axis.retune(MODE, lambda sway: Gff(sway, (-5.0, -4.0)))

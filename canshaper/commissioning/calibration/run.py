@@ -13,8 +13,7 @@ from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.design.lockstep import LockStep
-from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.gate.loop import boottime_ns, run_at_deadlines
+from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import JoystickNode

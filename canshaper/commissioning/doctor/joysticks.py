@@ -11,7 +11,7 @@ from typing import Any
 from canshaper.bus.packet import FD_SIZE, FDF, Packet
 from canshaper.codec.frame import EFF_FLAG
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, real_time, say_ready
-from canshaper.gate.loop import boottime_ns, run_at_deadlines
+from canshaper.gate.cycle import boottime_ns, run_at_deadlines
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.joysticks import JoystickNode

@@ -11,12 +11,12 @@ from typing import Any
 from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, say_ready
+from canshaper.config.bus import Bus
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
-from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.gate.loop import boottime_ns, run_at_deadlines
+from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
@@ -26,10 +26,11 @@ class WatchedPort(RawPort):
 
     Args:
         name: of the bus.
+        config: its section.
         one: the end.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
-        fd: what is sent in frames of CAN FD; None on a bus of classical CAN.
+        fd: what is sent in frames of CAN FD.
 
     Attributes:
         received: frames so far.
@@ -38,14 +39,18 @@ class WatchedPort(RawPort):
     def __init__(
         self,
         name: str,
+        config: Bus,
         one: socket.socket,
         on_fault: Callable[[FrameFault], None],
         on_sent: Callable[[Frame], None],
-        fd: Iterable[tuple[int, bool]] | None = None,
+        *,
+        fd: Iterable[tuple[int, bool]],
     ) -> None:
         self.received = 0
         self._on_sent = on_sent
-        super().__init__(name, lambda _ids: [one], None, on_fault, confirms=False, fd=fd)
+        super().__init__(
+            name, config, on_fault, None, fd, open_sockets=lambda *_: [one], has_echo=bool
+        )
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits."""
@@ -78,9 +83,7 @@ class Loop:
         faults = self._controller.counters.add
         buses, routes = deployment.config.buses, deployment.routing.buses
         self._ports = {
-            name: WatchedPort(
-                name, one, faults, self._note, routes[name].fd if buses[name].fd else None
-            )
+            name: WatchedPort(name, buses[name], one, faults, self._note, fd=routes[name].fd)
             for name, one in sockets.items()
         }
         self._valves: dict[tuple[str, int, bool], list[int]] = {}

@@ -171,12 +171,12 @@ class CanopenNetwork(BusProtocol):
             self.bound.append((bound, control))
         if own := valve.cia408.node if valve.cia408 else valve.node:
             node = self.nodes[valve.bus].nodes[own]
-            runner.add_interlock(NodeGate(node, Reason.VALVE_FAULT, control))
+            runner.stops.interlocks.append(NodeGate(node, Reason.VALVE_FAULT, control))
         if joystick.node:
             node = self.nodes[joystick.bus].nodes[joystick.node]
-            runner.add_interlock(NodeGate(node, Reason.NODE_FAULT))
+            runner.stops.interlocks.append(NodeGate(node, Reason.NODE_FAULT))
         if control is not None:
-            runner.add_interlock(control.gate)
+            runner.stops.interlocks.append(control.gate)
         if (sensor := runner.bound.sway_sensor) and sensor.config.node:
             runner.measured_by(self.nodes[sensor.config.bus].nodes[sensor.config.node])
 

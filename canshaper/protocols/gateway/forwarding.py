@@ -63,7 +63,7 @@ class ForwardedJoystick:
         self._passed_ns = arrived_ns
         stopped = stopped or self._joystick.releases != self._releases  # they trip with the tick
         for runner in self._runners:
-            if stopped or runner.tripping:  # the loop stood still, or the like: this is old
+            if stopped or runner.stops.trip:  # the loop stood still, or the like: this is old
                 runner.put(0)
         self.moves = self._any_moves() and not stopped
         return self._message.onto(data)
@@ -85,7 +85,7 @@ class ForwardedJoystick:
         return [self._message.own(enabled=False)] if self.moves else []
 
     def _any_moves(self) -> bool:
-        return any(runner.axis.raw and not runner.tripping for runner in self._runners)
+        return any(runner.axis.raw and not runner.stops.trip for runner in self._runners)
 
 
 class Gateway(BusProtocol):

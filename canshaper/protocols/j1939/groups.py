@@ -70,7 +70,7 @@ class AnySource:
                 # No tick need have seen the silence in between.
                 self._input.invalidate()
                 for runner in self._runners:
-                    runner.invalidate()
+                    runner.stops.invalid = True
             self._source = source
             self._ignored.clear()
             self.events.append(SourceEvent(self._bus, self._message, source, source))
@@ -132,7 +132,7 @@ class CommandedByOthers:
         to, fault = _destination(frame.can_id), FrameFault.NONE
         for runner, destination in self._runners:
             if to in (destination, GLOBAL):
-                runner.foreign_sender(arrived_ns)
+                runner.stops.foreign_sender(arrived_ns)
                 fault = FrameFault.SECOND_SENDER
         return fault
 

@@ -70,7 +70,7 @@ class J1939Network(BusProtocol):
         for bus, node in self.nodes.items():
             for runner in () if deployment.listen_only else axes.values():
                 if runner.bound.config.valve.bus == bus and not runner.bound.rewrites:
-                    runner.add_interlock(node.gate)
+                    runner.stops.interlocks.append(node.gate)
         for (bus, group), route in routing.groups.items():
             if route.axes:
                 commanded = [axes[name] for name in route.axes]

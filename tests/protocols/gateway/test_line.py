@@ -185,7 +185,7 @@ def test_a_trip_that_is_noted_makes_the_next_frame_neutral(rig: GatewayRig) -> N
 
 def test_neutral_after_a_trip_does_not_wait_for_a_joystick_that_is_late(rig: GatewayRig) -> None:
     rig.moving()
-    rig.controller.axes["slew"].trip(Reason.EMERGENCY_STOP)
+    rig.controller.axes["slew"].stops.trip = Reason.EMERGENCY_STOP
     sent = [rig.tick() for _ in range(4)]
     assert [len(frames) for frames in sent] == [0, 0, 1, 0]
     values = rig.decoded(sent[2][0])

@@ -1,6 +1,5 @@
 """J1939 on two buses: whose axes, whose inputs and whose faults are those of a bus."""
 
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault, name_bytes
+from canshaper.inputs.stops import StopCauses
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -60,11 +60,8 @@ def axes_of(deployment: Deployment, **reasons: Reason) -> dict[str, Any]:
     """Axes as the network sees them, with their interlocks and a reason."""
     axes: dict[str, Any] = {}
     for name, bound in deployment.axes.items():
-        gates: list[Callable[..., Any]] = []
         axis = SimpleNamespace(reason=reasons.get(name, Reason.START))
-        axes[name] = SimpleNamespace(
-            bound=bound, axis=axis, feedback=None, gates=gates, add_interlock=gates.append
-        )
+        axes[name] = SimpleNamespace(bound=bound, axis=axis, feedback=None, stops=StopCauses())
     return axes
 
 
@@ -78,7 +75,7 @@ def test_an_axis_asks_the_node_on_the_bus_of_its_valve_and_no_other(tmp_path: Pa
     deployment = two_buses(tmp_path)
     axes = axes_of(deployment)
     nodes = J1939Network(deployment, axes, []).nodes
-    assert {name: axis.gates for name, axis in axes.items()} == {
+    assert {name: axis.stops.interlocks for name, axis in axes.items()} == {
         "slew": [nodes["crane"].gate],
         "near_far": [nodes["crane"].gate],
         "lift": [nodes["boom"].gate],

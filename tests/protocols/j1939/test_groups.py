@@ -1,9 +1,12 @@
 """An input from whatever address: which one counts, and when another one takes over."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.protocols.interface import DrivenAxis
+from canshaper.inputs.stops import StopCauses
 from canshaper.protocols.j1939.groups import AnySource, SourceEvent
 
 TIMEOUT_NS = 100
@@ -11,7 +14,7 @@ FIRST, SECOND = 0x33, 0x34
 
 
 class Counted:
-    """An input and an axis: what they receive, and how often they are invalidated."""
+    """An input: what it receives, and how often it is invalidated."""
 
     def __init__(self) -> None:
         self.received: list[tuple[bytes, int]] = []
@@ -48,15 +51,15 @@ def test_the_first_address_invalidates_nothing(source: AnySource, joystick: Coun
 def test_an_address_that_takes_over_invalidates_the_input_and_its_axes_once(
     joystick: Counted,
 ) -> None:
-    axes = [Counted(), Counted()]
-    runners: list[DrivenAxis] = list(axes)  # type: ignore[arg-type]
+    stops = [StopCauses(), StopCauses()]
+    runners: Any = [SimpleNamespace(stops=one) for one in stops]
     source = AnySource("crane", "BJM1", joystick, TIMEOUT_NS, runners)
     source.receive(frame(FIRST), 0)
     assert source.receive(frame(SECOND), TIMEOUT_NS) is FrameFault.SECOND_SENDER
-    assert [one.invalidated for one in (joystick, *axes)] == [0, 0, 0]
+    assert [joystick.invalidated, *(one.invalid for one in stops)] == [0, False, False]
     for now_ns in (TIMEOUT_NS + 1, TIMEOUT_NS + 2):
         assert source.receive(frame(SECOND), now_ns) is FrameFault.NONE
-        assert [one.invalidated for one in (joystick, *axes)] == [1, 1, 1]
+        assert [joystick.invalidated, *(one.invalid for one in stops)] == [1, True, True]
     assert [data for data, _ in joystick.received] == [bytes((a,)) for a in (FIRST, SECOND, SECOND)]
 
 
