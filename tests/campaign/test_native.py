@@ -16,7 +16,7 @@ from canshaper.cli.app import app
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.errors import CampaignError, ConfigError, NativeError
 from canshaper.machine.binding import load_deployment
-from canshaper.native.fmu import FMU_FILES
+from canshaper.native.library import FMU_FILES
 from canshaper_sim.strokes import Script
 from tests.native.judge import needs_compiler
 from tests.rigs.files import CONFIG

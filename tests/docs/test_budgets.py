@@ -67,8 +67,8 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (66_340, "a new ability takes the room of an old one"),
-    "tests": (101_279, "one level for each behaviour"),
+    "canshaper": (66_336, "a new ability takes the room of an old one"),
+    "tests": (101_300, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (354, "one that only hands on is joined to its reader")}
