@@ -20,7 +20,7 @@ from measure import medians_s
 
 from canshaper.recording.form import Writer
 from canshaper.recording.listen import ReceivedFrame
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from canshaper.recording.mcap_write import McapWriter
 
 START_NS = 1_763_750_000_000_000_000
@@ -92,7 +92,7 @@ def main() -> None:
             size = path.stat().st_size / len(made)
             speed = len(made) / written_s
             print(f"{path.suffix}: written {speed:9.0f} frames/s, {size:.1f} bytes a frame")
-            works = {"ours": lambda path=path: deque(read_log(path), 0)}
+            works = {"ours": lambda path=path: deque(LogFile(path), 0)}
             works |= {n: lambda reader=reader: deque(reader(), 0) for n, reader in readers.items()}
             ours, *others = medians_s(works, runs).items()
             for name, seconds in others:

@@ -17,7 +17,7 @@ from random import Random
 import can
 from measure import medians_s
 
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 
 START_S = 1_763_750_000
 FORMATS = ("log", "asc", "blf", "csv", "db", "trc", "mf4")
@@ -86,7 +86,7 @@ def main() -> None:
             files[name] = path, files[like][1]
         for name, (ours, theirs) in files.items():
             works = {
-                "ours": lambda path=ours: deque(read_log(path), 0),
+                "ours": lambda path=ours: deque(LogFile(path), 0),
                 "theirs": lambda path=theirs: deque(can.LogReader(path), 0),
             }
             first, second = medians_s(works, arguments.runs).values()

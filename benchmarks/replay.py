@@ -27,7 +27,7 @@ from canshaper.cli.verbs.replay import _without_collector
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from canshaper.recording.replay import Replay, look
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import script_named
@@ -113,7 +113,7 @@ def main() -> None:
         before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         works: dict[str, Callable[[], object]] = {
             PEER: lambda: sum(1 for _ in can.LogReader(path)),
-            "canshaper reads it": lambda: sum(1 for _ in read_log(path)),
+            "canshaper reads it": lambda: sum(1 for _ in LogFile(path)),
             BOX: lambda: replay(box, config),
             "replay, ticks of a clock": lambda: replay(path, config),
         }

@@ -16,8 +16,8 @@ import canshaper.config.schema  # noqa: F401  (its classes are the sections)
 from canshaper.cli.verbs.config_schema import checksum_table, filter_table
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.status import AXIS_STATUS
+from canshaper.commissioning.procedure.procedure import STEPS
 from canshaper.commissioning.procedure.state import FILE
-from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.config.inputs import PROFILES
 from canshaper.config.section import Section
 from canshaper.config.uncertainty import MEASURES

@@ -178,7 +178,12 @@ def rows_of_more() -> list[list[Part]]:
     apart = {"PYTHONPATH": str(FOREIGN)}
     files = [
         f"tests/{one}.py"
-        for one in ("recording/test_mcap", "recording/test_mf4", "native/test_fmu")
+        for one in (
+            "recording/test_mcap",
+            "recording/test_mf4",
+            "native/test_fmu",
+            "campaign/test_unit",
+        )
     ]
     return [
         [Part("types", "mypy, import contracts", types)],

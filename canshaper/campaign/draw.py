@@ -8,6 +8,7 @@ meet the same crane and the same operator.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,7 @@ class Setting:
         factors: numbers that were drawn, by name.
         script: what the operator does.
         options: the crane and all else, see ``DriveOptions``.
+        dwell_s: how long after a release what swings is residual.
     """
 
     operator: str
@@ -52,6 +54,7 @@ class Setting:
     factors: dict[str, float]
     script: Script
     options: DriveOptions
+    dwell_s: float
 
 
 def driven_axes(deployment: Deployment) -> tuple[str | None, list[str]]:
@@ -85,7 +88,11 @@ def check_same_axes(first: Deployment, second: Deployment) -> None:
 
 
 def draw_drive(
-    deployment: Deployment, seed: int, ranges: Uncertainty, nominal: CraneParameters | None = None
+    deployment: Deployment,
+    seed: int,
+    ranges: Uncertainty,
+    nominal: CraneParameters | None = None,
+    longest_s: float = 0.0,
 ) -> Setting:
     """Draw one drive.
 
@@ -94,6 +101,7 @@ def draw_drive(
         seed: of the drive, 0 or more.
         ranges: from which the crane is drawn.
         nominal: the crane that the ranges are about.
+        longest_s: longest ``dwell_s`` of all files that are driven with the same seeds.
     """
     of_crane, of_operator, of_load, of_fault, of_place = (
         Draw(one) for one in np.random.SeedSequence(seed).spawn(5)
@@ -105,15 +113,16 @@ def draw_drive(
     swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
     operator = of_operator.one_of([*OPERATORS])
     script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
-    if (longer_s := dwell_s(deployment) - DWELL_S) > 0.0:
-        script = replace(script, duration_s=script.duration_s + longer_s)
+    duration_s = script.duration_s  # of what the operator does, whatever the tails of the file
+    rest_s = max(dwell_s(driven_part(deployment, crane)), longest_s)
+    script = replace(script, duration_s=duration_s + (rest_s - DWELL_S))
     if deployment.config.crane:
         script = script.moving(deployment.by_coordinate)
-    loads, of_loads = _loads(of_load, ranges, script.duration_s, drawn["grapple"])
+    loads, of_loads = _loads(of_load, ranges, duration_s, drawn["grapple"])
     if "rope_m" in factors:  # on a rope every load swings alike
         loads, of_loads = [], {}
     sensors = any(axis.sway_sensor for axis in deployment.axes.values())
-    fault = _fault(of_fault, ranges, script.duration_s, sensors=sensors)
+    fault = _fault(of_fault, ranges, duration_s, sensors=sensors)
     sensor = replace(nominal.sway_sensor, seed=seed % 1_000_000, **fault.sensor)
     options: DriveOptions = {
         "parameters": replace(nominal, **{**drawn, **placed, "sway_sensor": sensor}),
@@ -125,7 +134,16 @@ def draw_drive(
         options["disturb"] = fault.disturb
     factors |= of_places
     factors |= {"sway_across_deg": swing[0], "sway_along_deg": swing[1], **of_loads}
-    return Setting(operator, fault.name, factors, script, options)
+    return Setting(operator, fault.name, factors, script, options, rest_s)
+
+
+def on_unit(setting: Setting, unit: Path, nominal: CraneParameters) -> Setting:
+    """The drive of a unit: operator and faults are drawn, the crane is its own."""
+    drawn = setting.options["parameters"]
+    assert drawn
+    parameters = replace(nominal, sway_sensor=drawn.sway_sensor)
+    own: DriveOptions = {"unit": unit, "parameters": parameters, "sway": None, "loads": ()}
+    return replace(setting, factors={}, options={**setting.options, **own})
 
 
 def _crane(
@@ -157,8 +175,7 @@ def _crane(
     elif by_rope:
         own = _on_rope(getattr(nominal, kind), factors)
     else:
-        radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
-        crane["start_radius_m"] = radius_m
+        crane["start_radius_m"] = _clamp(factors, "radius", nominal)
     for axis in axes:
         drawn = {
             "dead_time_s": draw.between(*ranges.valve_dead_time_s),
@@ -180,14 +197,21 @@ def _crane(
     return crane, factors
 
 
+def _clamp(factors: dict[str, float], name: str, crane: Any) -> float:
+    """Bring a length that was drawn within what the crane has, and return it."""
+    low: float = getattr(crane, f"{name}_min_m")
+    high: float = getattr(crane, f"{name}_max_m")
+    factors[f"{name}_m"] = clamped = min(max(factors[f"{name}_m"], low), high)
+    return clamped
+
+
 def _on_rope(nominal: Any, factors: dict[str, float]) -> Parameters:
     """Return the rope that was drawn, and the radius where one was."""
     own: Parameters = {}
     if "radius_m" in factors:
-        radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
-        own["start_radius_m"] = radius_m
+        own["start_radius_m"] = _clamp(factors, "radius", nominal)
     return own | {
-        "rope_m": min(max(factors["rope_m"], nominal.rope_min_m), nominal.rope_max_m),
+        "rope_m": _clamp(factors, "rope", nominal),
         "rope_error_pct": factors["length_pct"],
         "damping_ratio": nominal.damping_ratio * (1.0 + factors["damping_pct"] / 100.0),
     }
@@ -214,7 +238,7 @@ def _place(
     near, ahead_m = draw.between(0.0, 100.0) < ranges.stops_pct, draw.between(0.0, _NEAR_M)
     at_m = draw.one_of((nominal.radius_min_m + ahead_m, nominal.radius_max_m - ahead_m))
     crane: Parameters = {}
-    if near and NEAR_FAR in axes:
+    if near := near and NEAR_FAR in axes:
         factors["radius_m"] = crane["start_radius_m"] = at_m
     tilts = {name: factors[name] for name in ("pitch_deg", "roll_deg", "rock_hz")}
     speed = factors["wind_m_s"]

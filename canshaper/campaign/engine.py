@@ -50,16 +50,24 @@ class Cluster:
     on_refusal: Callable[[str], object] = field(default=lambda _text: None)
     workers_s: float | None = WORKERS_S
 
-    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Do every job; see ``Engine``."""
-        from distributed import Client, KilledWorker, as_completed  # noqa: PLC0415  (an extra)
-        from distributed.comm import get_address_host_port  # noqa: PLC0415
+    def __post_init__(self) -> None:
+        """Check the address; a client that has begun with a wrong one takes half a minute to end.
+
+        Raises:
+            CampaignError: ``scheduler`` is no address.
+        """
+        from distributed.comm import get_address_host_port  # noqa: PLC0415  (an extra)
 
         try:
             get_address_host_port(self.scheduler, strict=True)
-        except ValueError:  # a client that has begun with one would take half a minute to end
+        except ValueError:
             expected = "expected the address of a scheduler, such as tcp://10.0.0.1:8786"
             raise CampaignError(f"{self.scheduler}: {expected}") from None
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job; see ``Engine``."""
+        from distributed import Client, KilledWorker, as_completed  # noqa: PLC0415  (an extra)
+
         try:
             client: Any = Client(self.scheduler, timeout=CONNECT_S, set_as_default=False)
         except OSError as error:
@@ -83,8 +91,13 @@ class Cluster:
                 doing[future.key] = job
                 done.add(future)
 
-            for job in islice(waiting, 4 * sum(client.ncores().values())):
-                submit(job)
+            def fill() -> None:
+                """Give every core four jobs; workers come and go, one job is always under way."""
+                most = max(1, 4 * sum(client.ncores().values()))
+                for job in islice(waiting, max(0, most - len(doing))):
+                    submit(job)
+
+            fill()
             for future in done:
                 job = doing.pop(future.key)
                 try:
@@ -98,8 +111,7 @@ class Cluster:
                 except KilledWorker:
                     raise CampaignError(f"{self.scheduler}: the workers died of {job}") from None
                 yield job, result
-                for following in islice(waiting, 1):
-                    submit(following)
+                fill()
 
 
 @dataclass

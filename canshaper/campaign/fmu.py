@@ -11,12 +11,13 @@ from canshaper.native.source import real
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW, TIP_AXES
 from canshaper_sim.cranes import cranes
 from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.unit import POSE, SWAY
 
 FILES = Path(__file__).with_name("c")
 _POSES = {
-    SLEW: ("angle", "Slew angle, counter-clockwise from above", "rad"),
-    NEAR_FAR: ("radius", "Distance of the tip from the slew axis", "m"),
-    LIFT: ("height", "Height of the tip", "m"),
+    SLEW: ("Slew angle, counter-clockwise from above", "rad"),
+    NEAR_FAR: ("Distance of the tip from the slew axis", "m"),
+    LIFT: ("Height of the tip", "m"),
 }
 
 
@@ -33,13 +34,13 @@ def plant_unit(deployment: Deployment) -> Unit:
         raise ConfigError([deployment.source.problem(("crane",), text)])
     names = [axes.get(one, one) for one in TIP_AXES]
     outputs, speeds = list[Variable](), list[Variable]()
-    for name, (moved, (pose, text, unit)) in zip(names, _POSES.items(), strict=True):
-        start = valve_numbers(crane, moved)["start"]
+    for name, (moved, (text, unit)) in zip(names, _POSES.items(), strict=True):
+        start, pose = valve_numbers(crane, moved)["start"], POSE[moved]
         outputs.append(Variable(f"{name}.{pose}", text, unit, start))
         speeds.append(Variable(f"{name}.speed", f"Speed of {pose}", f"{unit}/s"))
-    for one, way in (("across", "in slew direction"), ("along", "towards the crane")):
-        outputs.append(Variable(f"sway.{one}", f"Swing of the grapple {way}", "rad"))
-        speeds.append(Variable(f"sway.{one}_rate", f"Rate of sway.{one}", "rad/s"))
+    for one, way in zip(SWAY, ("in slew direction", "towards the crane"), strict=True):
+        outputs.append(Variable(one, f"Swing of the grapple {way}", "rad"))
+        speeds.append(Variable(f"{one}_rate", f"Rate of {one}", "rad/s"))
     own, steps = "cs_unit_plant.c", steps_of(deployment.config.tick_ms)
     valves = ", ".join(_row(valve_numbers(crane, one).values()) for one in TIP_AXES)
     return Unit(

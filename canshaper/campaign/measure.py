@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from canshaper.campaign.draw import Setting, draw_drive, driven_axes
+from canshaper.campaign.draw import Setting, draw_drive, driven_axes, on_unit
 from canshaper.campaign.native import NativeCrane
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.controller.events import RefusalEvent
@@ -18,7 +19,6 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import switches_off
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
-from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 Row = dict[str, Any]
@@ -35,6 +35,10 @@ def measured_drive(
     ranges: Uncertainty,
     nominal: CraneParameters | None = None,
     native: NativeCrane | None = None,
+    *,
+    both: bool = False,
+    longest_s: float = 0.0,
+    unit: Path | None = None,
 ) -> Row:
     """Draw a drive, drive it and measure it; see ``draw_drive``.
 
@@ -47,16 +51,21 @@ def measured_drive(
         ranges: from which the crane is drawn.
         nominal: the crane that the ranges are about.
         native: drives what it can; one drive in ``BOTH_OF`` is driven by both.
+        both: this one is.
+        longest_s: see ``draw_drive``.
+        unit: FMU in place of the crane.
 
     Raises:
         CampaignError: both drive it, and not alike.
     """
-    setting = draw_drive(deployment, seed, ranges, nominal)
+    setting = draw_drive(deployment, seed, ranges, nominal, longest_s)
     nominal = nominal or changed_parameters([], deployment)
+    if unit:
+        setting = on_unit(setting, unit, nominal)
     if not (native and native.has(setting)):
         return _row(deployment, seed, setting, nominal)
     row = _row(deployment, seed, setting, nominal, native)
-    if seed % BOTH_OF:
+    if seed % BOTH_OF and not both:
         return row
     own = _row(deployment, seed, setting, nominal)
     for name, value in own.items():
@@ -149,7 +158,7 @@ class _Tracks:
         driven = driven_part(deployment, crane)
         self._moves = moves = driven.coordinates
         axes = sorted(moves, key=lambda one: ALL_AXES.index(moves[one]))
-        self._dwell_s = dwell_s(driven)
+        self._dwell_s = setting.dwell_s
         self._script = setting.script
         self._tick_s = deployment.config.tick_ms / 1000.0
         self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}

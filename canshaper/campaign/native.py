@@ -26,7 +26,6 @@ from canshaper_sim.cranes import cranes
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.hand import Hand
 from canshaper_sim.joysticks import JoystickNode
-from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script
 from canshaper_sim.valve import ValveParameters
 from canshaper_sim.valve_frames import CommandReader
@@ -167,7 +166,7 @@ class NativeCrane:
         drive = self._drive(
             joystick=self._neutral[bypass],
             **steps_of(tick_ms),
-            dwell_s=dwell_s(self._deployment),
+            dwell_s=setting.dwell_s,
             still_deg=self._deployment.config.still_deg,
             tick_ms=tick_ms,
             ticks=ticks,

@@ -35,6 +35,8 @@ class Source:
         ranges: from which its cranes are drawn; of two files that are compared, those of the first.
         changes: parameters of the nominal crane, NAME=VALUE.
         engine: native or python; what C has no part for is Python's.
+        longest_s: longest ``dwell_s`` of the files that are compared; see ``draw_drive``.
+        unit: FMU in place of the crane.
     """
 
     path: str
@@ -42,6 +44,8 @@ class Source:
     ranges: Uncertainty
     changes: tuple[str, ...] = ()
     engine: str = "python"
+    longest_s: float = 0.0
+    unit: Path | None = None
 
     @classmethod
     def of(
@@ -50,12 +54,13 @@ class Source:
         ranges: Uncertainty,
         changes: Sequence[str] = (),
         engine: str = "python",
+        longest_s: float = 0.0,
     ) -> "Source":
         """Read the files of a deployment."""
-        path = deployment.path.resolve()
-        paths = [path, *((path.parent / name).resolve() for name in deployment.config.dbc)]
+        path = deployment.path.absolute()  # links stay: the DBC files are named from there
+        paths = [path, *(path.parent / name for name in deployment.config.dbc)]
         files = tuple((str(one), one.read_bytes()) for one in paths)
-        return cls(str(path), files, ranges, tuple(changes), engine)
+        return cls(str(path), files, ranges, tuple(changes), engine, longest_s)
 
     def load(self) -> Deployment:
         """Load the deployment, once in a process."""
@@ -72,12 +77,14 @@ class Source:
     @property
     def about(self) -> dict[str, Any]:
         """Identity of the drives: only drives with the same identity go together."""
+        unit = [sha256(self.unit.read_bytes()).hexdigest()] if self.unit else []
         content = sha256(b"".join(sha256(data).digest() for _, data in self.files)).hexdigest()
         return {
             "file": f"{Path(self.path).name} sha256:{content[:16]}",
             "program": f"sha256:{program_sha256()[:16]}",
             "ranges": self.ranges.model_dump(),
-            "crane": [*self.changes],
+            "crane": [*self.changes, *unit],
+            "residual_from_s": self.longest_s,
         }
 
 
@@ -106,13 +113,17 @@ def _native(source_path: str, files: tuple[tuple[str, bytes], ...]) -> NativeCra
         return error
 
 
-def drive_all(source: Source, seeds: Seeds) -> list[Row]:
-    """Draw, drive and measure each of some drives."""
+def drive_all(source: Source, seeds: Seeds, *, both: int = -1) -> list[Row]:
+    """Draw, drive and measure each of some drives; the one named ``both`` by both engines."""
     deployment = source.load()
     nominal = changed_parameters([*source.changes], deployment)
     native = source.native()
     c = native if isinstance(native, NativeCrane) else None
-    return [measured_drive(deployment, seed, source.ranges, nominal, c) for seed in seeds]
+    about = source.ranges, nominal, c
+    options: Any = {"longest_s": source.longest_s, "unit": source.unit}
+    return [
+        measured_drive(deployment, seed, *about, both=seed == both, **options) for seed in seeds
+    ]
 
 
 def shard_of(seeds: range, shard: str | None) -> range:
@@ -150,11 +161,12 @@ def run_campaign(
     Raises:
         CampaignError: the engine cannot go on, or the disk takes no more.
     """
-    left = (seed for seed in seeds if seed not in store.seeds)
-    done = sum(seed in store.seeds for seed in seeds)
+    left = [seed for seed in seeds if seed not in store.seeds]
+    done = len(seeds) - len(left)
     on_progress(done)
     try:
-        for _, rows in engine.run(partial(drive_all, source), _pieces(left)):
+        work = partial(drive_all, source, both=next(iter(left), -1))
+        for _, rows in engine.run(work, _pieces(iter(left))):
             store.add(rows)
             done += len(rows)
             on_progress(done)

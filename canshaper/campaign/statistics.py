@@ -104,6 +104,9 @@ def influences(
 def _influence(name: str, column: Sequence[Any], ranks: Any) -> Influence | None:
     if len({*column}) < 2:
         return None
+    total = float(((ranks - ranks.mean()) ** 2).sum())
+    if not total:  # every drive has the same measure
+        return Influence(name, 0.0, None)
     trend: float | None = None
     if isinstance(column[0], str):
         _, part = np.unique(np.array(column), return_inverse=True)
@@ -115,9 +118,6 @@ def _influence(name: str, column: Sequence[Any], ranks: Any) -> Influence | None
     counts = np.bincount(part)
     used = counts > 0
     between = float((sums[used] ** 2 / counts[used]).sum()) - ranks.sum() ** 2 / len(ranks)
-    total = float(((ranks - ranks.mean()) ** 2).sum())
-    if not total:
-        return Influence(name, 0.0, trend)
     free, parts = len(ranks) - 1, int(used.sum())
     within = (total - between) / (free + 1 - parts)
     return Influence(name, max(0.0, 1.0 - within * free / total), trend)

@@ -154,7 +154,9 @@ def _worse(columns: Columns) -> Worse:
     pairs = [(s, a, b) for s, a, b in zip(*of, strict=True) if a is not None and b is not None]
     worse = sorted((one for one in pairs if one[1] > one[2] + MORE_DEG), key=lambda o: o[2] - o[1])
     count, drives = len(worse), len(pairs)
-    high, low = most_of(count, drives), 1.0 - most_of(drives - count, drives)
+    two_sided = 0.5 * (1.0 + CONFIDENCE)
+    high = most_of(count, drives, confidence=two_sided)
+    low = 1.0 - most_of(drives - count, drives, confidence=two_sided)
     return Worse(drives, count, low, high, worse[:5])
 
 
@@ -261,8 +263,8 @@ def tables(summary: Summary) -> Iterator[Table]:
         drawn = new_table("worst", "seed", "still, s", "left, deg", "peak, deg", "run-on, s")
         shown = ("still_s", "residual_deg", "peak_deg", "run_on_s")
         for row in summary.worst:
-            figures = [row[name] or 0.0 for name in shown]
-            drawn.add_row(row["operator"], str(row["seed"]), *(f"{one:.2f}" for one in figures))
+            figures = ("-" if row[name] is None else f"{row[name]:.2f}" for name in shown)
+            drawn.add_row(row["operator"], str(row["seed"]), *figures)
         yield drawn
 
 

@@ -46,6 +46,7 @@ EXTRAS = {
     **dict.fromkeys(("canopen", "casadi", "matplotlib", "numpy", "scipy"), "tools"),
     **dict.fromkeys(("starlette", "uvicorn", "websockets"), "studio"),
     "pyarrow": "campaign",
+    "fmpy": "fmi",
     "prometheus_client": "metrics",
     **dict.fromkeys(("dask_jobqueue", "distributed"), "cluster"),
 }
@@ -62,12 +63,15 @@ CRANE = typer.Option(
     "--crane",
     help="Which one, where the deployment has several: the first part of axis names.",
 )
-SENSED = "forwarder-sensor.yaml"
+DEFAULT, SENSED = "forwarder-robust.yaml", "forwarder-sensor.yaml"
 SENSOR: bool = typer.Option(
     False, "--sensor", help=f"The shipped deployment with a sway sensor: {SENSED}."
 )
 SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
+)
+PLANT = typer.Option(
+    None, "--plant", metavar="FMU", help="A crane of yours, in place of the simulated one."
 )
 PROCESSES = typer.Option(None, "--processes", min=1, help="Processes; by default one a processor.")
 SCHEDULER = typer.Option(
@@ -168,13 +172,13 @@ def refuse_shipped(file: str, option: str = "--write") -> None:
         raise ConfigError([Problem(file, None, option, text)])
 
 
-def sensed(file: str, default: str, sensor: bool) -> str:
+def sensed(file: str, sensor: bool) -> str:
     """The deployment to show: with ``--sensor`` the shipped one with a sway sensor.
 
     Raises:
         UsageError: both are asked for.
     """
-    if sensor and file != default:
+    if sensor and file != DEFAULT:
         raise UsageError(f"--sensor: expected without FILE, got {file}: it is {SENSED}")
     return SENSED if sensor else file
 

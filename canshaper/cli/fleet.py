@@ -13,11 +13,12 @@ from typing import Any
 
 from canshaper.blackbox.file import SUFFIX
 from canshaper.campaign.engine import Engine
-from canshaper.cli.common import loader
+from canshaper.cli.common import loader, os_errors
+from canshaper.cli.results import Results
 from canshaper.errors import CanshaperError, UsageError
 from canshaper.recording.log import READERS, LogFile
 from canshaper.recording.shift import day_of
-from canshaper.report.console import NOTHING, SafeConsole, new_table
+from canshaper.report.console import NOTHING, new_table, progress_bar
 
 EXIT_NOT_READ = 1
 _HEADS = ("min", "raw deg", "left deg", "dip %", "stops", "trips")
@@ -72,25 +73,35 @@ def run_fleet(
     engine: Engine,
     work: Callable[[Path], list[Row]],
     folders: Sequence[Path],
-    on_progress: Callable[[float], object],
-) -> list[Log]:
-    """Do the work with every log; return the logs in the order of machines and paths.
+    show: Callable[[Sequence[Log], Results], None],
+    out: Path,
+    results: Results,
+) -> None:
+    """Do the work with every log, show and write what it gives, and what was wrong with logs.
 
     Args:
         engine: who does it.
         work: gives the rows of a log.
         folders: of the logs.
-        on_progress: called with the part that is done.
+        show: prints the tables of all logs, which are in the order of machines and paths.
+        out: folder for all numbers.
+        results: takes what is printed.
+
+    Raises:
+        typer.Exit: a log could not be read.
     """
     logs = [log for folder in folders for log in logs_below(folder)]
     if not logs:
         names = ", ".join(map(str, folders))
         raise UsageError(f"{names}: expected a folder with logs, got one without")
     done: list[Log] = []
-    for one in engine.run(partial(_one, work), logs):
-        done.append(one[1])
-        on_progress(len(done) / len(logs))
-    return sorted(done, key=lambda log: (log.machine, log.path))
+    with progress_bar("logs") as on_progress, os_errors(out):
+        for one in engine.run(partial(_one, work), logs):
+            done.append(one[1])
+            on_progress(len(done) / len(logs))
+    done.sort(key=lambda log: (log.machine, log.path))
+    show(done, results)
+    results.write(_finish(done, out, results))
 
 
 def _one(work: Callable[[Path], list[Row]], log: tuple[str, Path]) -> Log:
@@ -207,7 +218,7 @@ _REPLAY = {
 _PERIODS = {"period_s": "{:.3f}", "damping_ratio": "{:.4f}"}
 
 
-def show_replays(logs: Sequence[Log], results: SafeConsole) -> None:
+def show_replays(logs: Sequence[Log], results: Results) -> None:
     """Show a table of each deployment with a row for each log and axis; then all logs together.
 
     Log and axis are one column: the first one stands in every part of a table that is cut.
@@ -231,7 +242,7 @@ def show_replays(logs: Sequence[Log], results: SafeConsole) -> None:
     results.print(whole)
 
 
-def show_periods(logs: Sequence[Log], results: SafeConsole) -> None:
+def show_periods(logs: Sequence[Log], results: Results) -> None:
     """A row for each log and axis, and where a period has drifted."""
     table = new_table("machine, log", "day", "period, s", "damping ratio", "usable")
     for log, row in _rows(logs):
@@ -246,7 +257,7 @@ def show_periods(logs: Sequence[Log], results: SafeConsole) -> None:
         results.print(f"DRIFT: {line}", soft_wrap=True)
 
 
-def finish(logs: Sequence[Log], out: Path, results: SafeConsole) -> int:
+def _finish(logs: Sequence[Log], out: Path, results: Results) -> int:
     """Report what was wrong with logs, those that could not be read too, and write everything.
 
     Returns:

@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
 from rich.table import Table
 
 from canshaper import __version__
@@ -105,15 +106,16 @@ class Results(SafeConsole):
         """Say where the picture is, or why there is none; the report has it."""
         super().print(f"Picture: {path or _no_picture()}", soft_wrap=True)
 
-    def write(self) -> None:
-        """Write the report, where one is asked for."""
-        if not self._report:
-            return
-        command = ("command", shlex.join(["canshaper", *sys.argv[1:]]))
-        facts = [command, *html.facts(self.deployment, self._date)]
-        whole = html.document(self._title, facts, self._parts)
-        self._report.write_text(whole, encoding="utf-8")
-        super().print(f"Report: {self._report}", soft_wrap=True)
+    def write(self, code: int = 0) -> None:
+        """Write the report, where one is asked for; end the verb with its exit code, if not 0."""
+        if self._report:
+            command = ("command", shlex.join(["canshaper", *sys.argv[1:]]))
+            facts = [command, *html.facts(self.deployment, self._date)]
+            whole = html.document(self._title, facts, self._parts)
+            self._report.write_text(whole, encoding="utf-8")
+            super().print(f"Report: {self._report}", soft_wrap=True)
+        if code:
+            raise typer.Exit(code)
 
 
 def _no_picture() -> str:

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.calibration.fit import FULL, Calibration
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.verdict import ENDS_US, histogram, summary
-from canshaper.commissioning.sensor.finding import Finding
-from canshaper.commissioning.sensor.report import heading
+from canshaper.commissioning.sensor.finding import Finding, heading
 from canshaper.report import style
 from canshaper.report.console import axis_title
 from canshaper.shaping.limits import OutputLimits
@@ -40,7 +39,7 @@ def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: fl
     """
     commands, speeds = measured.curve()
     fine = [0.1 * k for k in range(-1000, 1001)]
-    fig = style.new_figure(style.WIDTH_PX, _VALVE_PX, dpi=style.PRINT_DPI)
+    fig = style.print_figure(_VALVE_PX)
     panel = fig.add_axes((0.1, 0.115, 0.87, 0.775))
     style.plain(panel, size=style.TEXT_PT)
     style.zero_line(panel)
@@ -84,13 +83,9 @@ def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: fl
         )
     panel.set_xlim(-100.0, 100.0)
     panel.set_ylim(-108.0, 108.0)
-    panel.set_xlabel(
-        "command to the valve, % of full", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR
-    )
-    panel.set_ylabel("speed, % of full", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+    style.label(panel, "command to the valve, % of full", "speed, % of full")
     panel.legend(loc="upper left", fontsize=style.TEXT_PT, frameon=False)
-    title = f"{axis_title(axis)}: the valve as the file has it, and as measured"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
+    style.headline(fig, f"{axis_title(axis)}: the valve as the file has it, and as measured")
     return fig
 
 
@@ -101,7 +96,7 @@ def of_runs(runs: Mapping[str, Run], tick_ms: float) -> Figure:
         runs: by their names.
         tick_ms: the tick; a tick as late as that has missed the next deadline.
     """
-    fig = style.new_figure(style.WIDTH_PX, _RUNS_PX, dpi=style.PRINT_DPI)
+    fig = style.print_figure(_RUNS_PX)
     panel = fig.add_axes((0.09, _FOOT, 0.9, 0.9 - _FOOT))
     style.plain(panel, size=style.TEXT_PT)
     limit_us = 1000.0 * tick_ms
@@ -129,11 +124,8 @@ def of_runs(runs: Mapping[str, Run], tick_ms: float) -> Figure:
     )
     panel.set_xlim(-0.7, max(len(ends), below) - 0.3)
     panel.set_xticks(range(len(ends)), [_time(end) for end in ends])
-    panel.set_xlabel("lateness of a tick, up to", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    panel.set_ylabel("ticks, %", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    fig.suptitle(
-        "How late the ticks came", x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold"
-    )
+    style.label(panel, "lateness of a tick, up to", "ticks, %")
+    style.headline(fig, "How late the ticks came")
     fig.legend(loc="lower left", bbox_to_anchor=(0.0, 0.0), fontsize=style.TEXT_PT, frameon=False)
     return fig
 
@@ -146,7 +138,7 @@ def of_sensors(findings: Sequence[Finding]) -> Figure:
     """Measured over model, a row a finding with a fit."""
     rows = [finding for finding in findings if finding.fit]
     height = _TOP_PX + _ROW_PX * len(rows) + _FOOT_PX
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     words = [
         ("measured", _DATA),
         ("model", style.SHAPED_COLOUR),
@@ -178,6 +170,5 @@ def of_sensors(findings: Sequence[Finding]) -> Figure:
                 color=style.JOYSTICK_COLOUR,
                 zorder=1,
             )
-        panel.set_ylabel(f"swing, {finding.unit}", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-        panel.set_xlabel("time in s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+        style.label(panel, "time in s", f"swing, {finding.unit}")
     return fig

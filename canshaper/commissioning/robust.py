@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from canshaper.config.filters import Filter, designed, filter_of
@@ -89,6 +90,10 @@ class RobustTask:
         own = Machine.of(self.bound)
         return replace(own, limits=replace(own.limits, tail_s=max(own.limits.tail_s, tail_s)))
 
+    def machine_of(self, shaper: RobustShaper) -> Machine:
+        """With the tail that is written with a shaper for lengths."""
+        return self.machine(shaper.duration_s if self.lengths_m else 0.0)
+
     def section(self, shaper: RobustShaper) -> dict[str, Any]:
         """The filter section of the file."""
         designed_for: dict[str, Any] = {
@@ -120,15 +125,27 @@ class RobustDesign:
         task: what it was designed for.
         shaper: it.
         measured: what it does through the limits of the machine.
-        verdict: whether it damps over its range.
         without: what the task gives without its second mode.
+        first: taps with which it has to begin.
+        shortest: it lasts as long as a residual asks for.
     """
 
     task: RobustTask
     shaper: RobustShaper
     measured: Evaluation
-    verdict: Verdict
     without: RobustShaper
+    first: Sequence[float] = ()
+    shortest: bool = False
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether it damps over its range, and otherwise a longer one that does."""
+        task, shaper = self.task, self.shaper
+        setup = task.mode, task.tick_s, task.in_file(shaper), task.machine_of(shaper)
+        verdict = judge(*setup, task.range_pct)
+        if verdict.word == "good" or self.shortest:
+            return verdict
+        return _with_longer(task, shaper, verdict, self.first)
 
     @property
     def bound(self) -> BoundAxis:
@@ -153,14 +170,9 @@ class RobustDesign:
 
     @property
     def reversal_s(self) -> float | None:
-        """Reversal that its second mode needs, where that of the file cuts the response off.
-
-        What makes good for a cut knows the first mode alone.
-        """
-        limits = self.bound.config.limits.output_limits()
-        needed_s = self.shaper.duration_s + limits.maximum / limits.fall_per_s
-        enough = limits.allow_reverse or limits.reversal_s >= needed_s
-        return None if enough or not self.task.second else math.ceil(10.0 * needed_s) / 10.0
+        """Reversal that its second mode needs, where that of the file cuts the response off."""
+        design = self.chosen.design()
+        return design.reversal_s(self.bound.config.limits) if design else None
 
 
 def design_robust(
@@ -186,7 +198,8 @@ def design_robust(
             follows, which it is designed for at its shortest.
         duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
         residual_pct: instead: the shortest that leaves at most this.
-        second: a second mode as the option --second has it.
+        second: a second mode as the option --second has it; None for that of the filter in the
+            file.
         first: taps with which it begins, where it has a duration.
 
     Raises:
@@ -214,25 +227,20 @@ def design_robust(
             return shortest(mode, residual_pct=residual_pct, **given)
         return least_residual(mode, duration_s=length_s, least_tap=least_tap, first=first, **given)
 
-    def machine(one: RobustShaper) -> Machine:
-        """With the tail that is written with a shaper for lengths."""
-        return task.machine(one.duration_s if lengths_m else 0.0)
-
     lengths_pct = [0.5 * k * range_pct for k in range(-2, 3)] if lengths_m else LENGTHS_PCT
     try:
         check_swing(mode)
         shapers = [design(task, one) for one in _LEAST_TAPS[: 3 if lengths_m else 1]]
         without = design(replace(task, second=None), LEAST_TAP) if task.second else shapers[0]
-        setups = [(mode, tick_s, task.in_file(one), machine(one)) for one in shapers]
-        measures = [evaluate(*setup, lengths_pct) for setup in setups]
-        best = min(range(len(shapers)), key=lambda k: measures[k].worst(range_pct))
-        shaper, measured = shapers[best], measures[best]
-        verdict = judge(*setups[best], range_pct)
-        if verdict.word != "good" and residual_pct is None:
-            verdict = _with_longer(task, shaper, verdict, first)
+        measures = [
+            evaluate(mode, tick_s, task.in_file(one), task.machine_of(one), lengths_pct)
+            for one in shapers
+        ]
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
-    return RobustDesign(task, shaper, measured, verdict, without)
+    best = min(range(len(shapers)), key=lambda k: measures[k].worst(range_pct))
+    is_shortest = residual_pct is not None
+    return RobustDesign(task, shapers[best], measures[best], without, first, is_shortest)
 
 
 def _with_longer(
@@ -271,17 +279,25 @@ def _following(task: RobustTask, sway: Sway, lengths_m: tuple[float, float] | No
 
 def _at(task: RobustTask, sway: Sway, length_m: float) -> RobustTask:
     """The task for the swing of a pendulum of this length, with its keys."""
-    if sway.length_m is not None:
-        changes = {"length_m": length_m}
-    else:
-        swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), task.mode.damping_ratio)
-        changes = {"period_s": round(swing.period_s, 4)}
+    changes = keys_of_length(sway, length_m)
     return replace(task, mode=sway.model_copy(update=changes).mode(), sway=changes)
 
 
+def keys_of_length(sway: Sway, length_m: float) -> dict[str, float]:
+    """Keys of the section sway that a pendulum of another length changes."""
+    if sway.length_m is not None:
+        return {"length_m": length_m}
+    swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), sway.mode().damping_ratio)
+    return {"period_s": round(swing.period_s, 4)}
+
+
 def _second(text: str | None, task: RobustTask) -> SecondMode | None:
-    """Return the second mode of the option --second."""
-    if text is None:
+    """Return the second mode of the option --second; without it that of the file's filter."""
+    config, at = task.bound.config, task.at
+    design = (config if at is None else config.gain_schedule[at]).filter.design()
+    if text is None and design and (own := design.second):
+        text = f"{own.period_s},{own.damping_ratio},{own.length_range_pct}"
+    if text is None or text == "none":
         return None
     if task.bound.rope:
         text = "its period does not go with the rope's; for one length, write sway without length"
@@ -289,7 +305,7 @@ def _second(text: str | None, task: RobustTask) -> SecondMode | None:
     try:
         period_s, damping_ratio, range_pct = (float(word) for word in text.split(","))
     except ValueError:
-        form = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20"
+        form = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, or none"
         raise UsageError(f"--second: expected {form}, got {text!r}") from None
     try:
         values = (period_s, damping_ratio, range_pct)

@@ -12,7 +12,7 @@ from canshaper.commissioning.stopping import consequences
 from canshaper.config.source import Place
 from canshaper.design.tuning.evaluate import shaper_of, swing_left
 from canshaper.design.tuning.modes import second_residual
-from canshaper.edit.edit import Change, change
+from canshaper.edit.edit import change
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 
@@ -77,19 +77,7 @@ def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console
 
 
 def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
-    """Write designs into the file, all or none; return changed lines and notes."""
-    changes, notes = list[Change](), list[str]()
-    for axis in dict.fromkeys(one.bound.name for one in designs):
-        own, noted = _changes(deployment, [one for one in designs if one.bound.name == axis])
-        changes += own
-        notes += noted
-    return [*change(deployment.path, changes), *notes]
-
-
-def _changes(
-    deployment: Deployment, designs: Sequence[RobustDesign]
-) -> tuple[list[Change], list[str]]:
-    """Changes of the file for the designs of an axis; see ``filter_changes``."""
+    """Write the designs of an axis into the file; return changed lines and notes."""
     config, parts = designs[0].bound.config, []
     for one in designs:
         at = one.task.at
@@ -100,7 +88,8 @@ def _changes(
     longest = max(designs, key=lambda one: one.shaper.duration_s)
     name, task = longest.bound.name, designs[0].task
     own = {"sway": task.sway, "rope": task.rope}
-    return filter_changes(deployment, name, parts, longest.needed_s, "robust", **own)
+    changes, notes = filter_changes(deployment, name, parts, longest.needed_s, "robust", **own)
+    return [*change(deployment.path, changes), *notes]
 
 
 def figure(one: RobustDesign) -> "Figure":

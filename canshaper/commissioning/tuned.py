@@ -59,10 +59,27 @@ class TunedDesign:
     choices: list[preference.Choice]
 
     @property
+    def section(self) -> dict[str, Any]:
+        """The filter section of the file."""
+        details = {
+            "length_range_pct": self.task.length_range_pct,
+            "duration_s": self.tail[0] if self.tail else None,
+            "valve_rate_per_s": self.task.require.max_rate_per_s,
+            "objective": self.objective,
+        }
+        designed_for = designed(self.task.mode) | details
+        values = {**self.setting.values(), "designed_for": _present(designed_for)}
+        return {"kind": "gff", **_present(values)}
+
+    @property
     def longer_tail(self) -> tuple[float, float] | None:
         """The tail that it needs, where that of the file is shorter."""
         short = self.tail and self.tail[0] > self.bound.config.limits.tail_s
         return self.tail if short else None
+
+
+def _present(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def design_tuned(
@@ -179,16 +196,8 @@ def print_tuned(deployment: Deployment, one: TunedDesign, console: Console) -> N
 
 def write_tuned(deployment: Deployment, one: TunedDesign) -> list[str]:
     """Write it into the file; see ``write_filters``."""
+    values = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True)) | one.section
     tail_s = one.tail[0] if one.tail else None
-    details = {
-        "length_range_pct": one.task.length_range_pct,
-        "duration_s": tail_s,
-        "valve_rate_per_s": one.task.require.max_rate_per_s,
-        "objective": one.objective,
-    }
-    designed_for = designed(one.task.mode) | {k: v for k, v in details.items() if v is not None}
-    values = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True))
-    values |= {"kind": "gff", **one.setting.values(), "designed_for": designed_for}
     return write_filters(deployment, one.bound.name, [((), values)], tail_s, "tune")
 
 

@@ -18,7 +18,7 @@ class _Crane(Section):
     @property
     def moved(self) -> dict[str, str]:
         """Axis by the coordinate that it moves."""
-        return self.model_dump(exclude={"kind", "simulated"}, exclude_none=True)
+        return self.model_dump(exclude={"kind", "drawn", "simulated"}, exclude_none=True)
 
 
 class CylindricalCrane(_Crane):
@@ -35,6 +35,7 @@ class CartesianCrane(_Crane):
     """A trolley on a bridge: the load hangs from a rope, each axis moves it along a straight."""
 
     kind: Literal["cartesian"] = Field(description="a trolley on a bridge")
+    drawn: Literal["multicopter"] | None = Field(None, description="what a page draws instead")
     bridge: str | None = Field(None, description="axis that moves the bridge along its runway")
     trolley: str | None = Field(None, description="axis that moves the trolley along the bridge")
     hoist: str | None = Field(None, description="axis of the rope, positive up")
@@ -44,6 +45,7 @@ class JointCrane(_Crane):
     """A boom whose joints have an axis each."""
 
     kind: Literal["joints"] = Field(description="an axis for each joint of the boom")
+    drawn: Literal["excavator"] | None = Field(None, description="what a page draws instead")
     slew: str | None = Field(None, description="axis that turns, positive counter-clockwise")
     lift_cylinder: str | None = Field(None, description="axis that raises the main boom")
     knuckle: str | None = Field(None, description="axis that folds the outer boom out")
@@ -107,6 +109,10 @@ class Motion(Section):
     max_s: Annotated[
         float, number(0.5, 60, "s", "longest motion of an axis that its operator left alone")
     ] = 6.0
+    luffing: str | None = None
+    """The joint that raises the boom and so moves the tip in; it needs sway, whose full_speed_m_s
+    is that of the tip inwards. It adds to its own commands only."""
+    luffing_rad_s: Annotated[float, number(0.01, 3, "rad/s", "its full speed")] | None = None
     aim: Status | None = None
     """Message with the way that the tip still goes if the joysticks are let go now."""
     waits: bool = Field(False, description="as if it were not there; commission takes this out")
@@ -116,6 +122,9 @@ class Motion(Section):
     def _one_radius(self) -> Self:
         if self.radius and self.radius_m:
             raise ValueError("expected one of radius and radius_m, got both")
-        if self.near_far is None and (self.radius or self.radius_m or self.aim):
+        measured = self.radius or self.radius_m
+        if self.near_far is None and (self.aim or (measured and not self.luffing)):
             raise ValueError("expected near_far with a radius or an aim, got none")
+        if bool(self.luffing) != bool(self.luffing_rad_s) or (self.luffing and not measured):
+            raise ValueError("expected luffing, luffing_rad_s and a radius together, got a part")
         return self

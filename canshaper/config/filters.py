@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from canshaper.config.inputs import InputSection, NamedCodes
-from canshaper.config.limits import Sway
+from canshaper.config.limits import Limits, Sway
 from canshaper.config.objective import Objective
 from canshaper.config.section import RUN, Origin, Section, expanded, number
 from canshaper.shaping.registry import KINDS
@@ -85,6 +85,16 @@ class DesignedFor(Section):
         if tail_s < (self.duration_s or 0.0):
             text = f"expected limits.tail_s of {self.duration_s:g} s or more, got {tail_s:g} s"
             yield "duration_s", text
+
+    def reversal_s(self, limits: Limits) -> float | None:
+        """Time that a reversal needs, where these limits cut the response off; else None.
+
+        What makes good for a cut knows the first mode alone: a second one swings on.
+        """
+        out = limits.output_limits()
+        needed_s = (self.duration_s or 0.0) + out.maximum / out.fall_per_s
+        enough = not self.second or out.allow_reverse or out.reversal_s >= needed_s
+        return None if enough else math.ceil(10.0 * needed_s) / 10.0
 
     def stretch_fault(self, factor: float) -> str | None:
         """Why its response cannot be drawn out in time by a factor, or None.

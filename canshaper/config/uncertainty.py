@@ -9,7 +9,8 @@ from canshaper.config.section import Section, number
 # Of each drive, with what it is and its unit.
 MEASURES = {
     "still_s": "from the last release until the swing stays below still_deg, or the drive ends, s",
-    "residual_deg": "largest swing that is left later than 2.5 s after the last release, deg",
+    "residual_deg": "largest swing that is left later than 2.5 s after the last release, or than"
+    " the longest tail_s where that is more than 5 s, deg",
     "peak_deg": "largest swing of the drive, deg",
     "run_on_s": "from the last release until the tip stands, s",
     "run_on_m": "how far the tip gets meanwhile, m",

@@ -63,6 +63,7 @@ class MotionRunner:
         slew: the axis that turns.
         near_far: the axis that moves the tip in and out, or None.
         radius: measured radius of the tip, or None.
+        luffing: the axis that turns the boom up, or None.
         tick_s: time between two ticks of the controller.
     """
 
@@ -74,6 +75,7 @@ class MotionRunner:
         near_far: AxisControl | None,
         radius: Value | None,
         *,
+        luffing: AxisControl | None,
         tick_s: float,
     ) -> None:
         self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
@@ -85,16 +87,24 @@ class MotionRunner:
         turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]
+        for member in self._members:
+            member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
+        bending: _Member | None = None
+        if luffing and config.luffing_rad_s:
+            bending = _Member(luffing, config.luffing_rad_s)
+            luffing.axis.bends = True
+            self._members.append(bending)
         self._roped = [one for one in self._members if one.runner.bound.rope]
         self._name = name
         self._apart = slew.bound.name  # what keeps the axes apart: at the start that they wait
-        for member in self._members:
-            member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
         if self._near_far:
             self._near_far.bound(config)
         self._motion = TwoAxisMotion(
             turning.moving, self._near_far.moving if self._near_far else None, config.max_path_m
         )
+        if bending:
+            self._motion.luffing = bending.moving
+            self._motion.height_m = _full_speed_m_s(bending.runner) / bending.moving.full_speed
 
     def adjust(self) -> None:
         """Take full speed and fall of near-far as they are now."""
@@ -181,5 +191,8 @@ def motion_runners(
         config = bound.config
         near_far = axes[config.near_far] if config.near_far else None
         slew, radius = axes[config.slew], radii.get(name)
-        motions.append(MotionRunner(name, config, slew, near_far, radius, tick_s=tick_s))
+        luffing = axes[config.luffing] if config.luffing else None
+        motions.append(
+            MotionRunner(name, config, slew, near_far, radius, luffing=luffing, tick_s=tick_s)
+        )
     return motions

@@ -4,6 +4,7 @@ The controller is the daemon's own, and everything passes through the same frame
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Protocol, TypedDict, Unpack
 
 from canshaper.codec.frame import Frame
@@ -21,6 +22,7 @@ from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import Recording
+from canshaper_sim.unit import unit_of
 
 OnFrame = Callable[[Frame, float], object]
 """Called with a frame and its time in s."""
@@ -167,6 +169,7 @@ class DriveOptions(TypedDict, total=False):
         prepare: called with the fresh controller, to put another filter in.
         crane: which one moves, where the deployment has several; the others' joysticks stand still.
         disturb: puts something between joysticks and bus.
+        unit: FMU in place of our crane.
     """
 
     bypass: bool
@@ -177,6 +180,7 @@ class DriveOptions(TypedDict, total=False):
     prepare: Callable[[Controller], None] | None
     crane: str | None
     disturb: Callable[[Joysticks], Joysticks]
+    unit: Path
 
 
 def driven_part(deployment: Deployment, crane: str | None) -> Deployment:
@@ -225,7 +229,10 @@ class Simulation:
         parameters, sway = options.get("parameters"), options.get("sway")
         driven = driven_part(deployment, crane)
         try:
-            self.plant = PlantNode(driven, parameters, machine, sway, listeners=listeners)
+            unit = unit_of(path) if (path := options.get("unit")) else None
+            self.plant = PlantNode(
+                driven, parameters, machine, sway, unit=unit, listeners=listeners
+            )
             hands: list[Joysticks] = [
                 JoystickNode(driven, script, bypass=options.get("bypass", False))
             ]

@@ -49,7 +49,7 @@ def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
     motions = {}
     for name, motion in lookup.config.motion.items():
         place: Place = ("motion", name)
-        for key in ("slew", "near_far"):
+        for key in ("slew", "near_far", "luffing"):
             _check_axis(lookup, (*place, key), getattr(motion, key), moved, turns=key == "slew")
         _check_crane(lookup, (*place, "near_far"), motion)
         slewing = lookup.config.axes[motion.slew].slewing if motion.slew in moved else None

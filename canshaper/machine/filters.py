@@ -127,6 +127,10 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
                     again = f"design it again: canshaper {KINDS[chosen.kind].designed_by}"
                     cure = "lengthen it" if key == "duration_s" else again
                     yield (*place, "designed_for", key), f"{fault}; {cure}"
+            if design and (lets_end_s := design.reversal_s(axis.limits)):
+                text = "a reversal cuts the response off and makes this mode swing; write in limits"
+                cure = f"reversal: brake_shaped, reversal_s: {lets_end_s:g}"
+                yield (*place, "designed_for", "second"), f"{text} {cure}"
 
 
 def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:

@@ -45,6 +45,7 @@ NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
     ("axes", "*", "valve"): ("direction", "also", "cia408", "node", *_PROTECTED[:3]),
     ("axes", "*", "sway"): ("length",),
     ("axes", "*", "limits"): ("ends",),
+    ("motion", "*"): ("luffing",),
     ("motion", "*", "radius"): _PROTECTED,
 }
 """Keys of the file for which the C has no part, by their sections."""

@@ -5,16 +5,18 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from canshaper.codec.frame import Frame, FrameFault, group_of
+from canshaper.codec.layout import Layout
 from canshaper.config.bus import Bus
 from canshaper.errors import CutOffError, LogError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
+from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.j1939.groups import AnySource, ReceivedGroup
-
-Key = tuple[str, int, bool]
 
 
 class Kind(Enum):
@@ -180,7 +182,7 @@ class InputFinder(Generic[_Input]):
     """
 
     def __init__(self, buses: Mapping[str, Bus], inputs: Iterable[_Input]) -> None:
-        self._by_key: dict[tuple[str, int, bool], _Input] = {}
+        self._by_key: dict[Key, _Input] = {}
         self._by_group: dict[tuple[str, int], ReceivedGroup] = {}
         self._input: _Input | None = None
         for bound in inputs:
@@ -226,3 +228,30 @@ class _Noted(Generic[_Input]):
 
     def invalidate(self) -> None:
         """Do nothing: no state is kept."""
+
+
+def joystick_commands(
+    joystick: BoundJoystick, axes: Mapping[str, BoundAxis], data: bytes
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Decode a joystick's frame: its raw values, and the command of each of its axes.
+
+    Both are empty for a frame of another length; a command that is no value is left out.
+    """
+    if len(data) != joystick.message.length:
+        return {}, {}
+    raw, commands = joystick.decode(data)
+    values = {}
+    for name, axis in axes.items():
+        config = axis.config.command
+        value = commands.get(config.signal) if config.joystick == joystick.name else None
+        if type(value) is float:
+            values[name] = value
+    return raw, values
+
+
+def valve_part(axis: BoundAxis, layout: Layout, data: bytes) -> float | None:
+    """Command in a valve frame, part of full; None for a frame of another length or a wrong one."""
+    if len(data) != axis.valve_message.length:
+        return None
+    steps = axis.valve.read(layout.decode(data))
+    return None if steps is None else steps / axis.valve.steps

@@ -16,7 +16,7 @@ from canshaper.codec.frame import NULL, Frame, with_source
 from canshaper.codec.layout import CLASSICAL_BYTES, Layout, layout_fault
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key
+from canshaper.machine.routing import Key
 from canshaper.recording.form import AXIS, EXTRAS, POSE, Channel, Group, Row, Writer, install
 from canshaper.recording.history import History
 from canshaper.recording.listen import ReceivedFrame
@@ -86,10 +86,6 @@ class Export:
         self._axes = {n: writer.group(Group(f"axes/{n}", AXIS)) for n in deployment.axes}
         self._states = dict.fromkeys(deployment.axes, (State.NEUTRAL_WAIT, Reason.START))
         self._history = History(deployment)
-        statuses = {
-            axis.status.message.key: n for n, axis in deployment.axes.items() if axis.status
-        }
-        self._statuses: dict[Key, str] = statuses
         self._crane = _CranePose(writer, deployment, parameters)
         self._last_ns = 0
 
@@ -101,12 +97,11 @@ class Export:
         if decoded:
             self._crane.measured(frame.time_ns, *decoded)
         history, before = self._history, len(self._history.changes)
-        history.receive(frame)
+        name = history.receive(frame)
         for change in history.changes[before:]:
             self._writer.event(change.time_ns, change.text)
-        name = self._statuses.get((frame.bus, frame.can_id, frame.extended))
-        if name and (status := history.axes.get(name)) and status.time_ns == frame.time_ns:
-            one = status.values
+        if name:
+            one = history.axes[name].values
             commands = one["RawCommand"] / 100.0, one["ShapedCommand"] / 100.0
             row = (*commands, one["PredictedSway"], one["State"], one["Reason"])
             self._axes[name](frame.time_ns, row)

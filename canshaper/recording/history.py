@@ -5,7 +5,7 @@ from typing import Any
 
 from canshaper.codec.status import LAST_FAULT, StatusCodec
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key
+from canshaper.machine.routing import Key
 from canshaper.recording.listen import ReceivedFrame
 
 
@@ -67,17 +67,18 @@ class History:
         if deployment.status:
             self._codecs[deployment.status.message.key] = deployment.status
 
-    def receive(self, frame: ReceivedFrame) -> None:
-        """Take a data frame; pass over one that is no status."""
+    def receive(self, frame: ReceivedFrame) -> str | None:
+        """Take a data frame, pass over one that is no status; the axis whose status it is."""
         key = (frame.bus, frame.can_id, frame.extended)
         codec = self._codecs.get(key)
         if codec is None or (values := codec.decode(frame.data)) is None:
-            return
+            return None
         shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
         if name := self._axes.get(key):
             self._axis(name, AxisStatus(frame.time_ns, values, shown))
         else:
             self._counters(values, shown[LAST_FAULT.name], frame.time_ns)
+        return name
 
     def _axis(self, name: str, status: AxisStatus) -> None:
         last = self.axes.get(name)

@@ -17,7 +17,7 @@ from canshaper.errors import CutOffError, LogError
 from canshaper.recording import asc, binary, candump, captures, tables
 from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
-__all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
+__all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame"]
 
 READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
     ".log": candump.log,
@@ -206,11 +206,6 @@ class _Utf8(RawIOBase):
         count = min(len(buffer), len(self._text))
         buffer[:count], self._text = self._text[:count], self._text[count:]
         return count
-
-
-def read_log(path: Path, progress: Callable[[float], None] | None = None) -> Iterator[TimedFrame]:
-    """Frames of a log, see ``LogFile``."""
-    return iter(LogFile(path, progress))
 
 
 def _format(place: Place) -> tuple[bool, str]:

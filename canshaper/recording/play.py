@@ -13,7 +13,7 @@ from canshaper.controller.guarded import Guarded
 from canshaper.errors import BoxError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import TimedFrame
-from canshaper.recording.ticks import Difference, Result, Rows, Tick, Timed
+from canshaper.recording.ticks import Difference, Result, Tick, Timed, rows_of
 
 # What the daemon may call between two frames of one tick.
 WITHIN = frozenset((Kind.FAILED, Kind.WITHHELD, Kind.FAULT))
@@ -99,7 +99,7 @@ class _Played:
     def __init__(self, guarded: Guarded, controller: Controller, buses: list[str]) -> None:
         self._guarded, self._controller, self._buses = guarded, controller, buses
         self._adjuster = Adjuster(controller)
-        self._rows = Rows(controller)
+        self._rows = rows_of(controller)
         controller.events.clear()  # the daemon has logged them
         self._records: list[Record] = []
         self._at = 0

@@ -13,24 +13,8 @@ from matplotlib.figure import Figure
 
 from canshaper.recording.report import Replayed
 from canshaper.recording.ticks import STATE_CHANGE
+from canshaper.report import style
 from canshaper.report.console import axis_title
-from canshaper.report.style import (
-    DASHED,
-    JOYSTICK_COLOUR,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    TITLE_PT,
-    WIDTH_PX,
-    coloured_words,
-    command_scale,
-    new_figure,
-    plain,
-    titled,
-    zero_line,
-)
 from canshaper.shaping.reasons import REASON_TEXTS
 from canshaper.shaping.states import MOVING, Reason, State
 from canshaper_sim.recording import Recording
@@ -46,8 +30,8 @@ class _Look(NamedTuple):
 
 # Of Okabe and Ito, as in the other pictures.
 LOOKS = (
-    _Look(SHAPED_COLOUR, 2.2, "solid"),
-    _Look(RAW_COLOUR, 1.0, DASHED),
+    _Look(style.SHAPED_COLOUR, 2.2, "solid"),
+    _Look(style.RAW_COLOUR, 1.0, style.DASHED),
     _Look("#009E73", 1.0, (0, (1.0, 1.0))),
     _Look("#CC79A7", 0.8, "solid"),
 )
@@ -90,7 +74,7 @@ def figure(replays: Sequence[Replayed]) -> Figure:
     followed = [kind for _, kind, _ in rows[1:]] + ["command"]
     gaps = [_GAPS_PX[kind] for kind in followed]
     height = _HEAD_PX + sum(h + gap for (_, _, h), gap in zip(rows, gaps, strict=True)) + _FOOT_PX
-    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    fig = style.print_figure(height)
     _head(fig, replays, [name for name in names if name not in moved], height)
     top = height - _HEAD_PX
     panels: list[Axes] = []
@@ -104,12 +88,12 @@ def figure(replays: Sequence[Replayed]) -> Figure:
             continue
         (_draw_sway if kind == "sway" else _draw_command)(panel, name, recordings, straight)
         if kind == "command":
-            titled(panel, _title(name, replays), TITLE_PT)
-        plain(panel, size=TEXT_PT)
-        zero_line(panel)
+            style.titled(panel, _title(name, replays), style.TITLE_PT)
+        style.plain(panel, size=style.TEXT_PT)
+        style.zero_line(panel)
         panel.tick_params(labelbottom=False)
-    panels[-1].tick_params(labelbottom=True, labelsize=TEXT_PT)
-    panels[-1].set_xlabel("time since the first tick, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    panels[-1].tick_params(labelbottom=True, labelsize=style.TEXT_PT)
+    style.label(panels[-1], "time since the first tick, s")
     panels[0].set_xlim(straight.t_s[0], straight.t_s[-1])
     return fig
 
@@ -125,10 +109,10 @@ def _head(fig: Figure, replays: Sequence[Replayed], idle: Sequence[str], height:
     styles = ("solid", "dashed", "dotted", "thin solid")
     for i, one in enumerate(replays):
         words.append((f"{one.name} ({styles[i % len(LOOKS)]})", LOOKS[i % len(LOOKS)].colour))
-    coloured_words(fig, words, (0.012, 1.0 - 14 / height), size=TEXT_PT, sep=12)
+    style.coloured_words(fig, words, (0.012, 1.0 - 14 / height), size=style.TEXT_PT, sep=12)
     left_out = f"; idle, left out: {', '.join(idle)}" if idle else ""
     at = 1.0 - 58 / height
-    fig.text(0.012, at, _KEY + left_out, fontsize=TEXT_PT, color=TEXT_COLOUR, va="top")
+    fig.text(0.012, at, _KEY + left_out, fontsize=style.TEXT_PT, color=style.TEXT_COLOUR, va="top")
 
 
 def _title(name: str, replays: Sequence[Replayed]) -> str:
@@ -151,10 +135,10 @@ def _draw_command(
 ) -> None:
     """Draw the command of the valve, over the joystick as a filled step."""
     if name in straight.axes:
-        joystick = straight.axes[name].joystick
-        panel.fill_between(straight.t_s, joystick, step="post", color=JOYSTICK_COLOUR, linewidth=0)
-    command_scale(panel, 1.1)
-    panel.set_ylabel("command, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
+        joystick, colour = straight.axes[name].joystick, style.JOYSTICK_COLOUR
+        panel.fill_between(straight.t_s, joystick, step="post", color=colour, linewidth=0)
+    style.command_scale(panel, 1.1)
+    style.label(panel, y="command, %")
     for i, recording in enumerate(recordings):
         if name in recording.axes:
             sent = recording.axes[name].sent
@@ -165,7 +149,7 @@ def _draw_sway(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
     """Draw the predicted sway, and that of the joystick straight to the valve."""
-    panel.set_ylabel("predicted\nsway, degrees", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    style.label(panel, y="predicted\nsway, degrees")
     joystick = straight.axes.get(name)
     if joystick is not None and joystick.sway_deg is not None:
         _plot(panel, straight.t_s, joystick.sway_deg, STRAIGHT)
@@ -193,7 +177,7 @@ def _draw_lanes(
                 side: Any = "right" if start_s > late_s else "left"
                 at_s = max(start_s, first_s) if side == "left" else min(end_s, last_s)
                 place = (at_s, len(replays) + 0.12)
-                panel.text(*place, words, fontsize=TEXT_PT, va="bottom", ha=side)
+                panel.text(*place, words, fontsize=style.TEXT_PT, va="bottom", ha=side)
             if state in _LANES:
                 colour, hatch = _LANES[state]
                 spans = [(start_s, end_s - start_s)]
@@ -202,13 +186,13 @@ def _draw_lanes(
                     linewidth=0,
                 )  # fmt: skip
         others = [_seconds(one, at) for at, text in one.events if not STATE_CHANGE.match(text)]
-        panel.plot(others, [low + 0.5] * len(others), "v", color=TEXT_COLOUR, markersize=3.5)
+        panel.plot(others, [low + 0.5] * len(others), "v", color=style.TEXT_COLOUR, markersize=3.5)
         look = LOOKS[i % len(LOOKS)]
         panel.plot([0.0, 0.0], [low + 0.1, low + 0.9], color=look.colour, linewidth=4.0)
     panel.set_ylim(0.0, len(replays))
     panel.set_yticks([])
     panel.spines[["top", "right", "left"]].set_visible(False)
-    panel.tick_params(labelbottom=False, labelcolor=TEXT_COLOUR)
+    panel.tick_params(labelbottom=False, labelcolor=style.TEXT_COLOUR)
 
 
 def _spans(one: Replayed, axis: str) -> Iterator[tuple[float, float, State, Reason]]:

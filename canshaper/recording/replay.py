@@ -11,7 +11,8 @@ from canshaper.codec.frame import Frame, group_of, new_frame
 from canshaper.controller.controller import Controller
 from canshaper.errors import BoxError, CutOffError, LogError, StateError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import Key, Kind, Sorter, TimedFrame, bus_of_channel
+from canshaper.machine.routing import Key
+from canshaper.recording.channels import Kind, Sorter, TimedFrame, bus_of_channel
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import Player, frames_of, of_its_copies, of_same_files
 from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick, clocked
@@ -210,7 +211,7 @@ class Replay:
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
         """Frames of the log on the buses of the deployment, but those that no daemon sees."""
         channels, box = self._drive.channels, self._drive.box
-        known: dict[tuple[str, int, bool], tuple[str, Kind]] = {}
+        known: dict[Key, tuple[str, Kind]] = {}
         new, ignored = new_frame, Kind.IGNORED
         try:
             for time_ns, channel, can_id, extended, data in frames_of(box) if box else self.log:

@@ -16,8 +16,8 @@ from canshaper.controller.runner import LEAST_RADIUS_M
 from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.inputs.value import PositionInput, Value
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
-from canshaper.recording.channels import Key
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import frames_of
 from canshaper.recording.replay import Drive, Replay

@@ -11,7 +11,8 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.controller.runner import AxisControl
 from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.recording.channels import Key, Kind
+from canshaper.machine.routing import Key
+from canshaper.recording.channels import Kind
 from canshaper.shaping.states import Reason, State
 from canshaper.shaping.sway import SwayMode
 
@@ -92,19 +93,10 @@ class Result:
     compared: int = 0
 
 
-class Rows:
-    """Makes what is drawn of each axis.
-
-    Args:
-        controller: whose axes they are.
-    """
-
-    def __init__(self, controller: Controller) -> None:
-        self._rows = [(n, _row_of(controller, r)) for n, r in controller.axes.items()]
-
-    def __call__(self) -> dict[str, Row]:
-        """All of them as they are now."""
-        return {name: row() for name, row in self._rows}
+def rows_of(controller: Controller) -> Callable[[], dict[str, Row]]:
+    """Return what makes the rows of its axes, as they are when it is called."""
+    rows = [(name, _row_of(controller, one)) for name, one in controller.axes.items()]
+    return lambda: {name: row() for name, row in rows}
 
 
 def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
@@ -213,7 +205,7 @@ class Stepper:
         self._standstill = Standstill(controller.deployment)
         self._standstill.clock = lambda: 0  # nothing is ever late here
         self._guarded = Guarded(controller)
-        self._rows = Rows(controller)
+        self._rows = rows_of(controller)
 
     def step(self, tick: Tick) -> Result:
         """Run one tick, as the daemon does."""

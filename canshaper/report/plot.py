@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from canshaper.report import style
 from canshaper.report.console import NOTHING, axis_title, change_text
 from canshaper.report.strokes import (
     Stroke,
@@ -19,26 +20,6 @@ from canshaper.report.strokes import (
     residual_window,
     residual_windows,
     rests,
-)
-from canshaper.report.style import (
-    DASHED,
-    HEAD_PT,
-    JOYSTICK_COLOUR,
-    MINUS,
-    PRINT_DPI,
-    RAW_COLOUR,
-    SHAPED_COLOUR,
-    TEXT_COLOUR,
-    TEXT_PT,
-    TITLE_PT,
-    WIDTH_PX,
-    coloured_words,
-    command_scale,
-    draw_top_views,
-    new_figure,
-    plain,
-    titled,
-    zero_line,
 )
 from canshaper_sim.recording import Recording
 
@@ -71,7 +52,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
     ]
     blocks = max(len(names), 2 if views else 1)
     height = _HEAD_PX + blocks * _BLOCK_PX + _FOOT_PX
-    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    fig = style.print_figure(height)
     _head(fig, report["crane"], height)
     if _windows(raw):
         _explain_shade(fig, height, raw.dwell_s)
@@ -85,7 +66,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
     if views:
         low = 1.0 - (_HEAD_PX + 2 * _BLOCK_PX) / height
         box = (_VIEW_LEFT, low, _RIGHT, top)
-        draw_top_views(fig, views, box, sizes=(TEXT_PT, TITLE_PT))
+        style.draw_top_views(fig, views, box, sizes=(style.TEXT_PT, style.TITLE_PT))
     return fig
 
 
@@ -103,10 +84,10 @@ def _draw_blocks(
         command = fig.add_subplot(block[0], sharex=time)
         sway = fig.add_subplot(block[1], sharex=command, sharey=panels[1] if panels else None)
         panels += [command, sway]
-        titled(command, title, TITLE_PT)
+        style.titled(command, title, style.TITLE_PT)
         for panel in (command, sway):
-            plain(panel, size=TEXT_PT)
-            zero_line(panel)
+            style.plain(panel, size=style.TEXT_PT)
+            style.zero_line(panel)
             _shade(panel, raw, windows)
         _draw_command(command, raw, shaped, name, strokes[name])
         _draw_sway(sway, raw, shaped, name)
@@ -115,7 +96,7 @@ def _draw_blocks(
         panel.tick_params(labelbottom=False)
     panels[0].set_xlim(0.0, min(raw.t_s[-1], shaped.t_s[-1]))
     panels[1].set_ylim(-1.45 * largest, 1.45 * largest)
-    panels[-1].set_xlabel("time, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    style.label(panels[-1], "time, s")
 
 
 def finding(name: str, axis: Mapping[str, Any]) -> str:
@@ -137,7 +118,7 @@ def _change(measures: Mapping[str, Any], measure: str) -> str:
     reduction = measures[f"{measure}_reduction_pct"]
     if reduction is None:
         return values
-    return f"{values} ({change_text(reduction).replace('-', MINUS)})"
+    return f"{values} ({change_text(reduction).replace('-', style.MINUS)})"
 
 
 def _windows(drive: Recording) -> list[range]:
@@ -149,15 +130,15 @@ def _windows(drive: Recording) -> list[range]:
 def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
     """Write the headline, which is at the same time the key to the curves, and gain and price."""
     words = (
-        ("The same operator script with", TEXT_COLOUR),
-        ("filters off (dashed)", RAW_COLOUR),
-        ("and", TEXT_COLOUR),
-        ("filters on (solid)", SHAPED_COLOUR),
+        ("The same operator script with", style.TEXT_COLOUR),
+        ("filters off (dashed)", style.RAW_COLOUR),
+        ("and", style.TEXT_COLOUR),
+        ("filters on (solid)", style.SHAPED_COLOUR),
     )
-    coloured_words(fig, words, (_EDGE, 1.0 - 14 / height), size=HEAD_PT, sep=4)
+    style.coloured_words(fig, words, (_EDGE, 1.0 - 14 / height), size=style.HEAD_PT, sep=4)
     if crane and crane["raw"]["run_on_m"] is not None:
-        text = gain_and_price(crane)
-        fig.text(_EDGE, 1.0 - 70 / height, text, fontsize=TITLE_PT, color=TEXT_COLOUR, va="top")
+        look: dict[str, Any] = {"fontsize": style.TITLE_PT, "color": style.TEXT_COLOUR}
+        fig.text(_EDGE, 1.0 - 70 / height, gain_and_price(crane), va="top", **look)
 
 
 def gain_and_price(crane: Mapping[str, Any]) -> str:
@@ -181,8 +162,8 @@ def _explain_shade(fig: Figure, height: float, dwell_s: float) -> None:
         46 / height,  # the stamp is below
         f"shaded: residual swing, from {dwell_s:g} s after release to the next move",
         va="bottom",
-        fontsize=TEXT_PT,
-        color=TEXT_COLOUR,
+        fontsize=style.TEXT_PT,
+        color=style.TEXT_COLOUR,
         bbox={"facecolor": WINDOW_COLOUR, "edgecolor": "none", "pad": 3.0},
     )
 
@@ -200,21 +181,21 @@ def _draw_command(
     """Draw the joystick as a filled step, and the command to the valve without and with filters."""
     joystick = raw.axes[name].joystick
     panel.fill_between(
-        raw.t_s, joystick, step="post", color=JOYSTICK_COLOUR, linewidth=0, zorder=1.5
+        raw.t_s, joystick, step="post", color=style.JOYSTICK_COLOUR, linewidth=0, zorder=1.5
     )
     _draw_pair(panel, raw, shaped, lambda drive: drive.axes[name].sent, drawstyle="steps-post")
-    command_scale(panel, 1.2)
-    panel.set_ylabel("command, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    style.command_scale(panel, 1.2)
+    style.label(panel, y="command, %")
     if strokes:
         first, last = strokes[0].plateau
         middle_s = 0.5 * (raw.t_s[first] + raw.t_s[last])
         level = -0.5 * strokes[0].direction
-        panel.text(middle_s, level, "joystick", ha="center", va="center", fontsize=TEXT_PT)
+        panel.text(middle_s, level, "joystick", ha="center", va="center", fontsize=style.TEXT_PT)
 
 
 def _draw_sway(panel: Axes, raw: Recording, shaped: Recording, name: str) -> None:
     _draw_pair(panel, raw, shaped, lambda drive: _sway(drive, name))
-    panel.set_ylabel("sway, degrees", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    style.label(panel, y="sway, degrees")
 
 
 def _draw_pair(
@@ -225,10 +206,13 @@ def _draw_pair(
     **options: Any,
 ) -> None:
     """Draw a curve of both drives: raw thin and dashed, shaped solid, so that grey is enough."""
-    looks = ((raw, RAW_COLOUR, 1.0, DASHED), (shaped, SHAPED_COLOUR, 1.7, "solid"))
-    for drive, colour, width, style in looks:
+    looks = (
+        (raw, style.RAW_COLOUR, 1.0, style.DASHED),
+        (shaped, style.SHAPED_COLOUR, 1.7, "solid"),
+    )
+    for drive, colour, width, dashes in looks:
         panel.plot(
-            drive.t_s, values(drive), color=colour, linewidth=width, linestyle=style, **options
+            drive.t_s, values(drive), color=colour, linewidth=width, linestyle=dashes, **options
         )
 
 
@@ -243,8 +227,8 @@ def _mark_residual(
     at_raw = _worst(raw, name)
     side = 1.0 if _sway(raw, name)[at_raw] > 0 else -1.0
     for drive, at, text, colour, height in (
-        (raw, at_raw, "filters off", RAW_COLOUR, side * height_deg),
-        (shaped, _worst(shaped, name), "filters on", SHAPED_COLOUR, -side * height_deg),
+        (raw, at_raw, "filters off", style.RAW_COLOUR, side * height_deg),
+        (shaped, _worst(shaped, name), "filters on", style.SHAPED_COLOUR, -side * height_deg),
     ):
         t, sway = drive.t_s[at], _sway(drive, name)[at]
         edge = 0.15 * drive.t_s[-1]  # a name centred nearer to the end would leave the panel
@@ -256,7 +240,7 @@ def _mark_residual(
             xytext=(t, height),
             ha=align,
             va="center",
-            fontsize=TEXT_PT,
+            fontsize=style.TEXT_PT,
             weight="bold",
             color=colour,
             arrowprops={

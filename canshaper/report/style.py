@@ -42,6 +42,11 @@ def new_figure(width_px: float, height_px: float, *, dpi: float = DPI, **options
     return fig
 
 
+def print_figure(height_px: float) -> Figure:
+    """A white figure as wide as a page."""
+    return new_figure(WIDTH_PX, height_px, dpi=PRINT_DPI)
+
+
 def save(fig: Figure, path: Path) -> None:
     """Write a picture in the format of its suffix: PNG, SVG or PDF."""
     fig.savefig(path, dpi=fig.dpi, format=path.suffix[1:])
@@ -65,6 +70,18 @@ def plain(panel: Axes, *, size: float = 10) -> None:
 def titled(panel: Axes, text: str, size: float) -> None:
     """A bold title at the left."""
     panel.set_title(text, loc="left", fontsize=size, weight="bold", color=TEXT_COLOUR, pad=5)
+
+
+def label(panel: Axes, x: str = "", y: str = "") -> None:
+    """Name the axes of a panel."""
+    for text, put in ((x, panel.set_xlabel), (y, panel.set_ylabel)):
+        if text:
+            put(text, fontsize=TEXT_PT, color=TEXT_COLOUR)
+
+
+def headline(fig: Figure, text: str) -> None:
+    """A bold title over all panels, at the left."""
+    fig.suptitle(text, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
 
 
 def zero_line(panel: Axes) -> None:

@@ -62,6 +62,8 @@ class ShapedAxis:
         unattended: whether the joystick rested longer than the tail, where a motion may move the
             axis.
         added_time: how long a motion may still move the axis.
+        bends: whether it takes an added velocity into the range of its own demands: it never moves
+            without them.
         error: how the filter has failed, see ``Transition``; empty unless it has while the axis
             entered TRIPPED or was in it.
     """
@@ -80,6 +82,7 @@ class ShapedAxis:
         self.command = 0.0
         self.sway = sway
         self.sensed: SensedSway | None = None
+        self.bends = False
         self.scale = 1.0
         self.bounds = -math.inf, math.inf
         self.error = ""
@@ -185,7 +188,7 @@ class ShapedAxis:
             self.command = demand
 
             adds = may_add and state is ACTIVE
-            if adds:
+            if adds or (self.bends and state is ACTIVE):
                 path = added
             reference = self._transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
             if adds and damps_now and not held:

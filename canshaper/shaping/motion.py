@@ -14,6 +14,13 @@ D = rho'' / w6^2. The motion adds the rest, psi - L to slew and R - rho - D to n
 velocities from one position to the next. The dampers of the joints are in L and D by the models; of
 the rest they are taken to first order. Near-far alone gets nothing added; slew alone moves the tip
 in on its circle.
+
+A boom that luffs moves the tip in by h times its angle, h high above its joint: rho and D have a
+part of it. The tip goes in an arc, so the joint itself makes up for what its filter does not know,
+the centripetal acceleration and that of Coriolis in the boom's plane (theta, b: angle of the boom
+that the grapple hangs on, and lead of the joint)
+
+    R/h (theta'^2 / w^2 - b^2 / 2) + (2 theta' rho' / w^2 - b D) / R
 """
 
 import math
@@ -51,17 +58,32 @@ class TwoAxisMotion:
         path_m: farthest that near-far is moved for slew, and as far again to damp its swing.
 
     Attributes:
+        luffing: the axis that turns the boom up, or None. It adds to its own commands only.
+        height_m: of the tip above the joint of the boom.
         unattended: every joystick of it rested for longer than the tail: way and time begin again.
     """
 
-    __slots__ = ("_near_far", "_path_m", "_radius_m", "_slew", "_weight", "unattended")
+    __slots__ = (
+        "_near_far",
+        "_path_m",
+        "_radius_m",
+        "_slew",
+        "_tip_m",
+        "_weight",
+        "height_m",
+        "luffing",
+        "unattended",
+    )
 
     def __init__(self, slew: MovingAxis, near_far: MovingAxis | None, path_m: float) -> None:
         self._slew = slew
         self._near_far = near_far
         self._path_m = path_m
         self._radius_m: float | None = None  # of the grapple
+        self._tip_m: float | None = None  # radius of the tip, as ``_bend`` follows it
         self._weight = 1.0
+        self.luffing: MovingAxis | None = None
+        self.height_m = 0.0
         self.unattended = False
 
     def step(self, elapsed_s: float, tip_m: float | None, circle_m: float | None = None) -> None:
@@ -72,9 +94,10 @@ class TwoAxisMotion:
             tip_m: measured radius of the tip, or None where it is not known.
             circle_m: instead of it: radius of the grapple, where that is a number of the file.
         """
-        slew, near_far = self._slew, self._near_far
+        slew, near_far, luffing = self._slew, self._near_far, self.luffing
         commanded = slew.commanded or (near_far is not None and near_far.commanded)
         able = slew.able and (near_far is None or near_far.able)
+        able = able and (luffing is None or luffing.able)
         weight = self._weight
         if weight < 1.0 or not able:
             fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
@@ -82,15 +105,14 @@ class TwoAxisMotion:
         self.unattended = slew.unattended and (near_far is None or near_far.unattended)
         if near_far is not None:
             self._moved(near_far, elapsed_s)
+        if luffing is not None and not luffing.ahead_s:
+            self._bend(luffing, elapsed_s, tip_m if circle_m is None else circle_m)
         if not commanded or not weight:
             self._rest(over=not commanded)
             return
-        if near_far is None:
-            radius_m = None
-        elif circle_m is None:
+        radius_m = circle_m
+        if near_far is not None and circle_m is None:
             radius_m = self._carried_m(near_far, elapsed_s, tip_m)
-        else:
-            radius_m = circle_m
         turn = slew.path(slew.period_s)
         if near_far is None or radius_m is None:
             if not slew.ahead_s:  # the grapple stays on its circle, of whatever radius
@@ -124,6 +146,33 @@ class TwoAxisMotion:
                 axis.damps = False
                 axis.joins = not over
 
+    def _bend(self, luffing: MovingAxis, elapsed_s: float, tip_m: float | None) -> None:
+        """Let the boom make up for the arc in which it moves the tip."""
+        radius_m = self._tip_m
+        if tip_m is not None:
+            last_m = tip_m if radius_m is None else radius_m
+            self._tip_m = radius_m = last_m + (tip_m - last_m) * min(1.0, elapsed_s / RADIUS_S)
+        if not radius_m or not luffing.commanded or not self._weight:
+            luffing.added = luffing.reached = 0.0
+            luffing.joins = luffing.commanded
+            return
+        lead, _, speed, _ = luffing.path(luffing.period_s)
+        stiffness, near_far = luffing.stiffness, self._near_far
+        target = radius_m / self.height_m * (speed * speed / stiffness - 0.5 * lead * lead)
+        if near_far is not None and near_far.commanded:
+            out, _, out_rate, _ = near_far.path(luffing.period_s)
+            across = 2.0 * speed * out_rate / stiffness - lead * out
+            target += across / max(radius_m, _LEAST_RADIUS_M)
+        luffing.add(target, self._weight)
+
+    def _luffed(self, luffing: MovingAxis, after_s: float) -> GrapplePath:
+        """How luffing alone moves tip and grapple outwards; see ``MovingAxis.path``."""
+        height_m = self.height_m
+        if not luffing.commanded:
+            return _REST
+        lead, rate, speed, acceleration = luffing.path(after_s)
+        return -height_m * lead, -height_m * rate, -height_m * speed, -height_m * acceleration
+
     def _moved(self, near_far: MovingAxis, elapsed_s: float) -> None:
         """Count how far near-far was moved; it damps no farther than it may be moved."""
         if near_far.commanded or self.unattended:
@@ -143,11 +192,12 @@ class TwoAxisMotion:
     ) -> float | None:
         """Radius of the grapple: carried on by the near-far model, corrected by the tip's."""
         sway, full = near_far.sway, near_far.full_speed
-        ahead_m = full * sway.angle + near_far.reached
+        luffed_m, _, luffed_m_s, _ = self._luffed(self.luffing, 0.0) if self.luffing else _REST
+        ahead_m = full * sway.angle + near_far.reached + luffed_m
         if self._radius_m is None:
             self._radius_m = None if tip_m is None else tip_m - ahead_m
         else:
-            self._radius_m -= full * sway.rate * elapsed_s
+            self._radius_m += (luffed_m_s - full * sway.rate) * elapsed_s
             if tip_m is not None:
                 error_m = tip_m - ahead_m - self._radius_m
                 self._radius_m += error_m * min(1.0, elapsed_s / RADIUS_S)
@@ -166,6 +216,10 @@ class TwoAxisMotion:
         """
         lead, lead_rate, speed, acceleration = turn
         out, _, out_rate, out_acceleration = near_far.path(after_s) if near_far.commanded else _REST
+        if self.luffing is not None:
+            luffed_m, _, luffed_m_s, luffed_m_s2 = self._luffed(self.luffing, after_s)
+            out, out_rate = out + luffed_m, out_rate + luffed_m_s
+            out_acceleration += luffed_m_s2
         slew = self._slew
         across_2, along_2 = slew.stiffness, near_far.stiffness
         radius_m += after_s * out_rate

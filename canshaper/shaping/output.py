@@ -157,6 +157,9 @@ class OutputStage:
             ValueError: the reference is no number, or the added velocity is no velocity.
         """
         limits, recent, output = self.limits, self._recent, self.output
+        added = path + damping
+        if not self.largest_added:  # it bends: in the range of its own demands
+            reference, added = reference + added, 0.0
 
         # 1. Range
         no_run_on = self._no_run_on > 0
@@ -176,7 +179,7 @@ class OutputStage:
                 own = movement
 
         # 3. Added velocity, and 4. ramp
-        added, total = path + damping, own
+        total = own
         if self.largest_added:
             self._demanded.add(demand)
         if not added and self._own_ramp == self.ramp and not self._dropped_at:

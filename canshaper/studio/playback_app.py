@@ -94,7 +94,7 @@ class _Kept:
             "playback": True,
             "profiles": False,
             "sliders": {},
-            **drawn_of(playback.parameters, playback.films[0].view.moves),
+            **drawn_of(playback.parameters, playback.films[0].view.deployment),
         }
 
 

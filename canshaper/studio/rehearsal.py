@@ -14,9 +14,8 @@ from typing import Any
 
 from canshaper.commissioning.procedure.bench import Simulated, check_rehearsal
 from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
-from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-from canshaper.commissioning.procedure.state import State, read_state
-from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.commissioning.procedure.procedure import STEPS, Procedure
+from canshaper.commissioning.procedure.state import Outcome, State, read_state
 from canshaper.commissioning.procedure.steps.report import NAME as REPORT
 from canshaper.errors import CanshaperError, UsageError
 from canshaper.machine.binding import load_deployment
@@ -24,7 +23,7 @@ from canshaper.report.console import OnProgress
 
 NICE = 10  # the cranes of the live page go first
 # The last results, not accepted yet.
-_proposals: dict[Path, Proposal] = {}
+_proposals: dict[Path, Outcome] = {}
 _CHOICE = ("offered", "recommended", "chosen")  # numbers of a step that asks for one
 
 
@@ -94,7 +93,7 @@ def _procedure(path: Path, changes: list[str], answer: str) -> Iterator[Procedur
     with files.locked():
         state = read_state(files.state)
         bench = Simulated(Reader(answer), changes or (state.changes if state else []))
-        yield Procedure(files, bench, load_deployment, STEPS, origin=path)
+        yield Procedure(files, bench, load_deployment, origin=path)
 
 
 def _do(procedure: Procedure, path: Path, what: str, name: str) -> None:

@@ -1,11 +1,18 @@
-"""State of each axis and source by the frames on the buses, for the page. No clock."""
+"""State of each axis, source and swing by the frames on the buses, for the page. No clock."""
 
+import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from canshaper.config.adjust import Key, adjusted
+from canshaper.config.limits import Sway
+from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
 from canshaper.studio.words import reason_words, state_level, state_words
+from canshaper_sim.axes import BRIDGE, EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW, TROLLEY
 
 WINDOW_S = 1.0
 """Frames are counted over the last second."""
@@ -78,3 +85,126 @@ class Sources:
                 "age_s": None if age_s is None else round(age_s, 2),
             }
         return values
+
+
+ACROSS, ALONG = "across", "along"
+_SWAY_OF = {
+    SLEW: ACROSS,
+    NEAR_FAR: ALONG,
+    LIFT_CYLINDER: ALONG,
+    KNUCKLE: ALONG,
+    EXTENSION: ALONG,
+    BRIDGE: ACROSS,
+    TROLLEY: ALONG,
+}
+LEAST_SWING_S = 1.0
+"""Shortest time over which the largest sway counts as the swing."""
+
+
+def sway_of(coordinates: Mapping[str, str]) -> dict[str, str]:
+    """Which swing an axis excites, by its name: across boom or bridge, or along it."""
+    return {axis: _SWAY_OF[moved] for axis, moved in coordinates.items() if moved in _SWAY_OF}
+
+
+class Swing:
+    """Sway in any direction over one full swing, and how long it lasts after a release.
+
+    Args:
+        models: sway models of the deployment, the longest period counts.
+        still_deg: swing below which the grapple counts as still.
+    """
+
+    def __init__(self, models: Iterable[Sway], still_deg: float) -> None:
+        periods = [2.0 * math.pi / model.mode().omega_rad_s for model in models]
+        self._lasts_s = max([LEAST_SWING_S, *periods])
+        self._still_deg = still_deg
+        self._sways: deque[tuple[float, float]] = deque()
+        self._over_s = -math.inf
+        self._moved = self._drove = False
+        self._released_s: float | None = None
+
+    def add(self, sway_deg: tuple[float, float], now_s: float) -> None:
+        """Take a sway, across and along the boom."""
+        sway = math.hypot(*sway_deg)
+        self._sways.append((now_s, sway))
+        if sway >= self._still_deg:
+            self._over_s = now_s
+
+    def move(self, now_s: float, *, moved: bool, drives: bool) -> None:
+        """Take whether any joystick is deflected, and whether any valve is open."""
+        if moved:
+            self._released_s = None
+            self._drove = drives or (self._moved and self._drove)
+        elif self._moved and self._drove:
+            self._released_s = now_s
+        self._moved = moved
+
+    def still_s(self, now_s: float) -> tuple[float | None, bool]:
+        """Time from the release until the last sway that was no stillness, and whether it swings.
+
+        There is none before a release, while a joystick is deflected, and after a press that opened
+        no valve. A swing is over when
+        there has been no such sway for as long as a full swing.
+        """
+        if self._released_s is None:
+            return None, False
+        return max(self._over_s - self._released_s, 0.0), now_s - self._over_s < self._lasts_s
+
+    def invalidate(self) -> None:
+        """Begin again."""
+        self._sways.clear()
+        self._over_s, self._released_s, self._moved = -math.inf, None, False
+
+    def largest_deg(self, now_s: float) -> float | None:
+        """The largest one of the last full swing; None before there is any."""
+        while self._sways and self._sways[0][0] < now_s - self._lasts_s:
+            self._sways.popleft()
+        return max((sway for _, sway in self._sways), default=None)
+
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+LENGTHS_PCT = tuple(range(-50, 101, 5))
+"""Deviations of the pendulum length from the file, percent."""
+
+
+def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """Return the residuals by axis; axes without sway data, or with several filters, have none.
+
+    Args:
+        deployment: the machine.
+        values: numbers in force that may differ from the file, by key.
+
+    Returns:
+        By axis ``lengths_m`` of a simple pendulum of the same period, ``left`` as a fraction of the
+        swing without a filter, the length that the filter ``believes``, and that of the ``file``.
+    """
+    by_axis: dict[str, dict[Key, float]] = {}
+    for text, number in values.items():
+        key = Key.parsed(text)
+        if key is not None:
+            by_axis.setdefault(key.axis, {})[key] = number
+    tick_s = deployment.config.tick_ms / 1000.0
+    curves = {}
+    for name, bound in deployment.axes.items():
+        config = bound.config
+        if config.sway and not config.gain_schedule and not config.profiles:
+            curves[name] = _curve(bound, by_axis.get(name, {}), tick_s * bound.period_ticks)
+    return curves
+
+
+def _curve(bound: BoundAxis, values: Mapping[Key, float], period_s: float) -> dict[str, Any]:
+    config = adjusted(bound.config, values, bound.config) if values else bound.config
+    assert config.sway is not None and bound.config.sway is not None
+    mode = config.sway.mode()
+    shaper_for = shaper_of(config.filter, period_s, config.limits.slowest_per_s)
+    believes_m = STANDARD_GRAVITY_M_S2 / mode.omega_rad_s**2
+    file_m = STANDARD_GRAVITY_M_S2 / bound.config.sway.mode().omega_rad_s ** 2
+    lengths_m = [file_m * (1.0 + percent / 100.0) for percent in LENGTHS_PCT]
+    errors_pct = [100.0 * (length / believes_m - 1.0) for length in lengths_m]
+    residuals = evaluate(mode, period_s, shaper_for, Machine.of(bound), errors_pct).residuals
+    return {
+        "lengths_m": [round(length, 4) for length in lengths_m],
+        "left": [round(one.machine, 4) for one in residuals],
+        "believes": round(believes_m, 4),
+        "file": round(file_m, 4),
+    }

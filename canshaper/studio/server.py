@@ -3,7 +3,7 @@
 import asyncio
 import itertools
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +25,13 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from canshaper import __version__
+from canshaper.machine.deployment import Deployment
 from canshaper.studio.access import Access
 from canshaper.studio.client import MOST_BYTES, TRY_AGAIN_LATER, Client
 from canshaper.studio.commission import Commission
+from canshaper.studio.seen import residuals, sway_of
 from canshaper.studio.sliders import RANGES
 from canshaper.studio.stage import MACHINE, RAW, Stage
-from canshaper.studio.swing import residuals, sway_of
 from canshaper_sim.axes import LUFFING, OVERHEAD, TOWER, kind_of
 from canshaper_sim.crane import CraneParameters
 
@@ -218,7 +219,7 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
         "machine": MACHINE in stage.cranes,
         "numbers": stage.numbers is not None,
         "profiles": any(j.next_profile for j in stage.deployment.config.joysticks.values()),
-        **drawn_of(parameters, stage.deployment.coordinates),
+        **drawn_of(parameters, stage.deployment),
         "preference": stage.preference is not None,
         "sliders": {
             name: {"range": RANGES[name], "numbers": [[n.key, n.value, n.power] for n in numbers]}
@@ -227,12 +228,15 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
     }
 
 
-def drawn_of(parameters: CraneParameters, coordinates: Mapping[str, str]) -> dict[str, Any]:
+def drawn_of(parameters: CraneParameters, deployment: Deployment) -> dict[str, Any]:
     """Return what a page draws: how long the links are, which swing each axis excites.
 
-    Of an overhead crane ``hall`` says how long runway, bridge and rope are; of others it is None.
+    Of an overhead crane ``hall`` says how long runway, bridge, rope and sling are; of others it is
+    None. A multicopter keeps its rope, and its place in the picture.
     The boom of another crane with a rope is ``straight``; that of a tower crane is its jib.
     """
+    coordinates, section = deployment.coordinates, deployment.config.crane
+    drawn: str | None = getattr(section, "drawn", None)
     grapple, own, kind = parameters.grapple, parameters.overhead, kind_of(coordinates.values())
     boom, tower, luffing = parameters.joints.boom._asdict(), parameters.tower, parameters.luffing
     if kind == TOWER:
@@ -242,11 +246,14 @@ def drawn_of(parameters: CraneParameters, coordinates: Mapping[str, str]) -> dic
         boom |= {"pillar_m": luffing.pillar_m, "main_boom_m": luffing.boom_m, "straight": True}
         boom["outer_boom_m"] = luffing.extension_max_m
     hall = {"runway": own.runway_m, "span": own.span_m, "rope": own.rope_max_m}
+    if drawn:
+        hall = {"runway": 2.0 * own.rope_m, "span": 2.0 * own.rope_m, "rope": own.rope_m}
     return {
         "sway_of": sway_of(coordinates),
         "boom": boom,
         "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
-        "hall": hall if kind == OVERHEAD else None,
+        "hall": {**hall, "sling": own.sling.length_m} if kind == OVERHEAD else None,
+        "drawn": drawn,
     }
 
 

@@ -37,11 +37,12 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
     """The numbers of each slider; none where no filter of the deployment has any.
 
     An axis with a gain schedule, profiles or a measured rope is left out: what is in force there
-    changes with the machine.
+    changes with the machine; and one whose filter covers a second mode, which would not go along.
     """
     numbers: list[Number] = []
     for name, axis in config.axes.items():
-        several = axis.gain_schedule or axis.profiles
+        design = axis.filter.design()
+        several = axis.gain_schedule or axis.profiles or (design and design.second)
         if axis.sway and not several and not axis.sway.length:
             # The period grows with the root of the length.
             for key, power in (("length_m", 1.0), ("period_s", 0.5)):

@@ -32,16 +32,11 @@ MS = 1_000_000
 
 
 class Stage:
-    """Everything behind the page.
+    """Everything behind the page of a machine, and its events."""
 
-    Args:
-        deployment: the machine.
-        events: where to report what happens.
-    """
-
-    def __init__(self, deployment: Deployment, events: Events) -> None:
+    def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
-        self.events = events
+        self.events = Events()
         self.cranes: dict[str, CraneSession] = {}
         self.cab: Cab | None = None
         self.sliders: dict[str, list[Number]] = {}

@@ -18,7 +18,7 @@ from canshaper import __version__
 from canshaper.campaign.statistics import CONFIDENCE
 from canshaper.report import html
 from canshaper.report.console import new_table
-from canshaper.studio.study_files import BROKEN, HIT, LETTERS, rows_of
+from canshaper.studio.study import BROKEN, HIT, LETTERS, rows_of
 
 Rows = Sequence[Mapping[str, str]]
 SPREAD = 0.215

@@ -26,10 +26,8 @@ from canshaper.studio.crane import CraneSession
 from canshaper.studio.in_process import HeldHand, InProcessCrane
 from canshaper.studio.server import hello_of, page_app, pages_of
 from canshaper.studio.stage import Stage
-from canshaper.studio.study import Placement, Session
-from canshaper.studio.study_files import Table
+from canshaper.studio.study import Placement, Session, Table
 from canshaper.studio.view import CraneView
-from canshaper.studio.words import Events
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.realtime import open_ports
 
@@ -154,7 +152,7 @@ class StudyStage(Stage):
         joysticks: RealJoysticks | None,
         done: Callable[[], None],
     ) -> None:
-        super().__init__(next(iter(settings.values())), Events())
+        super().__init__(next(iter(settings.values())))
         self.cab = Cab(self.deployment.axes, lambda text: self.events.add("page", text))
         self._settings, self._grapple, self._changes = settings, parameters.grapple, changes
         self.joysticks, self._done, self._over = joysticks, done, False

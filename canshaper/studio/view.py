@@ -13,16 +13,17 @@ from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
-from canshaper.studio.seen import AxisView, Sources, rounded
-from canshaper.studio.swing import ACROSS, ALONG, Swing, sway_of
+from canshaper.studio.seen import ACROSS, ALONG, AxisView, Sources, Swing, rounded, sway_of
 from canshaper.studio.words import fault_words, reason_words, said, state_level, state_words
 from canshaper_sim.axes import BRIDGE, SLEW, TROLLEY
 
 SILENT_S = 0.5
 """A daemon or a crane that has sent nothing for so long is shown as silent."""
 
+_JOINTS, _TROLLEY = ("LiftAngle", "KnuckleAngle", "Extension"), ("Bridge", "Trolley", "RopeLength")
 # Of a model: it lags behind the tip, and across the boom and below a trolley that is negative.
 _BEHIND = (SLEW, BRIDGE, TROLLEY)
 
@@ -40,9 +41,9 @@ class CraneView:
     """
 
     def __init__(self, deployment: Deployment, report: Report) -> None:
-        self._deployment = deployment
-        self.moves = deployment.coordinates
-        self._sway_of = sway_of(self.moves)
+        self.deployment = deployment
+        self._moves = deployment.coordinates
+        self._sway_of = sway_of(self._moves)
         self._report = report
         self.axes = {name: AxisView() for name in deployment.axes}
         self._profiles = {name: profile_by_number(axis) for name, axis in deployment.axes.items()}
@@ -50,6 +51,7 @@ class CraneView:
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
         self.trolley: tuple[float, ...] | None = None  # along runway, bridge and rope, m
+        self.sling: tuple[float, ...] | None = None  # how it hangs below the hook, degrees
         self.rope_m: float | None = None  # from the tip to the load
         self.aim: tuple[float, float] | None = None  # slewed, degrees, and radius, m
         self.simulated = False
@@ -61,7 +63,7 @@ class CraneView:
         models = [axis.config.sway for axis in deployment.axes.values()]
         self._swing = Swing((m for m in models if m), deployment.config.still_deg)
         self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
-        self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
+        self._handlers: dict[Key, list[Any]] = {}
         self._find_messages()
         names = [_source_of(joystick) for joystick in deployment.joysticks.values()]
         for entries in self._handlers.values():
@@ -69,7 +71,7 @@ class CraneView:
         self.sources = Sources(names)
 
     def _find_messages(self) -> None:
-        deployment = self._deployment
+        deployment = self.deployment
         for name, axis in deployment.axes.items():
             self._on(axis.valve.message.key, self._valve, name, axis.valve_message.name)
             if axis.status and (status := axis.config.status):
@@ -84,10 +86,11 @@ class CraneView:
                 self._on(motion.aim.message.key, self._aim, motion.aim, motion.config.aim.message)
         for message_name, handler in (
             ("GrappleSway", partial(self._sway, "SwayPerpendicular", "SwayParallel")),
-            ("TipPosition", self._position),
-            ("JointPosition", self._joints),
+            ("TipPosition", partial(self._measured, "pose", ("SlewAngle", "Radius", "Height"))),
+            ("JointPosition", partial(self._measured, "joints", _JOINTS)),
             ("LoadSway", partial(self._sway, "SwayBridge", "SwayTrolley")),
-            ("CranePosition", self._trolley),
+            ("CranePosition", partial(self._measured, "trolley", _TROLLEY)),
+            ("SlingSway", partial(self._measured, "sling", ("SlingBridge", "SlingTrolley"))),
             ("HookPosition", self._hook),
         ):
             message = self._message(message_name)
@@ -97,10 +100,10 @@ class CraneView:
                     self._on(key, handler, message, message_name)
 
     def _message(self, name: str) -> Message | None:
-        entry = self._deployment.messages.find(name)
+        entry = self.deployment.messages.find(name)
         return None if isinstance(entry, str) else entry[1]
 
-    def _on(self, key: tuple[str, int, bool], handler: Any, what: Any, message: str) -> None:
+    def _on(self, key: Key, handler: Any, what: Any, message: str) -> None:
         self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -141,7 +144,7 @@ class CraneView:
 
         A joystick position that is old is shown no more.
         """
-        for joystick in self._deployment.joysticks.values():
+        for joystick in self.deployment.joysticks.values():
             age_s = self.sources.age_s(_source_of(joystick), now_s)
             if age_s is None or age_s >= SILENT_S:
                 self._joystick_at(joystick.name, {})
@@ -184,6 +187,7 @@ class CraneView:
             "pose": self.pose,
             "joints": self.joints,
             "trolley": self.trolley,
+            "sling": self.sling,
             "rope": self.rope_m,
             "aim": self.aim if self.daemon_there(now_s) else None,
             "sway": self.sway_deg or self._predicted(),
@@ -215,20 +219,20 @@ class CraneView:
         _, commands = joystick.decode(data)
         if commands:  # none in other frames of a multiplexed message
             self._joystick_at(joystick.name, commands)
-        axes = self._deployment.axes.items()
+        axes = self.deployment.axes.items()
         bands = ((self.axes[n].joystick, a.config.command.neutral_pct / 100.0) for n, a in axes)
         moved = any(abs(at or 0.0) > band for at, band in bands)
         self._swing.move(now_s, moved=moved, drives=any(a.valve for a in self.axes.values()))
 
     def _joystick_at(self, joystick: str, commands: Mapping[str, float | Reason]) -> None:
         """Keep the commands of a joystick by signal; one that is invalid or missing is unknown."""
-        for name, axis in self._deployment.axes.items():
+        for name, axis in self.deployment.axes.items():
             if axis.config.command.joystick == joystick:
                 command = commands.get(axis.config.command.signal)
                 self.axes[name].joystick = None if isinstance(command, Reason) else command
 
     def _valve(self, name: str, data: bytes, now_s: float) -> None:
-        axis = self._deployment.axes[name]
+        axis = self.deployment.axes[name]
         raw: Any = axis.valve_message.decode(data, decode_choices=False, scaling=False)
         command = (axis.valve.read(raw) or 0) / axis.valve.steps
         self.axes[name].opening = command
@@ -240,7 +244,7 @@ class CraneView:
         if (values := codec.decode(data)) is None:
             return
         view, state, reason = self.axes[name], int(values["State"]), int(values["Reason"])
-        sign = -1.0 if self.moves.get(name) in _BEHIND else 1.0
+        sign = -1.0 if self._moves.get(name) in _BEHIND else 1.0
         view.predicted_deg = sign * values["PredictedSway"]
         if self.sway_deg is None and (predicted := self._predicted()):
             self._swing.add(predicted, now_s)
@@ -282,25 +286,16 @@ class CraneView:
         self._swing.add(sway_deg, now_s)
         self._crane_s = now_s
 
-    def _position(self, message: Message, data: bytes, now_s: float) -> None:
+    def _measured(
+        self, what: str, signals: tuple[str, ...], message: Message, data: bytes, now_s: float
+    ) -> None:
         values: Any = message.decode(data)
-        angle, radius, height = (float(values[n]) for n in ("SlewAngle", "Radius", "Height"))
-        self.pose = (angle, radius, height)
-        self._crane_s = now_s
-
-    def _trolley(self, message: Message, data: bytes, now_s: float) -> None:
-        values: Any = message.decode(data)
-        self.trolley = tuple(float(values[n]) for n in ("Bridge", "Trolley", "RopeLength"))
+        setattr(self, what, tuple(float(values[name]) for name in signals))
         self._crane_s = now_s
 
     def _hook(self, message: Message, data: bytes, _now_s: float) -> None:
         values: Any = message.decode(data)
         self.rope_m = float(values["RopeLength"])
-
-    def _joints(self, message: Message, data: bytes, now_s: float) -> None:
-        values: Any = message.decode(data)
-        self.joints = tuple(float(values[n]) for n in ("LiftAngle", "KnuckleAngle", "Extension"))
-        self._crane_s = now_s
 
 
 def _source_of(joystick: BoundJoystick) -> str:

@@ -165,6 +165,20 @@ class OverheadBoom:
         )
 
     @property
+    def sling_angles(self) -> tuple[float, float]:
+        """Swing of the sling along runway and bridge, rad; without one that of the rope."""
+        if not self.slung:
+            return self.angles[:2]
+        x, y, z = plus(self.slung.position, -1.0, self.hook)
+        return math.atan2(x, -z), math.atan2(y, -z)
+
+    @property
+    def hook(self) -> Vector:
+        """Where the rope ends, as ``SlungLoad.position``."""
+        bridge, trolley, _ = self.axes.values()
+        return plus((bridge.position, trolley.position, 0.0), 1.0, self.load)
+
+    @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
         """Trolley in polar coordinates about the start, hook below it, and their rates."""
         bridge, trolley, hoist = self.axes.values()
@@ -189,9 +203,8 @@ class OverheadBoom:
     def _pull(self, slung: SlungLoad, part_s: float) -> None:
         """Let the sling pull at the hook for part_s seconds; along the rope that takes it."""
         bridge, trolley, _ = self.axes.values()
-        hook = plus((bridge.position, trolley.position, 0.0), 1.0, self.load)
         rate = plus((bridge.speed, trolley.speed, 0.0), 1.0, self.rate)
-        change = slung.pull(part_s, hook, rate)
+        change = slung.pull(part_s, self.hook, rate)
         r = self.load
         self.rate = plus(plus(self.rate, 1.0, change), -dot(r, change) / dot(r, r), r)
 

@@ -15,10 +15,11 @@ from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.machines import AXES_OF, build_machine, machine_for
+from canshaper_sim.machines import AXES_OF, Machine, ValveDrivenCrane, build_machine, machine_for
 from canshaper_sim.overhead import OverheadBoom
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.sensor_messages import sensor_messages
+from canshaper_sim.unit import Unit
 from canshaper_sim.valve_frames import CommandReader
 
 # Feedback messages and their signals, in the order they are sent; they close with the sway.
@@ -39,6 +40,8 @@ OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "CraneVelocity": ("BridgeSpeed", "TrolleySpeed", "HoistSpeed"),
     "LoadSway": ("SwayBridge", "SwayTrolley"),
 }
+# Sent first by one whose DBC has it: how the sling hangs below the hook.
+SLING_FEEDBACK: Mapping[str, tuple[str, ...]] = {"SlingSway": ("SlingBridge", "SlingTrolley")}
 
 # Sent first by other cranes with a rope: how far down it hangs.
 HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {
@@ -159,6 +162,7 @@ class PlantNode:
         parameters: the crane; by default the nominal one.
         machine: one of `machines.MACHINES`.
         sway: swing of the grapple at the start; by default it hangs still.
+        unit: a crane of someone else in place of ours.
         listeners: whether others than the controller listen; without them pose, speeds and sway
             are only sent where the controller receives them.
 
@@ -175,6 +179,7 @@ class PlantNode:
         machine: str | None = None,
         sway: Sway | None = None,
         *,
+        unit: Unit | None = None,
         listeners: bool = True,
     ) -> None:
         parameters = parameters or changed_parameters([], deployment)
@@ -182,10 +187,11 @@ class PlantNode:
         problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
         self._feedback = _FEEDBACK_OF.get(name, {**JOINT_FEEDBACK, **FEEDBACK})
+        if name == OVERHEAD and not isinstance(deployment.messages.find("SlingSway"), str):
+            self._feedback = {**SLING_FEEDBACK, **self._feedback}
         self._senders: dict[str, Sender] = {}
-        # A feedback message that is the measured radius of the deployment is protected as it asks.
-        measured = [motion.radius for motion in deployment.motions.values()]
-        radii = {radius.message.name: radius.protection for radius in measured if radius}
+        # A feedback message that the deployment reads is sent where and as it asks.
+        read = {i.message.name: (i.config.bus, i.protection) for i in deployment.inputs()}
         for message, signals in self._feedback.items():
             entry = deployment.messages.find(message)
             if isinstance(entry, str):
@@ -193,8 +199,8 @@ class PlantNode:
             elif missing := [s for s in signals if not find_signal(entry[1], s)]:
                 problems.append(entry[0].problem(entry[1], f"lacks {', '.join(missing)}"))
             else:
-                protection = radii.get(message, UNPROTECTED)
-                sent = SentMessage(bus, entry[1], protection=protection)
+                where, protection = read.get(message, (bus, UNPROTECTED))
+                sent = SentMessage(where, entry[1], protection=protection)
                 self._senders[message] = sent.sender()
         if problems:
             raise ConfigError(problems)
@@ -205,7 +211,12 @@ class PlantNode:
                 for message, signals in self._feedback.items()
                 if received(self._senders[message].key)
             }
-        self._machine = build_machine(name, parameters, sway)
+        if unit:
+            tick_s = deployment.config.tick_ms / 1000.0
+            crane = unit.crane(deployment.by_coordinate, tick_s, parameters)
+            self._machine: Machine = ValveDrivenCrane(crane)
+        else:
+            self._machine = build_machine(name, parameters, sway)
         self._valve_feedback = [
             _ValveFeedback(deployment.coordinates.get(axis, axis), bound.feedback)
             for axis, bound in deployment.axes.items()
@@ -311,7 +322,8 @@ def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
     bridge, trolley, _ = axes
     if name == "CranePosition":
         return bridge.position, trolley.position, boom.signal_m
-    return tuple(math.degrees(angle) for angle in boom.angles[:2])
+    angles = boom.sling_angles if name == "SlingSway" else boom.angles[:2]
+    return tuple(math.degrees(angle) for angle in angles)
 
 
 def _heading_deg(theta1_rad: float) -> float:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from canshaper.errors import DesignError
 from canshaper_sim.actuator import Actuator
 from canshaper_sim.ranges import check_ranges
 
@@ -38,6 +39,8 @@ class PumpParameters:
 
     def __post_init__(self) -> None:
         check_ranges("pump", self, _ALLOWED)
+        if self.shares_flow not in (0.0, 1.0):
+            raise DesignError(f"pump: shares_flow: expected 0 or 1, got {self.shares_flow:g}")
 
 
 class Pump:

@@ -18,7 +18,7 @@ from canshaper.daemon.daemon import Daemon
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
 from tests.blackbox.driven import inside, replayed
-from tests.rigs.forwarder import ROOT
+from tests.rigs.files import ROOT
 
 
 @pytest.mark.slow

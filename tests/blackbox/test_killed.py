@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
-from tests.rigs.forwarder import ROOT
+from tests.rigs.files import ROOT, machine_file
 
 pytestmark = pytest.mark.processes
 
@@ -32,11 +32,8 @@ class Drive:
     def __init__(self, folder: Path, bus: can.BusABC) -> None:
         self.boxes, self._bus, self._count = folder / "boxes", bus, 0
         self._log = folder / "log"
-        file = folder / "machine.yaml"
-        text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-        text = text.replace("../dbc", str(ROOT / "dbc"))
-        text = text.replace(BUS, f"{{ interface: udp_multicast, channel: {GROUP} }}")
-        file.write_text(text, encoding="utf-8")
+        bus = (BUS, f"{{ interface: udp_multicast, channel: {GROUP} }}")
+        file = machine_file(folder, "forwarder", bus)
         command = [sys.executable, "-m", "canshaper", "run", str(file)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen([*command, "--black-box", self.boxes], stderr=log)

@@ -15,12 +15,12 @@ from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from canshaper.errors import BusError
 from tests.bus.neighbour import CANNOT
+from tests.rigs.files import ROOT
 
 WAIT_S = 10.0
 
 
 GROUPS = ("239.81.7.1", "239.81.7.2")
-ROOT = Path(__file__).parents[2]
 LIMIT_S = 300.0  # only to end a test that hangs
 
 

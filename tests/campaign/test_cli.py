@@ -12,8 +12,8 @@ from typer.testing import CliRunner, Result
 from canshaper.campaign.store import parts
 from canshaper.cli.app import app
 from canshaper.design.parallel import Processes
+from tests.rigs.files import CONFIG, machine_file
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 PLAIN = str(CONFIG / "forwarder.yaml")
 
 
@@ -22,10 +22,7 @@ def campaign(*arguments: str) -> Result:
 
 
 def machine(folder: Path, more: str) -> str:
-    text = Path(PLAIN).read_text(encoding="utf-8").replace("../dbc", str(CONFIG.parent / "dbc"))
-    path = folder / "machine.yaml"
-    path.write_text(f"{text}\n{more}\n", encoding="utf-8")
-    return str(path)
+    return str(machine_file(folder, "forwarder", more=f"\n{more}\n"))
 
 
 def rows(folder: Path) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from canshaper.campaign.store import Store
 from canshaper.cli.app import app
 from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
+from tests.rigs.files import ROOT
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'canshaper[cluster]'")
 
@@ -25,7 +26,6 @@ from canshaper.campaign.engine import Cluster
 
 pytestmark = pytest.mark.processes
 
-ROOT = Path(__file__).resolve().parents[2]
 ROBUST = ROOT / "config" / "forwarder-robust.yaml"
 LIMIT_S = 60.0
 REFUSED = r"worker tcp://[\d.:]+: expected the program sha256:\w{12}, got sha256:\w{12}"
@@ -152,6 +152,7 @@ def test_a_scheduler_that_is_not_there_is_reported_in_one_line(
 ) -> None:
     monkeypatch.setattr("canshaper.campaign.engine.CONNECT_S", 0.5)
     arguments = ["campaign", str(ROBUST), "-n", "16", "--scheduler", "tcp://127.0.0.1:9"]
+    arguments += ["--engine", "python"]  # said by name, or a machine without a compiler says so
     done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
     assert done.exit_code == 2
     assert done.output.startswith("tcp://127.0.0.1:9: no scheduler answers: ")

@@ -1,6 +1,7 @@
 """Draws of a campaign, and its measures of a drive."""
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,10 @@ from canshaper.machine.binding import load_deployment
 from canshaper.report.stroke_metrics import crane_metrics
 from canshaper.shaping.axis import ShapedAxis
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.recorder import dwell_s
 from tests.faults.shipped import NAMES
+from tests.rigs.files import CONFIG, text_of
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
 SENSOR = load_deployment(CONFIG / "forwarder-sensor.yaml")
 RANGES = Uncertainty()
@@ -40,6 +42,26 @@ def test_two_files_meet_the_same_crane_and_operator() -> None:
         one, other = draw_drive(ROBUST, seed, RANGES), draw_drive(plain, seed, RANGES)
         assert (one.factors, one.script) == (other.factors, other.script)
         assert one.options["parameters"] == other.options["parameters"]
+
+
+def test_other_tails_meet_the_same_drive_and_are_judged_from_the_same_time(tmp_path: Path) -> None:
+    file = tmp_path / "longer.yaml"
+    file.write_text(re.sub(r"tail_s: [\d.]+", "tail_s: 6", text_of(ROBUST.path)))
+    longer = load_deployment(file)
+    ranges = Uncertainty(load_change_pct=100.0, bus_fault_pct=50.0)
+    for seed in range(20):
+        one = draw_drive(ROBUST, seed, ranges, longest_s=dwell_s(longer))
+        other = draw_drive(longer, seed, ranges)
+        assert (one.factors, one.script, one.fault) == (other.factors, other.script, other.fault)
+        assert [at for at, _ in one.options["loads"]] == [at for at, _ in other.options["loads"]]
+        assert one.dwell_s == other.dwell_s == 6.0
+
+
+def test_a_length_that_the_crane_lacks_is_recorded_as_it_was_driven() -> None:
+    ranges = Uncertainty(radius_m=[30.0, 40.0], stops_pct=100.0)
+    assert draw_drive(SENSOR, 1, Uncertainty(radius_m=[30.0, 40.0])).factors["radius_m"] < 10.0
+    joints = load_deployment(CONFIG / "forwarder-joints.yaml")
+    assert draw_drive(joints, 1, ranges).factors["near_stop"] == 0.0
 
 
 def test_numbers_fill_their_ranges_and_do_not_leave_them() -> None:

@@ -11,15 +11,17 @@ from canshaper.campaign import measure, run
 from canshaper.campaign.draw import draw_drive
 from canshaper.campaign.measure import Row, measured_drive
 from canshaper.campaign.native import SOURCES, NativeCrane
-from canshaper.campaign.run import Source, drive_all
+from canshaper.campaign.run import Source, drive_all, run_campaign
+from canshaper.campaign.store import Store
 from canshaper.cli.app import app
 from canshaper.config.uncertainty import Uncertainty
+from canshaper.design.parallel import Processes
 from canshaper.errors import CampaignError, ConfigError, NativeError
 from canshaper.machine.binding import load_deployment
 from canshaper.native.library import FMU_FILES
 from canshaper_sim.strokes import Script
 from tests.native.judge import needs_compiler
-from tests.rigs.files import CONFIG
+from tests.rigs.files import CONFIG, machine_file
 
 ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
 FAULTY = Uncertainty(bus_fault_pct=100.0)
@@ -59,6 +61,28 @@ def test_one_drive_in_fifty_is_driven_by_both(monkeypatch: pytest.MonkeyPatch) -
     short(monkeypatch)
     row = measured_drive(ROBUST, 50, Uncertainty(), native=NativeCrane(ROBUST))
     assert (row["engine"], row["broken"]) == ("both", 0)
+
+
+def test_the_first_drive_of_a_campaign_is_seen_by_the_gate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short(monkeypatch)
+    store = Store(tmp_path, {})
+    source = Source.of(ROBUST, Uncertainty(), engine="native")
+    run_campaign(Processes(1), source, range(1, 3), store, lambda _done: None)
+    assert store.columns()["engine"] == ["both", "native"]
+
+
+def test_a_radius_on_another_bus_is_measured_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short(monkeypatch)
+    bus = "radius: { bus: crane, message: TipPosition"
+    second = "\nbuses:\n  second: { interface: virtual, channel: second }\n"
+    changes = (bus, bus.replace("crane", "second")), ("\nbuses:\n", second)
+    deployment = load_deployment(machine_file(tmp_path, ROBUST.path, *changes))
+    row = measured_drive(deployment, 50, Uncertainty(), native=NativeCrane(deployment))
+    assert row["residual_deg"] == measured_drive(ROBUST, 50, Uncertainty())["residual_deg"]
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from canshaper.campaign.statistics import influences, most_of, quantile
-from canshaper.campaign.summary import lines, summarise
+from canshaper.campaign.statistics import Influence, influences, most_of, quantile
+from canshaper.campaign.summary import lines, summarise, tables
 from canshaper.config.uncertainty import MEASURES
 
 DISTRIBUTIONS = {
@@ -84,6 +84,11 @@ def test_a_word_explains_and_has_no_trend() -> None:
     assert (factors[0].explained > 0.7, factors[0].trend) == (True, None)
 
 
+def test_a_measure_that_is_alike_in_all_drives_has_no_cause() -> None:
+    factor = [float(k) for k in range(200)]
+    assert influences({"a": factor}, [0.0] * 200) == [Influence("a", 0.0, None)]
+
+
 def test_drives_without_the_measure_are_left_out() -> None:
     factor = [float(k) for k in range(200)]
     assert influences({"a": factor}, [None] * 190 + [1.0] * 10) == []
@@ -105,17 +110,20 @@ def test_drives_that_leave_more_than_with_anti_sway_off_are_counted_and_named() 
         "swung_over": [False] * count,
         "raw_deg": raw,
         **dict.fromkeys(MEASURES, left),
+        "run_on_s": [None] * count,
     }
     worse = summarise(columns, {}).worse
     assert (worse.drives, worse.worse) == (4, 3)
     assert [seed for seed, _, _ in worse.seeds] == [3, 1, 2]
     exact = stats.binomtest(3, 4)
-    assert worse.high == pytest.approx(exact.proportion_ci(0.9, "exact").high)
-    assert worse.low == pytest.approx(exact.proportion_ci(0.9, "exact").low)
+    assert worse.high == pytest.approx(exact.proportion_ci(0.95, "exact").high)
+    assert worse.low == pytest.approx(exact.proportion_ci(0.95, "exact").low)
     assert "Drives by engine: 1 both, 4 native, 1 python; the gate sees all but native" in [
         *lines(summarise(columns, {}))
     ]
     assert summarise(columns, {}).promises.drives == 2
+    *_, worst = tables(summarise(columns, {}))
+    assert {*worst.columns[-1].cells} == {"-"}  # no measure is no good one
     (head, first, *_) = [line for line in lines(summarise(columns, {})) if "off" in line]
     assert head.startswith("Worse than with anti-sway off, by more than 0.3 deg: 3 of 4 drives")
     assert first == "  drive 3: 9.00 deg, with anti-sway off 3.00"

@@ -6,15 +6,14 @@ from typing import Any
 import can
 import pytest
 
-from tests.cli.invocation import ROOT, SHIPPED
+from tests.cli.invocation import SHIPPED
+from tests.rigs.files import machine_file
 
 
 @pytest.fixture
 def broken(tmp_path: Path) -> Path:
-    path = tmp_path / "broken.yaml"
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    path.write_text(text.replace("tick_ms: 20", "tick_ms: 0").replace("kind: off", "kind: x"))
-    return path
+    changes = ("tick_ms: 20", "tick_ms: 0"), ("kind: off", "kind: x")
+    return machine_file(tmp_path, SHIPPED, *changes)
 
 
 @pytest.fixture

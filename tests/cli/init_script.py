@@ -7,8 +7,8 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "forwarder.dbc"
 # The questions in their order, with the first words of each.
 QUESTIONS = (

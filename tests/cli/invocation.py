@@ -1,14 +1,13 @@
 """The command line called in this process, and the files of it that are shipped."""
 
-from pathlib import Path
 from typing import Any
 
 import typer
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "config" / "forwarder.yaml"
 VERBS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 

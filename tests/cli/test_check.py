@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from canshaper.machine.binding import load_deployment
-from tests.cli.invocation import ROOT, SHIPPED, invoke
+from tests.cli.invocation import SHIPPED, invoke
+from tests.rigs.files import ROOT, machine_file, text_of
 
 NO_PUMP = (
     "where the pump lacks oil for slew and near_far at once, swing is left; measure flow (canshaper"
@@ -76,9 +77,7 @@ def test_check_says_for_which_pendulums_the_filters_of_each_load_hold(tmp_path: 
         "    pendulum: at 0 1.02 to 1.38 m, 8 and 8 %; at 600 1.36 to 1.84 m, 7 and 7 %;"
         " load not known 1.20 to 1.60 m, 1 and 1 % of the swing left",
     ]
-    file = tmp_path / "machine.yaml"
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(SHIPPED.parents[1] / "dbc"))
-    file.write_text(f"{text}\nuncertainty: {{ length_pct: [-60, 100] }}\n", encoding="utf-8")
+    file = machine_file(tmp_path, SHIPPED, more="\nuncertainty: { length_pct: [-60, 100] }\n")
     assert "pendulum: 0.48 to 2.40 m, 53 and 33 % of" in invoke("check", str(file)).stdout
 
 
@@ -98,24 +97,24 @@ def test_check_counts_what_a_sway_sensor_moves_it_besides(tmp_path: Path, name: 
     way = " m/s, 0.6 m in or out (0.3 for slewing, as much to damp by its sway sensor), 6 s"
     note = "near_far moves too without its joystick"
     shipped = ROOT / "config" / f"{name}.yaml"
-    text = shipped.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     [row] = [row for row in invoke("check", str(shipped)).stdout.splitlines() if note in row]
     assert row.endswith(way)
-    watched = tmp_path / "watched.yaml"
-    watched.write_text(text.replace("use: damp", "use: watch"))
+    watched = machine_file(tmp_path, shipped, ("use: damp", "use: watch"))
     [row] = [row for row in invoke("check", str(watched)).stdout.splitlines() if note in row]
     assert row.endswith(" m/s, 0.3 m in or out, 6 s")
 
 
 @pytest.mark.slow
 def test_check_says_where_a_filter_no_longer_fits(tmp_path: Path) -> None:
-    file = tmp_path / "machine.yaml"
-    text = ROBUST.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     assert "designed" not in invoke("check", str(ROBUST)).stdout
-    text = text.replace("sway: { period_s: 2.356", "sway: { period_s: 2.6")
-    file.write_text(
-        text.replace("mass_kg: 300", "mass_kg: 120").replace("fall_per_s: 5", "fall_per_s: 4")
+    file = machine_file(
+        tmp_path,
+        ROBUST,
+        ("sway: { period_s: 2.356", "sway: { period_s: 2.6"),
+        ("mass_kg: 300", "mass_kg: 120"),
+        ("fall_per_s: 5", "fall_per_s: 4"),
     )
+    text = file.read_text()
     result = invoke("check", str(file))
     assert result.exit_code == 0
     slew, near_far = (
@@ -136,10 +135,8 @@ def test_check_says_where_a_filter_no_longer_fits(tmp_path: Path) -> None:
 
 def unstated(tmp_path: Path) -> Path:
     """The shipped machine, whose slew does not state how far it may travel on."""
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    file = tmp_path / "unstated.yaml"
-    file.write_text(text.replace(", stop_distance_m: 4.7", "").replace("    slewing:", "    #"))
-    return file
+    changes = (", stop_distance_m: 4.7", ""), ("    slewing:", "    #")
+    return machine_file(tmp_path, SHIPPED, *changes)
 
 
 LONG_WAY = (
@@ -229,7 +226,7 @@ PUMP = "hydraulics: { flow: 3 }"
 def test_a_pump_that_is_stated_and_one_filter_alone_are_no_warning(
     tmp_path: Path, more: str
 ) -> None:
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    text = text_of(SHIPPED)
     if more != PUMP:
         before, _, after = text.partition("  near_far:")
         filters = [row for row in after.splitlines() if row.lstrip().startswith("filter:")]
@@ -253,10 +250,8 @@ def test_check_shows_pump_and_end_stops(tmp_path: Path) -> None:
     assert found["axes"]["near_far"]["ends"]["highest"] == 8.0
     assert found["axes"]["slew"]["ends"] is None
     others = "{ bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200, full: 9 }"
-    text = pump.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    (file := tmp_path / "machine.yaml").write_text(
-        text.replace("{ flow: 1.2 }", f"{{ flow: 1.2, others_measured: {others} }}")
-    )
+    measured = ("{ flow: 1.2 }", f"{{ flow: 1.2, others_measured: {others} }}")
+    file = machine_file(tmp_path, pump, measured)
     assert f"{of_pump[:-1]}measured" in invoke("check", str(file)).stdout
     plain = json.loads(invoke("check", str(SHIPPED), "--json").stdout)
     assert plain["hydraulics"] is None

@@ -11,16 +11,15 @@ import pytest
 from canshaper import __version__
 from canshaper.cli.common import loader
 from canshaper.errors import ConfigError
-from tests.cli.invocation import ROOT, SHIPPED, VERBS, invoke
+from tests.cli.invocation import SHIPPED, invoke
+from tests.rigs.files import ROOT, machine_file
 
 
 @pytest.fixture
 def two_buses(tmp_path: Path) -> Path:
-    path = tmp_path / "two.yaml"
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     bus = "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
-    path.write_text(text.replace(bus, bus + bus.replace("crane", "boom").replace("vcan0", "vcan1")))
-    return path
+    boom = bus.replace("crane", "boom").replace("vcan0", "vcan1")
+    return machine_file(tmp_path, SHIPPED, (bus, bus + boom))
 
 
 def test_run_of_a_broken_file_opens_no_bus(broken: Path, opened: list[dict[str, Any]]) -> None:
@@ -50,13 +49,9 @@ def test_bus_options(two_buses: Path) -> None:
 
 def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path) -> None:
     """Sharing in a file holds for its own interface alone."""
-    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     bus = "{ interface: socketcan, channel: vcan0, bitrate: 250000 }"
-    shared = tmp_path / "machine.yaml"
-    shared.write_text(
-        text.replace(bus, "{ interface: udp_multicast, channel: 239.1.2.3, network: true }"),
-        encoding="utf-8",
-    )
+    other = "{ interface: udp_multicast, channel: 239.1.2.3, network: true }"
+    shared = machine_file(tmp_path, SHIPPED, (bus, other))
     multicast = (str(shared), "udp_multicast")
     assert loader(str(shared))().config.buses["crane"].network
     assert loader(str(shared), None, ["239.1.2.4"])().config.buses["crane"].network
@@ -88,21 +83,6 @@ def test_bus_options_that_do_not_fit(two_buses: Path, channels: list[str], says:
 # -- the command itself ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("option", ["--help", "-h"])
-def test_help_of_every_verb_has_an_example(verb: str, option: str) -> None:
-    result = invoke(verb, option)
-    assert result.exit_code == 0
-    assert re.search(rf"Examples:\s+canshaper {verb}\b", result.stdout)
-
-
-def test_help_names_every_verb() -> None:
-    result = invoke("--help")
-    assert result.exit_code == 0
-    assert {"run", "check", "config-schema"} <= set(VERBS)
-    assert all(re.search(rf"^\s+{verb}\s", result.stdout, re.MULTILINE) for verb in VERBS)
-
-
 def test_version() -> None:
     result = invoke("--version")
     assert (result.exit_code, result.stdout) == (0, f"canshaper {__version__}\n")
@@ -114,17 +94,6 @@ def test_wrong_use_is_an_error_without_a_traceback(arguments: list[str]) -> None
     assert result.exit_code == 2
     assert "Error: " in result.stderr
     assert isinstance(result.exception, SystemExit)
-
-
-def test_the_module_is_the_command() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "canshaper", "check", str(SHIPPED)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0
-    assert done.stdout.startswith(f"{SHIPPED}: good")
 
 
 @pytest.mark.parametrize("ends", ["SystemExit(0)", "KeyboardInterrupt"])

@@ -1,7 +1,6 @@
 """``canshaper demo`` in lock-step: every shipped deployment, by the axes that it has."""
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,8 @@ from canshaper.campaign.measure import measured_drive
 from canshaper.cli.app import app
 from canshaper.config.uncertainty import Uncertainty
 from canshaper.machine.binding import load_deployment
+from tests.rigs.files import ROOT, machine_file
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = sorted((ROOT / "config").glob("*.yaml"))
 
 
@@ -97,10 +96,7 @@ def test_several_cranes_are_driven_in_lock_step_only() -> None:
 @pytest.mark.slow
 def test_without_a_switch_for_anti_sway_both_drives_are_said_to_be_shaped(tmp_path: Path) -> None:
     """A campaign then has no drive to compare with."""
-    text = (ROOT / "config/forwarder-robust.yaml").read_text(encoding="utf-8")
-    text = re.sub(r" +anti_sway_off: \w+\n", "", text).replace("../dbc", str(ROOT / "dbc"))
-    path = tmp_path / "machine.yaml"
-    path.write_text(text, encoding="utf-8")
+    path = machine_file(tmp_path, "forwarder-robust", ("    anti_sway_off: AntiSwayOff\n", ""))
     said, report = demo(tmp_path, str(path))
     assert f"WARNING: {path}: no joystick has anti_sway_off" in said
     left = [report["crane"][one]["residual_deg"] for one in ("raw", "shaped")]

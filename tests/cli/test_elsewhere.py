@@ -16,9 +16,9 @@ from websockets.sync.client import connect
 from canshaper.cli.app import LINUX_ONLY
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.nodes.eds_files import JOYSTICK, VALVE, write
+from tests.rigs.files import ROOT, machine_file
 from tests.studio.page import Page
 
-ROOT = Path(__file__).parents[2]
 # Names of Windows' Python are fewer than those of macOS; numpy and matplotlib look at some of
 # Linux' by themselves, because this still is Linux: os.uname stays.
 ELSEWHERE = """
@@ -75,9 +75,7 @@ def test_desk_work_runs_on_any_system(line: str, answer: str, tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_what_is_found_is_written_on_any_system(tmp_path: Path) -> None:
-    file = tmp_path / "machine.yaml"
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    file.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
+    file = machine_file(tmp_path, "forwarder")
     done = called("robust", file, "--axis", "near_far", "--write")
     assert done.returncode == 0, done.stderr
     assert load_deployment(file).axes["near_far"].config.filter.kind == "robust"

@@ -11,7 +11,8 @@ import typer
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from tests.cli.invocation import ROOT, VERBS
+from tests.cli.invocation import VERBS
+from tests.rigs.files import ROOT, machine_file
 
 WIDTH = 80
 # Of desk work that is done in a second or two; others need a bus, a log, or minutes.
@@ -65,9 +66,7 @@ SOON = [
 @pytest.mark.parametrize("example", SOON)
 def test_an_example_of_desk_work_runs_as_it_is_pasted(tmp_path: Path, example: str) -> None:
     (tmp_path / "config").symlink_to(ROOT / "config")
-    text = (ROOT / "config" / "j1939-profiles.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
+    machine_file(tmp_path, "j1939-profiles")
     script = f'canshaper() {{ {shlex.quote(sys.executable)} -m canshaper "$@"; }}\n{example}\n'
     done = subprocess.run(
         ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -16,8 +16,8 @@ from canshaper.design.lockstep import Simulation
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import Script, Stroke
+from tests.rigs.files import CONFIG
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 PLAIN, ROBUST = str(CONFIG / "forwarder.yaml"), str(CONFIG / "forwarder-robust.yaml")
 DAY_S = 86_400
 FIRST_DAY_S = 1_780_000_000  # 2026-05-28 in UTC

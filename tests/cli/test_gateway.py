@@ -11,8 +11,8 @@ from canshaper.errors import GatewayError
 from canshaper.protocols.gateway import cangw
 from canshaper.protocols.gateway.cangw import Rule, difference
 from canshaper.protocols.gateway.forwarding import Pattern
+from tests.rigs.files import ROOT, machine_file
 
-ROOT = Path(__file__).parents[2]
 FILE = ROOT / "config" / "gateway-forwarder.yaml"
 
 
@@ -41,9 +41,7 @@ def test_a_kernel_that_refuses_is_reported(monkeypatch: pytest.MonkeyPatch) -> N
     [("stop", "no joystick does"), ("neutral", "neutral joysticks do"), ("pass", "WARNING: ")],
 )
 def test_the_check_reports_what_passes(tmp_path: Path, fallback: str, message: str) -> None:
-    text = FILE.read_text().replace("../dbc", str(ROOT / "dbc"))
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace("fallback: neutral", f"fallback: {fallback}"))
+    file = machine_file(tmp_path, FILE, ("fallback: neutral", f"fallback: {fallback}"))
     result = invoke("check", str(file))
     assert result.exit_code == 0
     line = "gateway between joysticks and machine: others pass by the kernel, "

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.invocation import ROOT, SHIPPED
+from tests.cli.invocation import SHIPPED
+from tests.rigs.files import ROOT
 
 # The recommended file loads so many of our modules and lines at most, the gate's 2 300 included.
 # It sends its aim point, for which it follows the run-on of its filters.
@@ -107,16 +108,6 @@ def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> Non
     assert (done.returncode, done.stderr) == (0, "")
     assert f"Picture: none, matplotlib is missing: {TOOLS}" in done.stdout
     assert [path.name for path in tmp_path.rglob("*.*")] == ["report.json"]
-
-
-@pytest.mark.slow
-def test_without_the_tools_a_first_deployment_has_the_filters_to_begin_with(tmp_path: Path) -> None:
-    (tmp_path / "answers.txt").touch()
-    gone = ("canopen", "casadi", "matplotlib", "numpy", "scipy")
-    done = without(gone, tmp_path, "init", "machine.yaml", "--answers", "answers.txt")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert f"axis slew: no robust shaper yet, numpy is missing: {TOOLS}" in done.stdout
-    assert without(gone, tmp_path, "check", "machine.yaml").returncode == 0
 
 
 def test_a_module_that_is_no_tool_is_a_fault_of_ours(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.machine.binding import load_deployment
-from tests.cli.init_script import DBC, QUESTIONS, ROOT, answers, changed_dbc, init, with_answers
+from tests.cli.init_script import DBC, QUESTIONS, answers, changed_dbc, init, with_answers
+from tests.rigs.files import ROOT
 
 
 def axis(file: Path, name: str) -> Any:

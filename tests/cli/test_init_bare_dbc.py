@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.machine.binding import load_deployment
-from tests.cli.init_script import BARE, DBC, ROOT, of_dbc
+from tests.cli.init_script import BARE, DBC, of_dbc
+from tests.rigs.files import ROOT
 
 
 def test_what_the_dbc_does_not_say_is_asked(tmp_path: Path) -> None:

@@ -4,15 +4,14 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from canshaper.bus.multicast import LocalMulticastBus
+from tests.rigs.files import ROOT
 
 pytestmark = pytest.mark.processes
 
-ROOT = Path(__file__).parents[2]
 GROUP = f"239.79.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 
 

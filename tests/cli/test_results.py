@@ -23,8 +23,8 @@ from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.report import html
 from canshaper.report.style import new_figure
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 FORWARDER = ROOT / "config" / "forwarder.yaml"
 MOST_BYTES = 2_000_000
 

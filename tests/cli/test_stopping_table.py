@@ -9,7 +9,8 @@ from rich.console import Console
 from canshaper.commissioning.stopping import print_stopping, stopping
 from canshaper.machine.binding import load_deployment
 from tests.controller.set_files import DBC, YAML
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import Rig
 
 Make = Callable[..., Rig]
 

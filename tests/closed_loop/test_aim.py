@@ -16,8 +16,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import AXES, SCRIPTS, random_script
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script
-from tests.closed_loop.test_twin import ROOT
-from tests.rigs.files import read
+from tests.rigs.files import ROOT, read
 
 REST_S = 8.0
 

@@ -23,7 +23,8 @@ from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
 from tests.closed_loop.test_motion import tilt_deg
 from tests.closed_loop.test_pump import shipped
-from tests.closed_loop.test_twin import OPERATORS, ROOT
+from tests.closed_loop.test_twin import OPERATORS
+from tests.rigs.files import text_of
 
 RADII_M = [round(5.1 + 0.2 * i, 1) for i in range(11)]
 PULSE = Script("pulse", (Stroke("near_far", 0.5, 3.0, 1.0, 0.1),), 9.5)
@@ -32,8 +33,7 @@ BETWEEN_STOPS = ("start_radius_m=4.4", "radius_min_m=3.6", "radius_max_m=6.2", "
 
 def machine(tmp_path: Path, axis: str, flow: float, **ends: object) -> Deployment:
     """The shipped machine with a pump, with other ends of an axis."""
-    data = yaml.safe_load((ROOT / "config" / "forwarder-pump.yaml").read_text(encoding="utf-8"))
-    data["dbc"] = [str(ROOT / "dbc" / "forwarder.dbc")]
+    data = yaml.safe_load(text_of("forwarder-pump"))
     data["hydraulics"]["flow"] = flow
     tip = data["axes"]["near_far"]["limits"]["ends"]
     data["axes"][axis]["limits"]["ends"] = tip | ends

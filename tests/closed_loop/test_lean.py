@@ -1,7 +1,6 @@
 """A drive that no one listens to: fewer frames on the bus, the same at every valve."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,8 +15,7 @@ from canshaper_sim.operator import random_script
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script
 from tests.faults.shipped import NAMES
-
-CONFIG = Path(__file__).resolve().parents[2] / "config"
+from tests.rigs.files import CONFIG
 
 
 @pytest.mark.slow

@@ -20,6 +20,8 @@ from canshaper.report.stroke_metrics import crane_metrics
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
+from tests.closed_loop.test_twin import TIMINGS
+from tests.rigs.files import machine_file
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n    limits: {"
@@ -40,15 +42,12 @@ def taps() -> str:
 
 
 def deployment(tmp_path: Path, taps: str, radius: str | None) -> Deployment:
-    text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
-    changed = f"    filter: {{ kind: robust, tick_ms: 20, taps: [{taps}] }}\n"
-    assert SLEW in text
-    file = tmp_path / "machine.yaml"
-    text = text.replace(SLEW, f"{changed}    limits: {{", 1).replace(": 4.7 }", ": 5.3 }")
+    robust = f"    filter: {{ kind: robust, tick_ms: 20, taps: [{taps}] }}\n    limits: {{"
+    more = ""
     if radius is not None:
-        text += f"motion: {{ crane: {{ slew: slew, near_far: near_far, {radius} }} }}\n"
-    file.write_text(text)
-    return load_deployment(file)
+        more = f"motion: {{ crane: {{ slew: slew, near_far: near_far, {radius} }} }}\n"
+    changes = (SLEW, robust), (": 4.7 }", ": 5.3 }")
+    return load_deployment(machine_file(tmp_path, FILE, *changes, more=more))
 
 
 def residuals_deg(recording: Recording) -> tuple[float, float]:
@@ -86,17 +85,6 @@ def test_without_compensation_the_plane_of_the_boom_keeps_its_swing(
 
 # -- both joysticks at once, with the recommended deployment ---------------------------------------
 
-TIMINGS = [(late, sign) for late in (-2.0, -1.2, -0.6, 0.0, 0.6, 1.2, 2.0) for sign in (1, -1)]
-
-
-def both(late_s: float, sign: int) -> Script:
-    """A slew of 3 s, and a stroke of near-far that begins so much later: out, or a little in."""
-    slew_s, near_far_s = 0.5 - min(0.0, late_s), 0.5 + max(0.0, late_s)
-    out = Stroke("near_far", near_far_s, 3.0, 1.0)
-    little_in = Stroke("near_far", near_far_s, 2.0, -0.4)
-    strokes = (Stroke("slew", slew_s, 3.0, 1.0), out if sign > 0 else little_in)
-    return Script("both", strokes, 13.0)
-
 
 def tilt_deg(recording: Recording) -> list[float]:
     slew, near_far = recording.axes["slew"].sway_deg, recording.axes["near_far"].sway_deg
@@ -110,11 +98,11 @@ def test_both_joysticks_at_once_leave_little_swing_whatever_the_timing() -> None
     deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
     apart = dataclasses.replace(deployment, motions={})
     residuals, alone, peaks = [], [], []
-    for late_s, sign in TIMINGS:
-        tilt = tilt_deg(drive(deployment, both(late_s, sign)))
+    for script in TIMINGS:
+        tilt = tilt_deg(drive(deployment, script))
         residuals.append(max(tilt[-150:]))
         peaks.append(max(tilt))
-        alone.append(max(tilt_deg(drive(apart, both(late_s, sign)))[-150:]))
+        alone.append(max(tilt_deg(drive(apart, script))[-150:]))
     mean, without = statistics.mean(residuals), statistics.mean(alone)
     print(f"{mean:.2f} degrees in the mean, {max(residuals):.2f} at worst, peak {max(peaks):.1f};")
     print(f"each axis by itself: {without:.2f}, {max(alone):.2f}")
@@ -197,12 +185,8 @@ def test_near_far_is_moved_no_farther_than_check_says(
     tmp_path: Path, name: str, path_m: float
 ) -> None:
     """The bound is small here, so that it holds the tip back all the time."""
-    text = FILE.with_name(f"{name}.yaml").read_text()
-    file = tmp_path / "machine.yaml"
-    text = text.replace("../dbc", str(FILE.parent.parent / "dbc"))
-    file.write_text(
-        re.sub("(?m)^(    )(near_far: near_far)$", rf"\1\2\n\1max_path_m: {path_m}", text)
-    )
+    own = "    near_far: near_far\n"
+    file = machine_file(tmp_path, name, (own, f"{own}    max_path_m: {path_m}\n"))
     printed = CliRunner().invoke(app, ["check", str(file)]).stdout
     [bound_m] = [float(m) for m in re.findall("by up to .* m/s, (.*?) m in or out", printed)]
     farthest_m = 0.0

@@ -2,8 +2,6 @@
 
 import cmath
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from canshaper.report.metrics import compare
 from canshaper.shaping.shapers.gff import poles_from_denominator
 from canshaper.shaping.sway import SwayMode
 from canshaper_sim.operator import SCRIPTS, Script, Stroke
+from tests.rigs.files import machine_file
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 PAPER_SLEW = (0.42, 0.043)
@@ -42,13 +41,7 @@ class OrdinaryGff:
 
 
 def variant(tmp_path: Path, *changes: tuple[str, str]) -> Deployment:
-    text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    file = tmp_path / "variant.yaml"
-    file.write_text(text)
-    return load_deployment(file)
+    return load_deployment(machine_file(tmp_path, FILE, *changes))
 
 
 @pytest.mark.slow
@@ -107,22 +100,3 @@ def test_every_drive_is_bit_identical() -> None:
     deployment = load_deployment(FILE)
     script = SCRIPTS["pulse-slew"]
     assert drive(deployment, script) == drive(deployment, script)
-
-
-@pytest.mark.slow
-def test_demo_command_in_lock_step_writes_table_picture_and_report(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "canshaper",
-        "demo",
-        "--lockstep",
-        "--script",
-        "pulse-near_far",
-    ]
-    done = subprocess.run(
-        [*command, "--out", str(tmp_path)], capture_output=True, text=True, check=True
-    )
-    assert "residual sway" in done.stdout
-    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
-    assert '"residual_reduction_pct"' in (tmp_path / "report.json").read_text()

@@ -15,8 +15,8 @@ from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script
 from tests.closed_loop.test_motion import tilt_deg
-from tests.closed_loop.test_twin import OPERATORS, ROOT, TIMINGS
-from tests.rigs.files import read
+from tests.closed_loop.test_twin import OPERATORS, TIMINGS
+from tests.rigs.files import ROOT, read
 
 PROPORTIONAL, STARVING = (), ("pump.shares_flow=0",)
 

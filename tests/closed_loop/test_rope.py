@@ -70,6 +70,21 @@ def test_every_filter_that_is_compared_is_driven() -> None:
     assert max(left[name] for name in ("ZV by length", "G_FF by length", "the file's")) < 0.3
 
 
+@pytest.mark.slow
+def test_with_a_hook_block_both_modes_are_compared_and_left_in_peace() -> None:
+    deployment = read(CONFIG / "bridge-crane-hook.yaml")
+    filters = {one.name: one for one in rope_filters(deployment)}
+    still = [one for one in works(deployment) if one.name == "6 m still"][1::2]
+    left = {
+        name: [left_deg(deployment, (filters[name], work)) for work in still]
+        for name in ("off", "ZV of both modes", "the file's")
+    }
+    off, both, own = left.values()
+    assert min(off) > 5.0
+    assert max(own) < 0.03 * min(off)
+    assert max(both) < 0.03 * min(off)
+
+
 def test_what_cannot_be_compared_is_said(tmp_path: Path) -> None:
     file = changed(tmp_path, (" trolley: trolley,", ""))
     says = "expected bridge and trolley in crane, without trolley"
@@ -111,7 +126,7 @@ def test_what_a_file_says_of_its_crane_is_simulated(tmp_path: Path) -> None:
     assert boom.rope_m == 5.0
     assert boom.axes["bridge"].valve.parameters == parameters.overhead.bridge
     file = changed(tmp_path, ("kind: cartesian,", "kind: cartesian, simulated: { rope: 1 },"))
-    with pytest.raises(DesignError, match=r"bridge-crane.yaml: crane.simulated: rope=1.*parameter"):
+    with pytest.raises(DesignError, match=r"machine.yaml: crane.simulated: rope=1.*parameter"):
         changed_parameters([], load_deployment(file))
 
 

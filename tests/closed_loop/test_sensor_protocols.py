@@ -16,8 +16,8 @@ from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
 from canshaper_sim.sway_sensor import SwaySensorParameters
+from tests.rigs.files import ROOT, machine_file
 
-ROOT = Path(__file__).parents[2]
 J1939, CANOPEN = "j1939-sensor.yaml", "canopen-sensor.yaml"
 TOOL = 0x30
 START_S = 2.0  # an address is claimed, nodes are started, and valves brought up
@@ -41,13 +41,7 @@ ANGULAR_RATE = (
 
 
 def changed(tmp_path: Path, file: str, *changes: Change) -> Deployment:
-    text = (ROOT / "config" / file).read_text(encoding="utf-8")
-    for old, new in (*changes, ("../dbc", str(ROOT / "dbc"))):
-        assert old in text, old
-        text = text.replace(old, new)
-    path = tmp_path / "machine.yaml"
-    path.write_text(text, encoding="utf-8")
-    return load_deployment(path)
+    return load_deployment(machine_file(tmp_path, file, *changes))
 
 
 def nothing(_time_s: float) -> Iterator[Frame]:

@@ -17,16 +17,14 @@ from canshaper_sim.grapple import Sway
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
 from canshaper_sim.sway_sensor import SwaySensor
+from tests.rigs.files import machine_file
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder-sensor.yaml"
 
 
 def watching(tmp_path: Path) -> Deployment:
     """The shipped deployment whose sensors are only watched."""
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(FILE.parents[1] / "dbc"))
-    path = tmp_path / "machine.yaml"
-    path.write_text(text.replace("use: damp", "use: watch"), encoding="utf-8")
-    return load_deployment(path)
+    return load_deployment(machine_file(tmp_path, FILE, ("use: damp", "use: watch")))
 
 
 def drive_both(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> Recording:

@@ -2,7 +2,6 @@
 
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
@@ -10,8 +9,8 @@ from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
+from tests.rigs.files import CONFIG
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
 # From leaving neutral to letting go. The ramp of the shortest one lies within the neutral band for
 # long, of the least stroke in this list a twentieth.
 DURATIONS = (0.1, 0.15, 0.3, 0.45, 1.0)

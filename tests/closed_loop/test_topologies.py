@@ -1,7 +1,9 @@
-"""The crane of forwarder.yaml behind a gateway, and twice in one machine, damps as much."""
+"""The crane of forwarder.yaml damps as much behind a gateway, twice in one machine, with others.
+
+Joysticks and valves may be nodes of J1939, or of CANopen, which follow in ACTIVE only.
+"""
 
 from functools import cache
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +13,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.report.metrics import compare
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.operator import SCRIPTS
-
-CONFIG = Path(__file__).resolve().parents[2] / "config"
+from tests.rigs.files import CONFIG
 
 
 @cache
@@ -27,17 +28,18 @@ def residual_reduction_pct(file: str, crane: str | None = None) -> dict[str, flo
 
 
 @pytest.mark.slow
-def test_a_gateway_in_the_line_damps_as_much() -> None:
-    """By the joystick's own frames with our velocities in them, a cycle later."""
-    reductions = residual_reduction_pct("gateway-forwarder.yaml")
-    assert reductions == pytest.approx(residual_reduction_pct("forwarder.yaml"), abs=1.0)
-    assert min(reductions.values()) > 90.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("crane", ["front", "rear"])
-def test_each_of_two_cranes_damps_as_much(crane: str) -> None:
-    reductions = residual_reduction_pct("two-cranes.yaml", crane)
+@pytest.mark.parametrize(
+    ("file", "crane"),
+    [
+        ("gateway-forwarder.yaml", None),  # the joystick's own frames, a cycle later
+        ("two-cranes.yaml", "front"),
+        ("two-cranes.yaml", "rear"),
+        ("canopen-forwarder.yaml", None),
+        ("j1939-forwarder.yaml", None),
+    ],
+)
+def test_it_damps_as_much(file: str, crane: str | None) -> None:
+    reductions = residual_reduction_pct(file, crane)
     assert reductions == pytest.approx(residual_reduction_pct("forwarder.yaml"), abs=1.0)
     assert min(reductions.values()) > 90.0
 

@@ -18,7 +18,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
-from tests.rigs.files import CONFIG, ROOT, read
+from tests.rigs.files import CONFIG, machine_file, read
 
 FILE = CONFIG / "tower-crane.yaml"
 OWN, OFF = RopeFilter("the file's", {}), RopeFilter("off", {}, bypass=True)
@@ -101,9 +101,7 @@ def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
 
 
 def test_a_motion_may_have_one_axis_with_a_rope(tmp_path: Path) -> None:
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    path = tmp_path / "slew.yaml"
-    near_far = "    near_far: trolley\n"
+    text = FILE.read_text(encoding="utf-8")
     radius = text[text.index("    radius: {") : text.index("    max_pct: 50")]
-    path.write_text(text.replace(near_far, "", 1).replace(radius, ""), encoding="utf-8")
+    path = machine_file(tmp_path, FILE, ("    near_far: trolley\n", ""), (radius, ""))
     assert 0.2 < left(driven(load_deployment(path), 40.0)) < 2.5

@@ -4,6 +4,7 @@
 the peak, degrees of total tilt.
 """
 
+import math
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -16,18 +17,19 @@ from canshaper.config.limits import Sway
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.shapers.fir import zv_taps
+from canshaper_sim.crane import Crane
+from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script, Stroke
-from tests.closed_loop.mujoco_twin import TwinCrane, drive, figures
+from tests.closed_loop.mujoco_twin import Twin, TwinCrane, drive, figures
+from tests.rigs.files import ROOT, text_of
 
-ROOT = Path(__file__).resolve().parents[2]
 ROBUST = "forwarder-robust.yaml"
 Change = Callable[[dict[str, Any]], object]
 
 
 def machine(tmp_path: Path, change: Change) -> Deployment:
     """The recommended deployment with both axes' sections of the file changed."""
-    data = yaml.safe_load((ROOT / "config" / ROBUST).read_text(encoding="utf-8"))
-    data["dbc"] = [str(ROOT / "dbc" / "forwarder.dbc")]
+    data = yaml.safe_load(text_of(ROBUST))
     for name in ("slew", "near_far"):
         change(data["axes"][name])
     file = tmp_path / "machine.yaml"
@@ -166,3 +168,58 @@ def test_a_valve_that_is_slow(lag_s: tuple[float, float]) -> None:
 def test_a_radius_that_is_lost_in_motion() -> None:
     residuals = figures(shipped(), TIMINGS, TwinCrane(radius_until_s=2.0))
     judged("radius lost after 2 s", residuals, 0.6, 0.6)
+
+
+TICK_S = 0.02
+ENDS_M = (1.8, 5.0)
+STOPPED = ("radius_max_m=5",)
+TILTED = ("carrier.pitch_deg=10", "carrier.roll_deg=-6")
+TYRES = (1.2, 0.1, 4e4)
+ROCKING = (
+    *("carrier.rock_hz=1.2", "carrier.rock_damping=0.1", "carrier.boom_kg=0"),
+    *("carrier.roll_kg_m2=4e4", "carrier.pitch_kg_m2=4e4"),
+)
+DRAG_M2 = 2.0
+WIND = ("wind.speed_m_s=12", f"wind.drag_m2={DRAG_M2}")
+WIND_N = 0.5 * 1.225 * DRAG_M2 * 12.0**2
+LOG = ("log.grip_s=0", "log.mass_kg=300", "log.below_m=0", "log.length_m=4", "rotator.start_deg=30")
+
+
+def commands(tick: int) -> tuple[float, float]:
+    """Slew and near-far at once, there and back, with releases."""
+    return (0.0, 0.6, 0.6, -0.3, 0.0)[tick // 60 % 5], (0.7, 0.7, -0.4, 0.0)[tick // 75 % 4]
+
+
+@pytest.mark.parametrize(
+    ("twin", "changes", "part", "apart_deg"),
+    [
+        (TwinCrane(), (), 1.0, 0.2),
+        (TwinCrane(pump=0.8), ("pump_flow=0.8",), 1.0, 0.2),
+        (TwinCrane(ends_m=ENDS_M), STOPPED, 1.0, 0.2),
+        (TwinCrane(ends_m=ENDS_M, cushion_s=0.5), (*STOPPED, "ends.cushion_s=0.5"), 1.0, 0.2),
+        (TwinCrane(slope_deg=(10.0, -6.0)), TILTED, 1.0, 0.2),
+        (TwinCrane(tyres=TYRES), ROCKING, 1.0, 0.8),
+        (TwinCrane(wind_n=WIND_N), WIND, 1.0, 0.2),
+        (TwinCrane(log=(300.0, 4.0, 30.0)), LOG, 0.3, 0.2),  # small angles
+    ],
+    ids=["plain", "pump", "stop", "cushion", "slope", "tyres", "wind", "log"],
+)
+def test_both_swing_alike(
+    twin: TwinCrane, changes: tuple[str, ...], part: float, apart_deg: float
+) -> None:
+    crane = Crane(changed_parameters(["radius_max_m=12", *changes]))
+    judge, apart, swing = Twin(twin), 0.0, 0.0
+    carrier = crane.around.carrier
+    judge.begin(crane.rest_rad, (carrier.roll[0], carrier.pitch[0]) if carrier else (0.0, 0.0))
+    for tick in range(500):
+        slew, near_far = (part * one for one in commands(tick))
+        judge.valves["slew"].command, judge.valves["near_far"].command = slew, near_far
+        judge.step()
+        crane.step(TICK_S, {"slew": slew, "near_far": near_far})
+        pairs = zip(judge.sway_rad, crane.state[7:9], strict=True)
+        apart = max(apart, *(abs(a - b) for a, b in pairs))
+        swing = max(swing, *map(abs, judge.sway_rad))
+        assert crane.state.radius_m == pytest.approx(judge.radius_m, abs=5e-3)
+    print(f"{math.degrees(apart):.3f} degrees apart, of {math.degrees(swing):.1f}")
+    assert math.degrees(swing) > 7.0
+    assert math.degrees(apart) < apart_deg

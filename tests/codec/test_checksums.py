@@ -24,6 +24,7 @@ from canshaper.checksums.kinds import (
 from canshaper.cli.verbs.config_schema import checksum_table
 from canshaper.machine.identity import Identity
 from tests.codec.checksum_reference import REFERENCE
+from tests.rigs.files import ROOT
 
 # Over the digits 1 to 9, id 0, the checksum behind them. Of the CRCs the check value in the
 # catalogue of parametrised CRC algorithms; all others by hand.
@@ -41,7 +42,6 @@ VALUES = {
 }
 BODY = bytes(range(0x11, 0x19))
 ROWS = frozenset(CHECKSUMS)  # before any test has added a CRC by its numbers
-ROOT = Path(__file__).parents[2]
 
 
 def places(kind: str) -> list[Checksum]:

@@ -33,10 +33,6 @@ def test_flags_bind(machine: Machine) -> None:
     ("flags", "says"),
     [
         (
-            FLAGS.replace("SlewNeutral", "N"),
-            "flags.neutral: expected a signal of JoystickLeft, got 'N'; there are",
-        ),
-        (
             FLAGS.replace(", positive: SlewPositive", ""),
             "flags.positive: missing: signal that the velocity is positive",
         ),

@@ -1,6 +1,5 @@
 """A rocker with a signal for each direction: one command, or none; and back into both signals."""
 
-from pathlib import Path
 from typing import Any
 
 import cantools
@@ -13,10 +12,9 @@ from hypothesis import strategies as st
 from canshaper.codec.message import SentMessage
 from canshaper.codec.velocity import FlagsCodec, RockerVelocity, ValveCodec, VelocitySignal
 from canshaper.shaping.states import Reason
-from tests.rigs.files import Machine
+from tests.rigs.files import ROOT, Machine
 from tests.rigs.sent import command_raw
 
-ROOT = Path(__file__).parents[2]
 network: Any = cantools.database.load_file(ROOT / "dbc" / "rotator.dbc")
 ROCKER = network.get_message_by_name("RotatorRocker")
 LEFT, RIGHT = (

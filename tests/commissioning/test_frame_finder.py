@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.identification.commands import Commands
+from canshaper.commissioning.identification.series import Commands
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.recording.channels import InputFinder
-from tests.rigs.j1939 import JOYSTICK, OTHER, OWN, ROOT, bjm
+from tests.rigs.files import ROOT, machine_file
+from tests.rigs.j1939 import JOYSTICK, OTHER, OWN, bjm
 
 MS = 1_000_000
 PLAIN = ROOT / "config" / "forwarder.yaml"
@@ -24,13 +25,9 @@ def any_source() -> Deployment:
 @pytest.fixture
 def one_source(tmp_path: Path) -> Deployment:
     """The left joystick is received from one address only."""
-    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
     joystick = "    message: BJM1\n"
-    assert joystick in text
-    text = text.replace(joystick, f"{joystick}    source: {JOYSTICK}\n")
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace("../dbc/", f"{ROOT}/dbc/"), encoding="utf-8")
-    return load_deployment(file)
+    source = (joystick, f"{joystick}    source: {JOYSTICK}\n")
+    return load_deployment(machine_file(tmp_path, "j1939-forwarder", source))
 
 
 def finder(deployment: Deployment) -> InputFinder[BoundInput]:

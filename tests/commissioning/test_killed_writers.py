@@ -20,7 +20,7 @@ from canshaper.edit.edit import change, replace_text, written_by
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.rigs.forwarder import ROOT
+from tests.rigs.files import ROOT
 
 pytestmark = pytest.mark.processes
 

@@ -8,8 +8,8 @@ import pytest
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
 from canshaper.errors import ConfigError
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "config" / "forwarder.yaml"
 
 Load = Callable[[str | bytes], DeploymentConfig]

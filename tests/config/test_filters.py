@@ -13,16 +13,15 @@ from typer.testing import CliRunner
 from canshaper.cli.app import app
 from canshaper.config.schema import DeploymentConfig
 from canshaper.errors import ConfigError
-from canshaper.machine.binding import load_deployment
 from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.rigs.files import ROOT, Machine
 from tests.rigs.residual import residual_left
 
 Load = Callable[[str], DeploymentConfig]
 Problems = Callable[[str], list[str]]
 
-ROOT = Path(__file__).parents[2]
 SLEW = "filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 LIFT = "filter: { kind: off }"
 TICK_S = 0.02
@@ -126,16 +125,6 @@ BAD = [
     ("kind: robust, tick_ms: 20, taps: [1, .nan]", "taps.1: expected 0 to 1, got nan"),
     ("kind: robust, tick_ms: 0, taps: [1]", "expected a whole number, 1 to 200 ms, got 0"),
     ("kind: robust, tick_ms: 20, taps: 1", "taps: expected a list, got 1"),
-    (
-        "kind: zvdd",
-        "filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei',"
-        " 'two_mode', 'robust', got 'zvdd'",
-    ),
-    (
-        "taps: [1]",
-        "filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei',"
-        " 'two_mode', 'robust', got nothing",
-    ),
 ]
 
 
@@ -174,27 +163,20 @@ def test_an_axis_without_sway_data_has_no_filter_that_needs_them(
 
 def checked(directory: Path, text: str, *, sway: str = "") -> list[str]:
     """Problems of a machine whose slew valve is sent every 40 ms."""
-    file = directory / "machine.yaml"
-    shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    changed = slew_with(shipped, text).replace("../dbc/forwarder.dbc", "machine.dbc")
+    machine, problems = Machine(directory), list[str]()
+    machine.yaml = slew_with(machine.yaml, text)
     if sway:
-        changed = changed.replace("period_s: 2.356, damping_ratio: 0.038", sway)
-    file.write_text(changed, encoding="utf-8")
-    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+        machine.in_yaml("period_s: 2.356, damping_ratio: 0.038", sway)
     cycle = 'BA_ "GenMsgCycleTime" BO_ 512 {};'
-    assert cycle.format(20) in dbc
-    (directory / "machine.dbc").write_text(
-        dbc.replace(cycle.format(20), cycle.format(40)), encoding="cp1252"
-    )
-    result = CliRunner().invoke(app, ["check", str(file)])
+    machine.in_dbc(cycle.format(20), cycle.format(40))
+    try:
+        machine.load()
+    except ConfigError as error:
+        problems = [str(p).removeprefix(f"{directory}/") for p in error.problems]
+    result = CliRunner().invoke(app, ["check", str(directory / "machine.yaml")])
     assert not isinstance(result.exception, Exception)
-    if result.exit_code == 0:
-        load_deployment(file)
-        return []
-    assert result.exit_code == 2
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(file)
-    return [str(p).removeprefix(f"{directory}/") for p in caught.value.problems]
+    assert result.exit_code == (2 if problems else 0)
+    return problems
 
 
 def test_taps_for_another_period_than_the_valves_are_refused(tmp_path: Path) -> None:

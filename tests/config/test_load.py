@@ -1,15 +1,14 @@
 """Deployment files as a whole: all problems at once, in the order of the file."""
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from canshaper.config.load import load_config
 from canshaper.config.schema import AxisSection, DeploymentConfig
-from canshaper.errors import ConfigError
+from canshaper.errors import did_you_mean, there_are
 from tests.config.sections import TOP, Problems, changed
+from tests.rigs.files import faults, machine_file
 
 Load = Callable[[str | bytes], DeploymentConfig]
 AXIS = ", ".join(AxisSection.model_fields)
@@ -57,13 +56,6 @@ def test_all_problems_are_reported_at_once_in_the_order_of_the_file(
     assert lines == sorted(lines)
 
 
-@pytest.mark.parametrize("text", ["", "# nothing\n", "{}\n"])
-def test_empty_file_lacks_everything(problems: Problems, text: str) -> None:
-    keys = [re.sub(r"^machine\.yaml(:1)?: ", "", p).split(": ", 1) for p in problems(text)]
-    assert [k for k, _ in keys] == ["axes", "buses", "dbc", "joysticks", "version"]
-    assert all(text.startswith("missing: ") for _, text in keys)
-
-
 @pytest.mark.parametrize(
     ("text", "shown"),
     [("- a\n", "['a']"), ("~\n", "nothing"), ("3\n", "3"), ("hello\n", "'hello'")],
@@ -79,44 +71,53 @@ def test_long_findings_are_cut(shipped: str, problems: Problems) -> None:
     assert "'xxx" in problem
 
 
-def test_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError) as caught:
-        load_config(tmp_path / "none.yaml")
-    assert str(caught.value) == f"{tmp_path / 'none.yaml'}: No such file or directory"
-
-
 def test_off_needs_no_quotes(shipped: str, load: Load) -> None:
     for word in ("off", "'off'", '"off"', "false", "False", "FALSE"):  # as tools of YAML 1.1 write
         config = load(shipped.replace("kind: off", f"kind: {word}"))
         assert config.axes["lift"].filter.kind == "off"
 
 
-@pytest.mark.parametrize("word", ["true", "'false'", "no", "0", "null"])
-def test_nothing_else_is_off(shipped: str, problems: Problems, word: str) -> None:
-    (problem,) = problems(shipped.replace("kind: off", f"kind: {word}"))
-    assert "axes.lift.filter.kind: expected one of 'off', 'gff', " in problem
-    assert ", got " in problem
-
-
-def test_numbers_with_an_exponent_are_numbers(shipped: str, load: Load) -> None:
-    sway = load(shipped.replace("damping_nms: 120", "damping_nms: 1.2e2")).axes["near_far"].sway
-    assert sway
-    assert sway.damping_nms == 120.0
-
-
-def test_the_shipped_file_is_read_as_it_stands(shipped: str, load: Load) -> None:
-    config = load(shipped)
-    assert config.tick_ms == 20
-    assert list(config.axes) == ["slew", "near_far", "lift"]
-    slew = config.axes["slew"]
-    assert slew.filter.model_dump(exclude_none=True) == {"kind": "gff", "a1": 0.708, "a2": 0.12}
-    assert (slew.limits.deadband_pct, slew.limits.rise_per_s) == (5, 5)
-    assert slew.sway
-    assert slew.sway.mode().damping_ratio == 0.038
-
-
-@pytest.mark.parametrize("text", ["", "# only a comment\n", "\n\n"])
+@pytest.mark.parametrize("text", ["", "# only a comment\n", "\n\n", "{}\n"])
 def test_an_empty_file_is_wrong_in_its_first_line(problems: Problems, text: str) -> None:
     said = problems(text)
     assert said[0].split(":")[:3][1:] == ["1", " axes"], said
-    assert all(": missing: " in one for one in said)
+    keys = [one.rpartition(": missing: ")[0].split(": ")[-1] for one in said]
+    assert keys == ["axes", "buses", "dbc", "joysticks", "version"]
+
+
+@pytest.mark.parametrize(
+    ("name", "end"),
+    [
+        ("joistick", "; did you mean joystick?"),
+        ("JoystickLEFT", "; did you mean JoystickLeft?"),
+        ("Left", ""),
+        ("", ""),
+    ],
+)
+def test_a_name_like_it_is_named(name: str, end: str) -> None:
+    assert did_you_mean(name, ("joystick", "JoystickLeft", "NearFarCommand")) == end
+
+
+def test_of_many_names_only_the_nearest_are_listed() -> None:
+    few = [f"Valve{i:02}" for i in range(20)]
+    assert there_are("Valve", few) == f"; there are {', '.join(few)}; did you mean Valve19?"
+    assert there_are("Valve", []) == "; there are none"
+    many = [*few, *(f"Pump{i:03}" for i in range(140)), "JoystickLeft", "JoystickRight"]
+    said = there_are("JoystikLeft", many)
+    assert said.startswith("; there are 162, such as JoystickLeft, JoystickRight")
+    assert said.endswith("; did you mean JoystickLeft?")
+    assert len(said) < 120
+    nothing_like_it = "; there are 162, such as Valve00, Valve01, Valve02, Valve03, Valve04"
+    assert there_are("###", many) == nothing_like_it
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "end"),
+    [
+        ("timeout_ms: 100 #", "timeoutms: 100 #", "got an unknown one; did you mean timeout_ms?"),
+        ("message: JoystickLeft", "message: JoystikLeft", "; did you mean JoystickLeft?"),
+        ("signal: NearFar,", "signal: NearFaar,", "; did you mean NearFar?"),
+    ],
+)
+def test_every_kind_of_name_in_a_file(tmp_path: Path, old: str, new: str, end: str) -> None:
+    assert any(one.endswith(end) for one in faults(machine_file(tmp_path, "forwarder", (old, new))))

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.rigs.files import ROOT, machine_file
+
 EXAMPLE = ROOT / "examples" / "own_filter"
-SLEW = "filter: { kind: gff, a1: 0.708, a2: 0.12 }"
-OWN = "filter: { kind: moving_average, window_s: %s }"
+SLEW = "filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
+OWN = "filter: { kind: moving_average, window_s: %s }\n"
 # What a drive, the comparison and a process of the comparison do with the kind.
 WORK = """
 import json, pickle, sys
@@ -100,12 +101,8 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def machine(directory: Path, window_s: str) -> tuple[Path, int]:
     """A machine whose slew axis has the filter, and the line that it stands in."""
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    assert SLEW in text
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace(SLEW, OWN % window_s, 1)
-    file = directory / "machine.yaml"
-    file.write_text(text, encoding="utf-8")
-    return file, text[: text.index("moving_average")].count("\n") + 1
+    file = machine_file(directory, "forwarder", (SLEW, OWN % window_s))
+    return file, file.read_text().partition("moving_average")[0].count("\n") + 1
 
 
 @pytest.mark.slow

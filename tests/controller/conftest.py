@@ -8,8 +8,8 @@ import pytest
 from tests.controller.adjustable import CONTROL, STATUS, Make
 from tests.controller.cab import LEFT, SEAT_DBC, SWITCHES
 from tests.rigs.canopen import CanopenRig, write_variant
-from tests.rigs.files import Machine
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import Machine, machine_file
+from tests.rigs.forwarder import Rig
 from tests.rigs.j1939 import Rig as J1939Rig
 
 
@@ -33,10 +33,7 @@ def canopen(tmp_path: Path) -> CanopenRig:
 
 @pytest.fixture
 def j1939(tmp_path: Path) -> J1939Rig:
-    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
-    rig = J1939Rig(file).claimed()
+    rig = J1939Rig(machine_file(tmp_path, "j1939-forwarder")).claimed()
     rig.run(5)
     return rig
 

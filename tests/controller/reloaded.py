@@ -5,14 +5,15 @@ from typing import Any
 
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import text_of
+from tests.rigs.forwarder import Rig
 
 Make = Callable[..., Rig]
 
 
 def reload(rig: Any, *changes: tuple[str, str]) -> None:
     """The controller after a reload of the rig's file, with pieces of it replaced."""
-    text = rig.deployment.path.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    text = text_of(rig.deployment.path)
     for old, new in changes:
         assert old in text, old
         text = text.replace(old, new)

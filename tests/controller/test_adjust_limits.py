@@ -8,9 +8,8 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.controller.adjust import Adjuster
 from tests.controller.adjustable import Make
+from tests.rigs.files import text_of
 from tests.rigs.forwarder import Rig
-
-ROOT = Path(__file__).parents[2]
 
 
 def test_limits_change_in_neutral_only(make: Make) -> None:
@@ -60,8 +59,7 @@ def test_the_sway_shown_follows_full_speed(make: Make) -> None:
 
 
 def test_a_two_axis_motion_takes_the_new_sway_of_near_far(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "forwarder-robust.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
+    text = text_of("forwarder-robust")
     assert "full_speed_m_s: 1.0 }" in text
     control = "control: { adjustable: { axes.near_far.sway.full_speed_m_s: [0.5, 2.0] } }\n"
     rigs = []

@@ -10,7 +10,8 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT, machine_file
+from tests.rigs.forwarder import Rig
 
 Make = Callable[..., Rig]
 
@@ -85,13 +86,9 @@ def test_a_trip_and_a_bypass_let_nothing_run_on(rig: Rig) -> None:
 
 def test_it_is_not_known_while_another_set_is_in_force(tmp_path: Path) -> None:
     """The run-on is that of the axis' own filter."""
-    text = (ROOT / "config" / "forwarder-load.yaml").read_text(encoding="utf-8")
     aim_point = "    aim: { bus: crane, message: AimPoint }\n"
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace(
-        "    radius:", f"{aim_point}    radius:"
-    )
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
-    rig = Rig(tmp_path / "machine.yaml")
+    aiming = ("    radius:", f"{aim_point}    radius:")
+    rig = Rig(machine_file(tmp_path, "forwarder-load", aiming))
     rig.run(10)
     assert aim(rig)["known"] is True
     load = rig.message("GrappleLoad")

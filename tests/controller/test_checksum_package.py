@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc16AugCcitt
 
+from tests.rigs.files import ROOT
+
 pytestmark = pytest.mark.processes
 
-ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "own_checksum"
 PAGE = (ROOT / "docs" / "checksums.md").read_text(encoding="utf-8")
 COUNTER = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n'

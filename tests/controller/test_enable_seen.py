@@ -14,8 +14,7 @@ from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.states import CommandInput, Reason
 from canshaper_sim.hand import Hand, Held
 from tests.controller.cab import enable_of, seat
-from tests.rigs.files import Machine
-from tests.rigs.forwarder import ROOT
+from tests.rigs.files import ROOT, Machine
 
 LEFT, RIGHT, SEAT = 272, 273, 288
 MS = 1_000_000

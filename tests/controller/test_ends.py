@@ -7,7 +7,8 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import Rig
 
 Make = Callable[..., Rig]
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200"

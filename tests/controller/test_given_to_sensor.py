@@ -20,6 +20,7 @@ from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
 from tests.faults import shipped
+from tests.rigs.files import machine_file
 
 STROKES = (Stroke("near_far", 0.5, 2.5, 1.0, 0.1), Stroke("slew", 6.0, 6.0, 1.0, 0.1))
 SLEWING = Script("slew", STROKES, 13.0)
@@ -117,11 +118,8 @@ def test_near_far_is_given_what_slewing_alone_would_show_across() -> None:
 
 
 def test_a_sensor_of_another_kind_shows_nothing_of_that(tmp_path: Path) -> None:
-    text = (shipped.CONFIG / "forwarder-sensor.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(shipped.CONFIG.parent / "dbc"))
     angle, rate = "SwayAngle, signal: Across, kind: angle", "SwayRate, signal: Across, kind: rate"
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace(angle, rate), encoding="utf-8")
+    file = machine_file(tmp_path, "forwarder-sensor", (angle, rate))
     assert Controller(load_deployment(file)).axes["near_far"].other is None
 
 

@@ -9,7 +9,8 @@ from canshaper.config.load import load_config
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import Rig
 
 Make = Callable[..., Rig]
 FULL = {"Slew": 1000, "NearFar": 1000}

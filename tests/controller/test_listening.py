@@ -11,9 +11,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.protocols.canopen.network import ValveControl
 from canshaper.shaping.states import State
 from tests.rigs import canopen, j1939
+from tests.rigs.files import ROOT, text_of
 from tests.rigs.forwarder import Rig
-
-ROOT = Path(__file__).parents[2]
 
 
 def sent(name: str) -> set[int]:
@@ -46,7 +45,7 @@ def test_j1939_keeps_its_address_for_the_status_and_for_nothing_else(tmp_path: P
     assert j1939.CLAIM in sent("j1939-forwarder.yaml")
     assert not sent("j1939-forwarder.yaml") & valves
     assert listening.routing.buses["crane"].sent_groups == set()
-    lines = machine.read_text().replace("../dbc", str(ROOT / "dbc")).splitlines()
+    lines = text_of(machine).splitlines()
     silent = tmp_path / "silent.yaml"
     status = ("status:", "identity:")
     silent.write_text("\n".join(line for line in lines if not line.strip().startswith(status)))

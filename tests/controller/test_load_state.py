@@ -7,7 +7,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.shaping.sway import SwayModel
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import Rig
 
 EMPTY, LOG, UNKNOWN = 1, 2, 0
 

@@ -9,7 +9,8 @@ from types import FrameType
 
 import pytest
 
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import Rig
 
 SLEW = 600
 PACKAGE = f"{ROOT / 'canshaper'}/"

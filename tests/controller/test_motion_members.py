@@ -8,7 +8,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from tests.controller.motion_rig import Make, moving_as_one, near_far
-from tests.faults import shipped
+from tests.rigs.files import machine_file
 
 TICK_S = 0.02
 
@@ -49,10 +49,7 @@ def test_periods_that_were_missed_are_held_and_the_next_is_awaited(
 
 @pytest.mark.parametrize("use", ["damp", "watch"])
 def test_with_a_sensor_that_damps_it_may_go_as_far_again(use: str, tmp_path: Any) -> None:
-    text = (shipped.CONFIG / "forwarder-sensor.yaml").read_text()
-    text = text.replace("../dbc", str(shipped.CONFIG.parent / "dbc"))
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace("use: damp", f"use: {use}"))
+    file = machine_file(tmp_path, "forwarder-sensor", ("use: damp", f"use: {use}"))
     controller = Controller(load_deployment(file))
     (motion,) = controller.deployment.config.motion.values()
     times = 2.0 if use == "damp" else 1.0

@@ -12,8 +12,9 @@ from canshaper.machine.binding import load_deployment
 from canshaper.report.metrics import axis_metrics
 from canshaper.shaping.states import State
 from canshaper_sim.operator import Script, Stroke
+from tests.rigs.files import ROOT
 from tests.rigs.forwarder import Rig as Forwarder
-from tests.rigs.j1939 import ROOT, Rig, bjm
+from tests.rigs.j1939 import Rig, bjm
 
 FILE = ROOT / "config" / "j1939-profiles.yaml"
 NORMAL, QUICK, FINE = range(3)

@@ -26,15 +26,15 @@ from canshaper_sim.plant import PlantNode
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
 from canshaper_sim.sway_sensor import SwaySensorParameters
+from tests.rigs.files import ROOT, text_of
 
-ROOT = Path(__file__).parents[2]
 FILE = ROOT / "config" / "forwarder-sensor.yaml"
 PULSE = SCRIPTS["pulse-near_far"]
 
 
 def changed(tmp_path: Path, *changes: tuple[str, str]) -> Deployment:
     """The shipped deployment, changed."""
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    text = text_of(FILE)
     for old, new in changes:
         assert re.search(old, text), old
         text = re.sub(old, new, text)

@@ -12,8 +12,8 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from tests.controller.reloaded import reload
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
 MESSAGES = {
     "JoystickLeft": {"Slew": 0, "NearFar": 0, "AntiSwayOff": 0},

@@ -18,7 +18,8 @@ from canshaper.gate import cycle, loop
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import BusRoutes
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import text_of
+from tests.rigs.forwarder import Rig
 
 BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
 SECOND = f"{BUS}\n  two: {{ interface: socketcan, channel: vcan1 }}"
@@ -87,6 +88,11 @@ class Bench:
         opening: called when a bus is opened, with its channel.
     """
 
+    def become(self, name: str) -> None:
+        """Have this shipped deployment in the file."""
+        self.text = text_of(name)
+        self.file.write_text(self.text, encoding="utf-8")
+
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_ns = 10**12
         self.ports: list[FakePort] = []
@@ -94,9 +100,7 @@ class Bench:
         self.script: Callable[[int], None] = lambda number: None
         self.opening: Callable[[str], None] = lambda channel: None
         self.file = folder / "machine.yaml"
-        text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-        self.text = text.replace("../dbc", str(ROOT / "dbc"))
-        self.file.write_text(self.text, encoding="utf-8")
+        self.become("forwarder")
         self.rig = Rig(self.file)  # for its joysticks
         self._tick = 0
         self._handlers: dict[int, Any] = {}

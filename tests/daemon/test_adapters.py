@@ -18,18 +18,17 @@ import yaml
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.machine.binding import load_deployment
 from tests.bus.lines import ANSWER_S, SerialLine
+from tests.rigs.files import text_of
 
 pytestmark = pytest.mark.processes
 
-ROOT = Path(__file__).parents[2]
 GROUP = f"239.78.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 MULTICAST = {"interface": "udp_multicast", "channel": GROUP}
 
 
 def written(path: Path, change: Callable[[dict], None]) -> Path:  # type: ignore[type-arg]
     """The shipped forwarder, changed."""
-    content = yaml.safe_load((ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8"))
-    content["dbc"] = [str(ROOT / "dbc" / "forwarder.dbc")]
+    content = yaml.safe_load(text_of("forwarder"))
     content["buses"] = {"crane": MULTICAST}
     change(content)
     path.write_text(yaml.safe_dump(content), encoding="utf-8")

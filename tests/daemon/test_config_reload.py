@@ -18,7 +18,8 @@ from canshaper.daemon import config_reload as reading_module
 from canshaper.daemon.config_reload import ConfigReload
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
-from tests.rigs.forwarder import ROOT, TICK_NS
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import TICK_NS
 
 pytestmark = pytest.mark.processes
 

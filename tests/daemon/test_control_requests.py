@@ -60,8 +60,9 @@ def test_the_log_says_who_set_what(
 ) -> None:
     path = tmp_path / "c.sock"
     control(bench, path)
-    answered(bench, path, {"set": {"axes.slew.filter.a1": value}})
+    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": value}})
     (line,) = log("axes.slew.filter.a1")
+    assert line.endswith(answer.get("error", ""))
     assert "uid=" in line
     assert "pid=" in line
     assert said in line

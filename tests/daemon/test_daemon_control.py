@@ -34,19 +34,6 @@ def test_the_table_is_asked_for_and_nothing_is_set(
     assert not [line for line in log() if " set " in line or "set=" in line]
 
 
-def test_a_number_that_is_refused_is_in_the_log(
-    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
-) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 2}})
-    assert "0.5 to 1" in answer["error"]
-    refused = [line for line in log() if "set=refused" in line]
-    assert len(refused) == 1
-    assert refused[0].startswith("WARNING set=refused uid=")
-    assert refused[0].endswith(answer["error"])
-
-
 @pytest.mark.parametrize("request_", [{"get": 1}, {"set": 1}, {"set": {}, "more": 1}])
 def test_a_request_that_is_none(bench: Bench, tmp_path: Path, request_: object) -> None:
     path = tmp_path / "c.sock"

@@ -11,7 +11,6 @@ from canshaper.errors import BusError
 from canshaper.gate.cycle import FramePort, FrameProcessor, Standstill, receive_waiting
 from canshaper.machine.deployment import Deployment
 from tests.daemon.bench import Bench, at
-from tests.rigs.forwarder import ROOT
 
 
 class CountingGateway:
@@ -54,9 +53,7 @@ class CountingGateway:
 @pytest.fixture
 def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[CountingGateway]:
     """The bench's machine has a gateway; what stands in its line, one after the other."""
-    text = (ROOT / "config" / "gateway-forwarder.yaml").read_text(encoding="utf-8")
-    bench.text = text.replace("../dbc", str(ROOT / "dbc"))
-    bench.file.write_text(bench.text, encoding="utf-8")
+    bench.become("gateway-forwarder")
     lines: list[CountingGateway] = []
 
     def in_line(*arguments: Any) -> CountingGateway:

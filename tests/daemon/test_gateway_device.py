@@ -16,7 +16,7 @@ from canshaper.daemon import gateway
 from canshaper.daemon.gateway import Bridge
 from canshaper.errors import BusError, WrongDeviceError
 from canshaper.protocols.gateway import cangw
-from tests.rigs.gateway import ROOT
+from tests.rigs.files import ROOT, machine_file
 
 FILE = ROOT / "config" / "gateway-forwarder.yaml"
 FRAME = bytes(16)
@@ -148,12 +148,7 @@ def test_without_match_an_interface_that_is_down_is_kept(monkeypatch: pytest.Mon
 
 
 def matched_file(folder: Path, match: str) -> Path:
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    changed = text.replace("channel: vcan1,", f"channel: vcan1, match: {match},")
-    assert changed != text
-    file = folder / "machine.yaml"
-    file.write_text(changed, encoding="utf-8")
-    return file
+    return machine_file(folder, FILE, ("channel: vcan1,", f"channel: vcan1, match: {match},"))
 
 
 @pytest.mark.parametrize("state", ["running", "away"])

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.rigs.files import machine_file
+
 pytestmark = pytest.mark.processes
 
-ROOT = Path(__file__).parents[2]
 ANSWER_S = 60.0  # only to end a test that hangs
 BUS = "{ interface: socketcan, channel: vcan0, bitrate: 250000 }"
 
@@ -23,11 +24,8 @@ class Daemon:
     """``canshaper run`` on a bus of its own, with us as its service manager."""
 
     def __init__(self, folder: Path) -> None:
-        self.file = folder / "machine.yaml"
-        text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-        text = text.replace("../dbc", str(ROOT / "dbc"))
-        self.text = text.replace(BUS, "{ interface: virtual, channel: x }")
-        self.file.write_text(self.text, encoding="utf-8")
+        self.file = machine_file(folder, "forwarder", (BUS, "{ interface: virtual, channel: x }"))
+        self.text = self.file.read_text(encoding="utf-8")
         self._log = folder / "log"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind(str(folder / "notify"))

@@ -17,7 +17,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import Reason
 from tests.machine import protected_machine
-from tests.rigs.files import CONFIG, ROOT, Machine, read
+from tests.rigs.files import CONFIG, Machine, machine_file, read
 
 FLOAT = """
 BO_ 16 Joystick: 4 J
@@ -91,10 +91,8 @@ def test_a_joystick_that_may_stand_for_long_is_not_frozen(machine: Machine) -> N
 
 
 def test_the_switch_that_is_pressed_is_the_enable(tmp_path: Path) -> None:
-    text = (CONFIG / "ecu-forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("[Enable, seat, crane_mode]", "[seat, Enable, crane_mode]")
-    path = tmp_path / "machine.yaml"
-    path.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
+    other = ("[Enable, seat, crane_mode]", "[seat, Enable, crane_mode]")
+    path = machine_file(tmp_path, "ecu-forwarder", other)
     claims = {name: one.claim for name, one in rehearsed_faults(load_deployment(path)).items()}
     assert claims["switch_off:seat"] == "ENABLE_LOST"
     assert claims["switch_off:crane_mode"] == "R2"

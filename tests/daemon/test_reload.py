@@ -9,7 +9,7 @@ from canshaper.daemon import daemon as module
 from canshaper.daemon import ports as service_ports
 from canshaper.errors import BusError
 from tests.daemon.bench import BUS, FOREIGN, SECOND, Bench
-from tests.rigs.forwarder import ROOT, TICK_NS
+from tests.rigs.forwarder import TICK_NS
 
 
 def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
@@ -105,9 +105,7 @@ def test_what_waits_on_a_bus_that_is_opened_again_is_read(
 ) -> None:
     """An emergency message comes once: before the old port closes, or while the new one is new."""
     caplog.set_level(logging.INFO, "canshaper")
-    text = (ROOT / "config" / "canopen-forwarder.yaml").read_text(encoding="utf-8")
-    bench.text = text.replace("../dbc", str(ROOT / "dbc"))
-    bench.file.write_text(bench.text, encoding="utf-8")
+    bench.become("canopen-forwarder")
     emergency = Frame("crane", 0xA0, False, bytes.fromhex("0380810000000000"))
     sleep = bench.sleep
 

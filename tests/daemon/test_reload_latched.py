@@ -12,7 +12,8 @@ from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason, State
 from tests.daemon.bench import FOREIGN, Bench
-from tests.rigs.forwarder import ROOT, Rig
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import Rig
 
 
 def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench) -> None:

@@ -9,7 +9,8 @@ from canshaper.gate.cycle import Standstill, longest_gap_ns
 from canshaper.gate.loop import run_at_deadlines
 from canshaper.shaping.states import State
 from tests.rigs.emergency import DBC, LAST, STOP
-from tests.rigs.forwarder import PATIENT, ROOT
+from tests.rigs.files import ROOT
+from tests.rigs.forwarder import PATIENT
 from tests.rigs.standing import MS, Machine, Make
 
 T_MS = 150

@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 from canshaper.campaign import work_results
 from canshaper.cli.app import app
-
-ROOT = Path(__file__).parents[2]
+from tests.rigs.files import ROOT, text_of
 
 
 def run(*words: str) -> tuple[int, str]:
@@ -79,9 +78,7 @@ def test_the_crane_is_the_one_of_set(figures: dict[tuple[str, str], dict[str, fl
 
 def short(folder: Path) -> Path:
     """Profiles on near-far alone, one of them shorter than half a swing."""
-    text = (ROOT / "config" / "j1939-profiles.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
-    slew, near_far = text.partition("  near_far:\n")[::2]
+    slew, near_far = text_of("j1939-profiles").partition("  near_far:\n")[::2]
     slew = re.sub(r"    profiles:\n(      \w+: .*\n)+", "", slew)
     taps = "taps: [2 x 0.1, 32 x 0.0125, 4 x 0.1]"
     near_far = re.sub(r"(quick: .*?)taps: \[.*?\], designed_for: {.*?} ", rf"\1{taps} ", near_far)

@@ -21,28 +21,28 @@ TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
     "CHANGELOG.md": 800,
-    "CONTRIBUTING.md": 560,
+    "CONTRIBUTING.md": 595,
     "README.md": 640,
     "SECURITY.md": 430,
     "docs/api.md": 150,
-    "docs/architecture.md": 310,
+    "docs/architecture.md": 330,
     "docs/calibration.md": 420,
-    "docs/campaign.md": 1135,
+    "docs/campaign.md": 1195,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 790,
     "docs/comparison.md": 610,
-    "docs/decisions.md": 895,
+    "docs/decisions.md": 907,
     "docs/deployment.md": 2245,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
-    "docs/export.md": 516,
+    "docs/export.md": 556,
     "docs/glossary.md": 400,
     "docs/guide.md": 1030,
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
-    "docs/machines.md": 980,
+    "docs/machines.md": 1040,
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
@@ -67,11 +67,11 @@ LINES = {
         5_018,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (66_336, "a new ability takes the room of an old one"),
-    "tests": (101_300, "one level for each behaviour"),
+    "canshaper": (66_323, "a new ability takes the room of an old one"),
+    "tests": (100_662, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (354, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

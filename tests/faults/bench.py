@@ -25,6 +25,7 @@ from canshaper.gate import cycle as io_cycle_module
 from canshaper.gate import loop as loop_module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.daemon.bench import Uncollected
 from tests.faults.guarded import Unrefused
 from tests.faults.machine import Key
 from tests.faults.rules import Rules
@@ -212,9 +213,8 @@ class Bench:
     def put(self, frame: Frame, now_ns: int) -> None:
         """A frame is on a bus."""
         if port := self._ports.get(frame.bus):
-            late = (
-                frame[:3] in self.rules.machine.valves or frame[:3] in self.rules.machine.statuses
-            )
+            machine = self.rules.machine
+            late = frame[:3] in machine.valves or frame[:3] in machine.statuses
             (port.late if late else port.waiting).append((frame, now_ns))
 
     def signal(self, number: int) -> None:
@@ -243,10 +243,10 @@ class Bench:
         yield time, "sleep", self.sleep
         yield module.signal, "signal", self._handlers.__setitem__
         yield ports_module, "open_port", self._open
-        yield reloads, "ConfigReload", self._read
+        yield reloads, "ConfigReload", lambda load: Read(load, self._polls)
         yield module, "Controller", Unrefused
         yield module, "Collector", Uncollected
-        yield control_module, "ControlServer", self._control
+        yield control_module, "ControlServer", lambda *_: self.control or Requests(self)
         yield gateway_module, "select", self
         yield gateway_module, "rules", _no_rules
         yield module, "lock_memory", lambda: None
@@ -255,12 +255,6 @@ class Bench:
     def _open(self, name: str, bus: Bus, *_: object) -> BenchPort:
         self._ports[name] = BenchPort(name, bus.channel, self)
         return self._ports[name]
-
-    def _read(self, load: Callable[[], Deployment]) -> "Read":
-        return Read(load, self._polls)
-
-    def _control(self, *_: object) -> "Requests":
-        return self.control or Requests(self)
 
 
 class Read:
@@ -295,14 +289,6 @@ class Requests:
         self._bench.requests.clear()
 
     def close(self) -> None: ...
-
-
-class Uncollected:
-    """This process is not the daemon's: its garbage is its own."""
-
-    def freeze(self) -> None: ...
-
-    def pause(self, now_ns: int) -> None: ...
 
 
 def _no_rules() -> None:

@@ -1,16 +1,28 @@
-"""Daemons that do one thing wrong each: the rules have to catch them all.
+"""Daemons and controllers that do one thing wrong each: rules and judge have to catch them all.
 
-They stand between the daemon and its buses, so they stay what they are however it is built.
+They stand between daemon and buses, so they stay what they are however it is built.
 """
 
 from collections.abc import Callable
+from typing import Protocol
 
 from canshaper.codec.frame import Frame
 from tests.faults.axis import Axis
+from tests.faults.axis_judge import TRIPPED
 from tests.faults.inputs import Joystick
 from tests.faults.machine import Machine
-from tests.faults.sequence import Sequence
 
+Change = Callable[[Frame], Frame | None]
+
+
+class Hooks(Protocol):
+    """Where frames can be changed, in and out."""
+
+    incoming: Change
+    outgoing: Change
+
+
+Lie = Callable[[Hooks, Machine], None]
 JOYSTICKS = "forwarder"
 
 
@@ -19,18 +31,18 @@ def _joystick(machine: Machine, frame: Frame) -> Joystick | None:
     return source if isinstance(source, Joystick) and len(frame.data) == source.length else None
 
 
-def _incoming(change: Callable[[Machine, Frame], Frame | None]) -> Callable[[Sequence], None]:
-    def lie(sequence: Sequence) -> None:
-        sequence.bench.incoming = lambda frame: change(sequence.machine, frame)
+def _incoming(change: Callable[[Machine, Frame], Frame | None]) -> Lie:
+    def lie(hooks: Hooks, machine: Machine) -> None:
+        hooks.incoming = lambda frame: change(machine, frame)
 
     return lie
 
 
-def _steps(change: Callable[[Axis, int], int]) -> Callable[[Sequence], None]:
+def _steps(change: Callable[[Axis, int], int]) -> Lie:
     """Every command changed."""
 
-    def lie(sequence: Sequence) -> None:
-        valves = sequence.machine.valves
+    def lie(hooks: Hooks, machine: Machine) -> None:
+        valves = machine.valves
 
         def changed(frame: Frame) -> Frame:
             if (axis := valves.get(frame[:3])) is None:
@@ -41,7 +53,7 @@ def _steps(change: Callable[[Axis, int], int]) -> Callable[[Sequence], None]:
             word += axis.valve.put(new) - axis.valve.put(raw)
             return frame._replace(data=word.to_bytes(len(frame.data), "little"))
 
-        sequence.bench.outgoing = changed
+        hooks.outgoing = changed
 
     return lie
 
@@ -49,7 +61,7 @@ def _steps(change: Callable[[Axis, int], int]) -> Callable[[Sequence], None]:
 def _enabled(machine: Machine, frame: Frame) -> Frame:
     """Enable is on, whatever the frame says."""
     joystick = _joystick(machine, frame)
-    if joystick is None or joystick.enable is None:
+    if joystick is None or joystick.enable is None or joystick.checksum:
         return frame
     word = int.from_bytes(frame.data, "little")
     word += joystick.enable.put(1) - joystick.enable.put(joystick.enable.get(word))
@@ -98,7 +110,7 @@ def _no_claim(machine: Machine, frame: Frame) -> Frame | None:
     return None if frame.extended and frame.can_id >> 8 & 0xFF00 == 0xEE00 else frame
 
 
-def _holds_on(sequence: Sequence) -> None:
+def _holds_on(hooks: Hooks, machine: Machine) -> None:
     """Neutral goes out a frame late."""
     last: dict[str, int] = {}
 
@@ -107,24 +119,23 @@ def _holds_on(sequence: Sequence) -> None:
         last[axis.name] = raw
         return raw if raw else before
 
-    _steps(late)(sequence)
+    _steps(late)(hooks, machine)
 
 
-def _counter_stands(sequence: Sequence) -> None:
+def _counter_stands(hooks: Hooks, machine: Machine) -> None:
     """The alive counter of a valve stands still now and then."""
-    valves = sequence.machine.valves
 
     def stands(frame: Frame) -> Frame:
-        if frame[:3] not in valves or frame.data[1] % 50 != 49:
+        if frame[:3] not in machine.valves or frame.data[1] % 50 != 49:
             return frame
         return frame._replace(data=frame.data[:1] + bytes([frame.data[1] - 1]))
 
-    sequence.bench.outgoing = stands
+    hooks.outgoing = stands
 
 
-def _checksum_wrong(sequence: Sequence) -> None:
+def _checksum_wrong(hooks: Hooks, machine: Machine) -> None:
     """A gateway's frame leaves with another checksum, where it moves."""
-    axes = {axis.valve_key: axis for axis in sequence.machine.axes.values()}
+    axes = {axis.valve_key: axis for axis in machine.axes.values()}
 
     def spoiled(frame: Frame) -> Frame:
         if frame[:3] not in axes or not axes[frame[:3]].sent(frame.data)[0]:
@@ -133,10 +144,48 @@ def _checksum_wrong(sequence: Sequence) -> None:
         data = frame.data[:at] + bytes([frame.data[at] ^ 1]) + frame.data[at + 1 :]
         return frame._replace(data=data)
 
-    sequence.bench.outgoing = spoiled
+    hooks.outgoing = spoiled
 
 
-LIES: dict[str, tuple[str, Callable[[Sequence], None]]] = {
+def _no_stop(machine: Machine, frame: Frame) -> Frame:
+    """The emergency stop is heard and taken for free."""
+    stop = machine.stop
+    if stop is None or frame[:3] != stop.key or len(frame.data) != stop.length:
+        return frame
+    assert stop.counter
+    count = stop.counter.get(int.from_bytes(frame.data, "little"))
+    return frame._replace(data=stop.data({stop.counter.name: count}))
+
+
+def _left_out(hooks: Hooks, machine: Machine) -> None:
+    """A frame of a valve is left out now and then."""
+    hooks.outgoing = lambda frame: (
+        None if frame[:3] in machine.valves and frame.data[1] % 60 == 59 else frame
+    )
+
+
+def _untold(hooks: Hooks, machine: Machine) -> None:
+    """A trip is not reported."""
+    hooks.outgoing = lambda frame: (
+        None if frame[:3] in machine.statuses and frame.data[0] & 0xF == TRIPPED else frame
+    )
+
+
+def _never_back(hooks: Hooks, machine: Machine) -> None:
+    """Each valve stays neutral for good once it has moved and stopped."""
+    moved, over = set[str](), set[str]()
+
+    def neutral(axis: Axis, raw: int) -> int:
+        if raw:
+            moved.add(axis.name)
+        elif axis.name in moved:
+            over.add(axis.name)
+        return 0 if axis.name in over else raw
+
+    _steps(neutral)(hooks, machine)
+
+
+LIES: dict[str, tuple[str, Lie]] = {
     "enable forced": (JOYSTICKS, _incoming(_enabled)),
     "error code unseen": (JOYSTICKS, _incoming(_no_error)),
     "another sender unseen": (JOYSTICKS, _incoming(_no_others)),
@@ -151,4 +200,14 @@ LIES: dict[str, tuple[str, Callable[[Sequence], None]]] = {
     "creeps": (JOYSTICKS, _steps(lambda axis, raw: raw or round(axis.deadband * axis.steps) + 1)),
     "checksum wrong": ("gateway-protected", _checksum_wrong),
     "never moves": (JOYSTICKS, _steps(lambda _, __: 0)),
+}
+# Of a controller: what is a lie of frames alone, and what only the judge sees.
+OF_FRAMES = ("enable forced", "another sender unseen", "neutral late", "counter stands")
+OF_FRAMES += ("a little too fast", "wrong way", "creeps")
+JUDGED: dict[str, Lie] = {
+    **{name: LIES[name][1] for name in OF_FRAMES},
+    "stop unseen": _incoming(_no_stop),
+    "frame left out": _left_out,
+    "trip untold": _untold,
+    "never back": _never_back,
 }

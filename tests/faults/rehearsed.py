@@ -20,9 +20,9 @@ from canshaper.machine.binding import load_deployment
 from tests.faults.bench import Bench, Loader
 from tests.faults.machine import Machine
 from tests.faults.rules import Rules
-from tests.faults.shipped import CONFIG, directory
-from tests.faults.variants import ROOT
+from tests.faults.shipped import directory
 from tests.faults.world import World
+from tests.rigs.files import text_of
 
 CONTROL = "\ncontrol:\n  rehearse_faults: true\n"
 HALF = 0.5
@@ -34,8 +34,7 @@ Hand = Callable[["Rehearsed", float], tuple[int, int, float]]
 @functools.cache
 def slow_file(name: str) -> Path:
     """A shipped deployment at reduced speed, which allows rehearsed faults."""
-    text = (CONFIG / f"{name}.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
+    text = text_of(name)
     text = re.sub(r"(\n *|[{ ])(rise_per_s: [125])(?=[,\n])", r"\1max_pct: 40,\1\2", text)
     text = re.sub(r"(max_pct: 40),(?=\n)", r"\1", text).replace("max_pct: 50", "max_pct: 40")
     path = Path(directory().name) / f"{name}-rehearsed.yaml"

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from canshaper.config.load import load_config
 from tests.faults.machine import Machine
-from tests.faults.variants import COUNTER, JOYSTICK_COUNTER, ROOT, Variant, write
+from tests.faults.variants import COUNTER, JOYSTICK_COUNTER, Variant, write
+from tests.rigs.files import ROOT, text_of
 
 CONFIG = ROOT / "config"
 NAMES = (
@@ -36,6 +37,7 @@ NAMES = (
     "forwarder-pump",
     "forwarder-load",
     "bridge-crane",
+    "bridge-crane-hook",
     "excavator",
     "multicopter",
     "tower-crane",
@@ -89,7 +91,7 @@ def shipped(name: str) -> Shipped:
     ranges = _ranges(machine)
     numbers = "".join(f"    {key}: [{low}, {high}]\n" for key, (low, high) in ranges.items())
     control = f"\ncontrol:\n  adjustable:\n{numbers}"
-    text = file.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    text = text_of(file)
     changed = text.replace("rise_per_s: 5,", "max_pct: 70, rise_per_s: 4,")
     changed = changed.replace("rise_per_s: 1,", "max_pct: 70, rise_per_s: 0.8,")
     assert "max_pct: 70" in changed

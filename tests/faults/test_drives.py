@@ -6,15 +6,17 @@ One again, tick by tick: ``python -m tests.faults SEED --trace``.
 import itertools
 import random
 from collections import Counter
+from collections.abc import Callable
 
 import pytest
 
+from canshaper.controller.controller import Controller
 from tests.faults import inject
 from tests.faults.drive import Drive, plan
 from tests.faults.fields import CHECKSUMS
 from tests.faults.inputs import Input
 from tests.faults.judge import Violation
-from tests.faults.liars import LIARS, Honest, SecondSenderUnseen, SendFailureUnseen, StopUnseen
+from tests.faults.lies import JUDGED
 from tests.faults.variants import NAMES, machine
 
 DRIVES = 10_000
@@ -22,7 +24,7 @@ CHUNK = 250
 # So many in ``make test``, in chunks of 15, and with the tests marked slow; the others are a study.
 QUICK, OFTEN = 150, 2_500
 # Seen after many drives.
-RARE = {SecondSenderUnseen, SendFailureUnseen, StopUnseen}
+RARE = {"another sender unseen", "send failure unseen", "stop unseen"}
 
 
 def driven(first: int, count: int) -> Counter[str]:
@@ -73,20 +75,49 @@ def test_every_fault_is_among_them_often() -> None:
     assert at_once > DRIVES / 4
 
 
+def silence_unseen(drive: Drive) -> None:
+    for joystick in drive.controller.joysticks.values():
+        joystick._timeout_ns = 10**18
+
+
+def stall_unseen(drive: Drive) -> None:
+    drive.controller.stalled = lambda: None
+
+
+def send_failure_unseen(drive: Drive) -> None:
+    """Frames that did not go out are counted, and no more."""
+    failed, valves = drive.controller.send_failed, drive.machine.valves
+    drive.controller.send_failed = lambda frame: failed(
+        frame._replace(can_id=0x7F0) if frame[:3] in valves else frame
+    )
+
+
+def not_neutral_at_the_end(drive: Drive) -> None:
+    last = drive.controller.neutral_frames
+    drive.controller.neutral_frames = lambda: [f._replace(data=b"\x0a\0") for f in last()]
+
+
+LIARS: dict[str, Callable[[Drive], None]] = {
+    one.__name__.replace("_", " "): one
+    for one in (silence_unseen, stall_unseen, send_failure_unseen, not_neutral_at_the_end)
+}
+LIARS |= {n: lambda drive, lie=lie: lie(drive, drive.machine) for n, lie in JUDGED.items()}
+
+
 @pytest.mark.parametrize(
-    "liar",
-    [pytest.param(one, marks=pytest.mark.slow) if one in RARE else one for one in LIARS],
-    ids=lambda liar: liar.__name__,
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in RARE else n for n in LIARS]
 )
-def test_the_judge_catches(liar: type[Honest]) -> None:
-    """Each of these does one thing wrong; an honest one in the same drives does nothing wrong."""
+def test_the_judge_catches(name: str) -> None:
+    """Each of these does one thing wrong; in the same drive without it nothing is."""
     for seed in itertools.count():
         assert seed < 300, "not caught"
+        drive = Drive(seed, Controller)
+        LIARS[name](drive)
         try:
-            Drive(seed, liar).run()
+            drive.run()
         except Violation:
             break
-    Drive(seed, Honest).run()
+    Drive(seed, Controller).run()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -5,14 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.commissioning.procedure.rehearsed import (
-    GOOD,
-    NEVER,
-    UNDONE,
-    Row,
-    reaction_of,
-    refused,
-)
+from canshaper.commissioning.procedure import rehearsed as procedure
+from canshaper.commissioning.procedure.rehearsed import GOOD, NEVER, UNDONE, Row, reaction_of
 from canshaper.config.bus import REDUCED_PCT
 from canshaper.daemon.rehearsal import fault, rehearsal
 from canshaper.daemon.rehearsal.fault import no_more, takes_back
@@ -85,7 +79,7 @@ def test_every_row_is_rehearsed_somewhere_or_says_why_not() -> None:
     claims = {claim for row in reactions.ROWS for claim in row.ids.split(", ")}
     assert made.isdisjoint(NEVER)
     assert claims - made == NEVER.keys() | {"JOYSTICK_NOT_A_NUMBER"}  # no shipped one has a float
-    here = refused(load_deployment(slow_file("forwarder")))
+    here = procedure.refused(load_deployment(slow_file("forwarder")))
     assert here["R3"] == NEVER["R3"]
     assert here["VALVE_FAULT"] == "no part of this machine can have it"
 

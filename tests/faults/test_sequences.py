@@ -5,7 +5,6 @@ More, and one again: ``python -m tests.faults SEED --deployment NAME``.
 
 import random
 from collections import Counter
-from collections.abc import Callable
 from typing import Any
 from unittest.mock import patch
 
@@ -16,7 +15,7 @@ from canshaper.controller.controller import Controller
 from canshaper.shaping.demands import FlowBudget
 from tests.faults import later
 from tests.faults.judge import Violation
-from tests.faults.lies import LIES
+from tests.faults.lies import LIES, Lie
 from tests.faults.sequence import ACTS, LATER, SENDING, Sequence, kinds_for
 from tests.faults.shipped import CONFIG, MADE, NAMES, shipped
 
@@ -91,16 +90,16 @@ def test_every_fault_is_among_them_often() -> None:
 )
 def test_the_rules_catch(lie: str) -> None:
     """Each is one thing wrong; in the same sequence without it nothing is."""
-    name, apply = LIES[lie]
-    seed = _caught(name, apply)
+    name, _ = LIES[lie]
+    seed = _caught(*LIES[lie])
     Sequence(name, seed).run()
 
 
-def _caught(name: str, apply: Callable[[Sequence], None]) -> int:
+def _caught(name: str, lie: Lie) -> int:
     """The first sequence in which it is seen."""
     for seed in range(MOST):
         sequence = Sequence(name, seed)
-        apply(sequence)
+        lie(sequence.bench, sequence.machine)
         try:
             sequence.run()
         except Violation:
@@ -113,7 +112,7 @@ def _caught(name: str, apply: Callable[[Sequence], None]) -> int:
 def test_the_rules_catch_what_the_controller_does_not_do(method: str) -> None:
     """A reload that forgets; a standstill, or a frame that was not sent, that does not matter."""
     with patch.object(Controller, method, lambda *_: None):
-        seed = _caught("forwarder", lambda _: None)
+        seed = _caught("forwarder", lambda *_: None)
     Sequence("forwarder", seed).run()
 
 
@@ -132,7 +131,7 @@ def test_the_rules_catch_a_budget_or_an_end_stop_that_is_none(
     where: Any, name: str, wrong: Any
 ) -> None:
     with patch.object(where, name, wrong):
-        seed = _caught("forwarder-pump", lambda _: None)
+        seed = _caught("forwarder-pump", lambda *_: None)
     Sequence("forwarder-pump", seed).run()
 
 

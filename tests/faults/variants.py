@@ -11,8 +11,7 @@ from pathlib import Path
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.faults.machine import Machine
-
-ROOT = Path(__file__).parents[2]
+from tests.rigs.files import ROOT
 
 LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, stop_s: 2.0"
 ROBUST_LIMITS = LIMITS.replace(

@@ -8,8 +8,8 @@ from canshaper.controller.controller import Controller
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = ("forwarder", "forwarder-robust", "forwarder-joints")
 SMALL = "small"
 

@@ -9,7 +9,8 @@ from canshaper.codec.frame import Frame
 from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.shaping.states import State
 from tests.rigs.emergency import PRESSED, READY, Machine
-from tests.rigs.forwarder import PATIENT, ROOT, SLOW_VALVE, TICK_NS, Rig
+from tests.rigs.files import machine_file
+from tests.rigs.forwarder import PATIENT, SLOW_VALVE, TICK_NS, Rig
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
@@ -92,11 +93,8 @@ def test_an_emergency_stop_of_a_standstill_is_latched(changed_rig: Make) -> None
 def test_in_j1939_it_is_known_by_its_group_and_source_at_any_priority(
     tmp_path: Path, source: int, counts: bool
 ) -> None:
-    shipped = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
     stop = "{ bus: crane, message: BJM3, signal: Button1, timeout_ms: 100, source: 0x33 }"
-    text = shipped.replace("../dbc", str(ROOT / "dbc")) + f"emergency_stop: {stop}\n"
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
-    rig = J1939Rig(tmp_path / "machine.yaml")
+    rig = J1939Rig(machine_file(tmp_path, "j1939-forwarder", more=f"emergency_stop: {stop}\n"))
     rig.controller.stalled()
     for pressed in (1, 0):
         rig.receive(bjm("BJM2", 0x33), bjm("BJM3", source, 6, Button1=pressed))

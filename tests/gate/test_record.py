@@ -9,18 +9,14 @@ import pytest
 from canshaper.gate.build import _valve_key, record_of
 from canshaper.gate.signals import start_of
 from canshaper.machine.binding import load_deployment
-from tests.faults import shipped
 from tests.gate.bench import load
 from tests.gate.test_decoder import message
-from tests.rigs.files import Machine
+from tests.rigs.files import Machine, machine_file
 
 
 def test_a_motion_of_slew_alone_moves_nothing_else(tmp_path: Path) -> None:
-    text = (shipped.CONFIG / "forwarder.yaml").read_text(encoding="utf-8")
-    file = tmp_path / "machine.yaml"
     motion = "motion: { crane: { slew: slew } }\n"
-    file.write_text(text.replace("../dbc", str(shipped.CONFIG.parent / "dbc")) + motion)
-    axes = record_of(load_deployment(file)).axes
+    axes = record_of(load_deployment(machine_file(tmp_path, "forwarder", more=motion))).axes
     assert axes["slew"].added == 0.25
     assert axes["near_far"].added == 0.0
     assert {axis.partner for axis in axes.values()} == {""}

@@ -10,6 +10,7 @@ from pathlib import Path
 import can
 
 from tests.hil.machine import ANSWER_S, FILE, Service, service
+from tests.rigs.files import machine_file
 
 GATEWAY = FILE.with_name("gateway-forwarder.yaml")
 NEAR, FAR = "vcan0", "vcan1"
@@ -18,13 +19,7 @@ BATCH = 40  # a bus carries so many in 20 ms, a receive queue some more
 
 
 def write(folder: Path, *changes: tuple[str, str], base: Path = GATEWAY) -> Path:
-    text = base.read_text().replace("../dbc", str(FILE.parents[1] / "dbc"))
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    file = folder / "gateway.yaml"
-    file.write_text(text)
-    return file
+    return machine_file(folder, base, *changes)
 
 
 def rules(file: Path, state: str, code: int = 0) -> str:

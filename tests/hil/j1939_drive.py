@@ -18,7 +18,8 @@ from typing import Any
 import cantools
 import yaml
 
-from tests.hil.machine import ANSWER_S, ROOT, candump, logged, service
+from tests.hil.machine import ANSWER_S, candump, logged, service
+from tests.rigs.files import ROOT
 
 FILE = ROOT / "config" / "j1939-forwarder.yaml"
 GROUP_MASK = 0x03FFFF00  # data page, group and destination: from whatever source, of any priority

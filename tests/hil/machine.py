@@ -14,7 +14,8 @@ from pathlib import Path
 import can
 import cantools
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.rigs.files import ROOT
+
 FILE = ROOT / "config" / "forwarder.yaml"
 DBC = cantools.database.load_file(ROOT / "dbc" / "forwarder.dbc")
 DBC.add_dbc_file(ROOT / "dbc" / "sway-sensor.dbc")

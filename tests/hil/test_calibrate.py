@@ -18,6 +18,7 @@ from tests.hil.machine import (
     open_bus,
     service,
 )
+from tests.rigs.files import machine_file
 
 VALVES = {DBC.get_message_by_name(f"{a}Command").frame_id for a in ("Slew", "NearFar", "Lift")}
 QUICK = ["--axis", "slew", "--rate", "10", "--top", "15", "--live", "--yes"]
@@ -25,9 +26,7 @@ QUICK = ["--axis", "slew", "--rate", "10", "--top", "15", "--live", "--yes"]
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    copy = tmp_path / "machine.yaml"
-    copy.write_text(FILE.read_text().replace("../dbc", str(FILE.parents[1] / "dbc")))
-    return copy
+    return machine_file(tmp_path, FILE)
 
 
 def moving(message: can.Message) -> bool:

@@ -13,7 +13,8 @@ import pytest
 from crccheck.crc import Crc8Autosar
 
 from tests.hil.gateway import DAEMON, FAR, NEAR, STOP, drain, in_the_line
-from tests.hil.machine import ANSWER_S, ROOT, candump, logged, service
+from tests.hil.machine import ANSWER_S, candump, logged, service
+from tests.rigs.files import ROOT
 
 FILE = ROOT / "config" / "canfd-forwarder.yaml"
 DBC = cantools.database.load_file(ROOT / "dbc" / "canfd.dbc")

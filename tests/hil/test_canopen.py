@@ -22,7 +22,8 @@ from tests.hil.canopen_nodes import (
     Machine,
     machine_on,
 )
-from tests.hil.machine import ANSWER_S, ROOT, Service, candump, logged, open_bus, service
+from tests.hil.machine import ANSWER_S, Service, candump, logged, open_bus, service
+from tests.rigs.files import ROOT, machine_file
 
 FILE = ROOT / "config" / "canopen-forwarder.yaml"
 # An emulated machine stands still now and then, for longer than a joystick of 20 ms may.
@@ -49,13 +50,7 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """The shipped deployment with more patience."""
-    text = FILE.read_text().replace("../dbc", str(ROOT / "dbc"))
-    for old, new in PATIENCE:
-        assert old in text
-        text = text.replace(old, new)
-    changed = tmp_path / "machine.yaml"
-    changed.write_text(text)
-    return changed
+    return machine_file(tmp_path, FILE, *PATIENCE)
 
 
 @pytest.fixture

@@ -21,7 +21,8 @@ from tests.hil.canopen_nodes import (
 )
 from tests.hil.j1939_drive import set_points
 from tests.hil.j1939_nodes import Joysticks
-from tests.hil.machine import ANSWER_S, ROOT, Service, candump, logged, service
+from tests.hil.machine import ANSWER_S, Service, candump, logged, service
+from tests.rigs.files import text_of
 
 SHIPPED = {
     "canopen-sensor": Parts(VALVE, inclinometer=0x30),
@@ -101,7 +102,7 @@ class Deployment:
 
 def patient(name: str, folder: Path) -> Path:
     """The shipped deployment with more patience."""
-    text = (ROOT / "config" / f"{name}.yaml").read_text().replace("../dbc", str(ROOT / "dbc"))
+    text = text_of(name)
     for old, new in PATIENCE:
         text, count = re.subn(old, new, text)
         assert count, old

@@ -13,7 +13,6 @@ import pytest
 from tests.hil.machine import (
     DBC,
     FILE,
-    ROOT,
     VALVES,
     Service,
     candump,
@@ -23,6 +22,7 @@ from tests.hil.machine import (
     service,
     wait_for,
 )
+from tests.rigs.files import ROOT, text_of
 
 # What an emulated processor that is late makes the daemon say, rightly.
 LATE = re.compile(r"from=ACTIVE reason=(LOOP_\w+|\w*JOYSTICK_TIMEOUT|ENABLE_LOST)")
@@ -62,8 +62,7 @@ def test_joystick_and_valves_on_different_buses(
     can_pairs: tuple[tuple[str, str], tuple[str, str]], tmp_path: Path
 ) -> None:
     (joystick, joystick_far), (valve, valve_far) = can_pairs
-    text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
-    text = text.replace(
+    text = text_of(FILE).replace(
         "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
         "  joy: { interface: socketcan, channel: can0 }\n"
         "  crane: { interface: socketcan, channel: can2 }",

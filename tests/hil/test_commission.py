@@ -18,13 +18,13 @@ from canshaper.machine.binding import load_deployment
 from tests.hil.machine import (
     ANSWER_S,
     DBC,
-    FILE,
     VALVES,
     Joysticks,
     joysticks_on,
     open_bus,
     service,
 )
+from tests.rigs.files import machine_file
 
 DONE = ("buses", "joysticks", "check", "dry", "motion", "drive", "report")
 # What takes minutes, and has tests of its own.
@@ -109,9 +109,7 @@ class Person:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """A crane with a sway sensor, whose swing was identified before."""
-    root, copy = FILE.parents[1], tmp_path / "machine.yaml"
-    text = (root / "config" / "forwarder-sensor.yaml").read_text()
-    copy.write_text(text.replace("../dbc", str(root / "dbc")))
+    copy = machine_file(tmp_path, "forwarder-sensor")
     skipped = {name: Record(Status.SKIPPED, why="left out") for name in SKIPPED}
     write_state(Files(copy).state, State(steps=skipped))
     return copy

@@ -15,7 +15,6 @@ import pytest
 from tests.hil.machine import (
     ANSWER_S,
     FILE,
-    ROOT,
     Service,
     candump,
     drive,
@@ -26,6 +25,7 @@ from tests.hil.machine import (
     service,
     wait_for,
 )
+from tests.rigs.files import machine_file
 
 OTHER_CRANE = "vcan1"
 JOYSTICKS = {"JoystickLeft", "JoystickRight"}
@@ -50,12 +50,7 @@ def place_of(name: str) -> str:
 def deployment(folder: Path, channel: str, place: str) -> Path:
     """The shipped machine on the controller at that place."""
     match = f'match: {{ path: "pci-{place}", driver: kvaser_pci, bitrate: 250000 }}'
-    text = FILE.read_text().replace("../dbc", str(ROOT / "dbc"))
-    file = folder / "machine.yaml"
-    changed = text.replace("channel: vcan0,", f"channel: {channel}, {match},")
-    assert changed != text
-    file.write_text(changed)
-    return file
+    return machine_file(folder, FILE, ("channel: vcan0,", f"channel: {channel}, {match},"))
 
 
 @contextmanager

@@ -14,8 +14,9 @@ import can
 import pytest
 
 from tests.hil.driven import drive
-from tests.hil.machine import ANSWER_S, FILE, ROOT, joysticks_on, open_bus, service, wait_for
+from tests.hil.machine import ANSWER_S, FILE, joysticks_on, open_bus, service, wait_for
 from tests.hil.slcan import ACTIVE, BUS_OFF, Adapter, adapter
+from tests.rigs.files import ROOT, machine_file
 
 FD_FILE = ROOT / "config/canfd-forwarder.yaml"
 
@@ -30,11 +31,7 @@ def tc(*words: str) -> None:
 
 def changed(file: Path, folder: Path, old: str, new: str) -> str:
     """A shipped file with a change, in a folder of its own."""
-    text = file.read_text().replace("../dbc", str(ROOT / "dbc"))
-    assert old in text
-    copy = folder / file.name
-    copy.write_text(text.replace(old, new))
-    return str(copy)
+    return str(machine_file(folder, file, (old, new)))
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.config.load import load_config
 from canshaper.inputs.value import ProfileSwitch, ValueInput, profile_names
-from tests.rigs.j1939 import ROOT
+from tests.rigs.files import ROOT
 
 
 class Display:

@@ -64,6 +64,9 @@ def test_a_frame_of_another_length_is_no_radius(changed_rig: Make, length: int) 
     data = (frame(message, 1500) + bytes(2))[:length]
     assert radius.receive(data, NOW_NS) is FrameFault.WRONG_LENGTH
     assert radius.fresh(NOW_NS) is None
+    radius.receive(frame(message, 1500), NOW_NS)
+    assert radius.receive(data, NOW_NS + 1) is FrameFault.WRONG_LENGTH
+    assert radius.fresh(NOW_NS + TIMEOUT_NS + 1) is None
 
 
 def test_it_is_known_until_its_timeout_and_not_a_nanosecond_longer(changed_rig: Make) -> None:

@@ -8,7 +8,7 @@ import pytest
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.machine.binding import load_deployment
-from tests.rigs.forwarder import ROOT
+from tests.rigs.files import ROOT
 
 FILE = ROOT / "config" / "forwarder-sensor.yaml"
 

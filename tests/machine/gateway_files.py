@@ -7,8 +7,7 @@ import pytest
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-
-ROOT = Path(__file__).parents[2]
+from tests.rigs.files import ROOT
 
 
 def load(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> Deployment:

@@ -114,13 +114,7 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
             "joysticks.left.anti_sway_off: expected a free signal, got 'Enable', which is enable"
             " already",
         ),
-        # times and filters
-        (
-            "timeout_ms: 100",
-            "timeout_ms: 39",
-            "joysticks.left.timeout_ms: expected 40 ms or more, twice the cycle of JoystickLeft,"
-            " got 39",
-        ),
+        # filters
         (
             "a1: 0.708, a2: 0.12",
             "poles_rad_s: [-3, -51]",

@@ -5,13 +5,11 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.layout import FD_LENGTHS
-from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from tests.machine.gateway_files import problems as gateway_problems
-from tests.rigs.files import Machine
+from tests.rigs.files import ROOT, Machine, faults, machine_file
 from tests.rigs.sent import command_frame
 
-ROOT = Path(__file__).parents[2]
 FD = 'BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","J1939PG","StandardCAN_FD";\n'
 FD += 'BA_DEF_DEF_ "VFrameFormat" "StandardCAN";\n'
 
@@ -117,15 +115,9 @@ def test_what_cannot_be_a_bus_of_can_fd(machine: Machine, new: str, where: str, 
 
 
 def test_j1939_is_classical(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
-    assert "bitrate: 250000" in text
-    file = tmp_path / "machine.yaml"
-    file.write_text(
-        text.replace("../dbc", str(ROOT / "dbc")).replace("bitrate: 250000", "fd: true", 1)
-    )
-    with pytest.raises(ConfigError, match="expected none on a bus of j1939") as caught:
-        load_deployment(file)
-    assert len(caught.value.problems) == 1
+    file = machine_file(tmp_path, "j1939-forwarder", ("bitrate: 250000", "fd: true"))
+    (fault,) = faults(file)
+    assert "expected none on a bus of j1939" in fault
 
 
 FD_MACHINE = ("channel: vcan1, bitrate: 250000", "channel: vcan1, bitrate: 250000, fd: true")

@@ -1,7 +1,5 @@
 """DBC files as they are: faults of messages that are not used, and how one is read later."""
 
-from collections.abc import Iterator
-
 import pytest
 from typer.testing import CliRunner
 
@@ -49,29 +47,6 @@ def test_a_fault_of_a_message_that_is_not_used_is_a_warning(
     assert count == 1
     assert str(warning).startswith(f"{machine.directory}/machine.dbc:{first + line - 1}: ")
     assert says in str(warning)
-
-
-def with_signals(*signals: str) -> Iterator[str]:
-    yield "BO_ 5 Other: 2 A"
-    for name in signals:
-        yield f' SG_ {name}@1+ (1,0) [0|0] "" A'
-
-
-@pytest.mark.parametrize(
-    "signals",
-    [
-        ("M M : 0|8", "A m0 : 8|8", "B m1 : 8|8"),
-        ("A : 8|8", "B m0 : 0|8", "C m1 : 0|8"),
-        ("M M : 0|4", "N m0M : 4|4", "B m1 : 4|8", "C m1 : 8|8"),  # which is of which is not known
-        ("M M : 0|4", "N m0M : 4|4", "O m1M : 4|4", "B m1 : 8|8", "C m1 : 8|8"),
-        (),
-    ],
-)
-def test_signals_that_exclude_each_other_may_overlap(
-    machine: Machine, signals: tuple[str, ...]
-) -> None:
-    machine.in_dbc("CM_ ", "\n".join(with_signals(*signals)) + "\n\nCM_ ")
-    assert machine.load().messages.warnings() == (0, [])
 
 
 def test_a_message_too_long_for_any_protocol_is_not_compared(machine: Machine) -> None:
@@ -159,6 +134,12 @@ def overlap(length: int, *signals: str) -> str | None:
     ("length", "signals"),
     [
         (1, ("A m0 : 0|8@1", "B m1 : 0|8@1")),
+        (2, ("M M : 0|8@1", "A m0 : 8|8@1", "B m1 : 8|8@1")),
+        (2, ("A : 8|8@1", "B m0 : 0|8@1", "C m1 : 0|8@1")),
+        # which is of which is not known
+        (2, ("M M : 0|4@1", "N m0M : 4|4@1", "B m1 : 4|8@1", "C m1 : 8|8@1")),
+        (2, ("M M : 0|4@1", "N m0M : 4|4@1", "O m1M : 4|4@1", "B m1 : 8|8@1", "C m1 : 8|8@1")),
+        (0, ()),
         (2, ("A m0 : 8|8@1", "B m0 : 0|8@1")),
         (2, ("A : 7|8@0", "B : 15|8@0")),
         (3, ("A : 7|8@0", "B : 15|8@0", "C : 23|8@0")),

@@ -11,7 +11,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.buses import BusLoad
 from canshaper.machine.deployment import Deployment
 from tests.controller.set_files import DBC, FAST, FAST_SETS, YAML
-from tests.rigs.files import ROOT, Machine
+from tests.rigs.files import ROOT, Machine, machine_file
 
 
 def shipped(name: str) -> Deployment:
@@ -155,22 +155,6 @@ def test_a_bus_without_a_message_has_no_load(machine: Machine) -> None:
     assert machine.load().load("boom") == BusLoad(0.0, 0)
 
 
-def test_the_load_is_not_known_without_a_bit_rate(machine: Machine) -> None:
-    machine.in_yaml(", bitrate: 250000", "")
-    assert machine.load().load("crane") is None
-
-
-def test_the_load_is_that_of_the_bit_rate(machine: Machine) -> None:
-    deployment = machine.load()
-    slow = deployment.load("crane")
-    machine.in_yaml("bitrate: 250000", "bitrate: 500000")
-    fast = machine.load().load("crane")
-    assert slow is not None
-    assert fast is not None
-    assert slow.share == pytest.approx(2 * fast.share)
-    assert slow.messages == fast.messages == 10
-
-
 # -- inputs and senders ----------------------------------------------------------------------------
 
 
@@ -240,13 +224,10 @@ def test_who_listens_keeps_the_machine_without_what_answers_commands() -> None:
 
 
 def test_who_listens_keeps_a_node_of_j1939_where_it_reports(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc"))
-    file = tmp_path / "machine.yaml"
-    file.write_text(text, encoding="utf-8")
+    file = machine_file(tmp_path, "j1939-forwarder")
     before = load_deployment(file)
     assert before.listening().config.buses == before.config.buses
-    file.write_text(re.sub(r"(?m)^ *(status|identity): .*\n", "", text), encoding="utf-8")
+    file.write_text(re.sub(r"(?m)^ *(status|identity): .*\n", "", file.read_text()))
     silent = load_deployment(file).listening()
     assert list(silent.config.buses) == ["crane"]
     bus = silent.config.buses["crane"]

@@ -108,14 +108,6 @@ def test_what_is_wrong_is_one_whole_line(switched: Machine, old: str, new: str, 
     assert says in problems, problems
 
 
-def test_a_place_in_a_list_of_two_has_its_number(machine: Machine) -> None:
-    machine.in_yaml("enable: Enable", "enable: [Enable, rihgt.Enable]")
-    (problem,) = machine.problems()
-    assert problem.partition(": ")[2] == (
-        f"{LEFT}.1: expected a joystick, got 'rihgt'; there are left, right"
-    )
-
-
 @pytest.mark.parametrize("text", ["rihgt.Enable", "[rihgt.Enable]"])
 def test_a_place_of_one_name_has_no_number(machine: Machine, text: str) -> None:
     machine.in_yaml("enable: Enable", f"enable: {text}")

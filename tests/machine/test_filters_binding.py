@@ -181,6 +181,29 @@ def test_a_filter_of_another_swing_says_how_to_cure_it(machine: Machine) -> None
     ]
 
 
+@pytest.mark.parametrize(
+    ("limits", "needs"),
+    [
+        ("", True),
+        ("reversal: brake_shaped, reversal_s: 2.1, ", True),
+        ("reversal: brake_shaped, reversal_s: 2.2, ", False),
+        ("allow_reverse: true, ", False),
+    ],
+)
+def test_a_second_mode_asks_for_a_reversal_that_lets_the_response_end(
+    machine: Machine, limits: str, needs: bool
+) -> None:
+    """2 s of response, and full speed falls by 5 a second."""
+    second = "second: { period_s: 0.6, damping_ratio: 0.1, length_range_pct: 20 }"
+    designed = f"{DESIGNED} period_s: 2.356, damping_ratio: 0.038, duration_s: 2, {second} }}"
+    machine.in_yaml(OWN, designed)
+    machine.in_yaml("limits: { ", f"limits: {{ {limits}")
+    text = "a reversal cuts the response off and makes this mode swing; write in limits"
+    says = f"{text} reversal: brake_shaped, reversal_s: 2.2"
+    place = "axes", "slew", "filter", "designed_for", "second"
+    assert list(unfit(machine.load().config)) == [(place, says)] * needs
+
+
 def test_a_filter_gets_the_rate_of_its_valve(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,16 +5,14 @@ from pathlib import Path
 import cantools
 import pytest
 
-from canshaper.checksums.kinds import Checksum
 from canshaper.codec.frame import EFF_FLAG
-from canshaper.codec.message import Protection
-from canshaper.codec.rewrite import RewrittenMessage, neutral_fault
-from canshaper.errors import ConfigError
+from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import AND, CS_CRC8, CS_XOR, OR
 from canshaper.protocols.gateway.rules import excluded, fallback_rules, passing_rules
-from tests.machine.gateway_files import ROOT, j1939_gateway, load, problems
+from tests.machine.gateway_files import j1939_gateway, load, problems
+from tests.rigs.files import ROOT, faults, machine_file
 
 SLEW = "bus: machine, message: JoystickLeft, signal: Slew, timeout_ms: 200,"
 COUNTER = "alive_counter: AliveCounter"
@@ -110,34 +108,14 @@ def test_an_ecu_that_waits_for_a_tick_longer_than_we_do_is_enough(tmp_path: Path
 
 
 def test_a_fallback_needs_a_joystick_that_is_passed_on(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "forwarder.yaml").read_text()
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace(
-        "\ndbc:", "  far: { interface: socketcan, channel: vcan1 }\n"
-        "gateway: { between: [crane, far], fallback: neutral }\ndbc:",
-    )  # fmt: skip
-    file = tmp_path / "machine.yaml"
-    file.write_text(text)
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(file)
-    assert [str(problem).partition(": ")[2] for problem in caught.value.problems] == [
+    far = (
+        "  far: { interface: socketcan, channel: vcan1 }\n"
+        "gateway: { between: [crane, far], fallback: neutral }\ndbc:"
+    )
+    assert faults(machine_file(tmp_path, "forwarder", ("\ndbc:", far))) == [
         "gateway.fallback: expected stop where no valve has the message of a joystick on the other"
         " bus, got neutral"
     ]
-
-
-@pytest.mark.parametrize(
-    ("kind", "byte", "possible"),
-    [
-        ("xor", 3, True),
-        ("sum", 7, False),
-        ("crc8_autosar", 0, True),
-        ("crc8_autosar", 7, True),
-        ("crc8_autosar", 6, False),
-    ],
-)
-def test_checksums_that_the_kernel_can_make(kind: str, byte: int, possible: bool) -> None:
-    fault = neutral_fault(Protection(check=Checksum(kind, byte)), 8)
-    assert (fault is None) == possible
 
 
 def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -> None:

@@ -1,14 +1,12 @@
 """A deployment is read by a process of its own: the daemon gets it as a pickle."""
 
 import pickle
-from pathlib import Path
 
 import pytest
 
 from canshaper.machine.binding import load_deployment
 from tests.faults.shipped import NAMES
-
-CONFIG = Path(__file__).parents[2] / "config"
+from tests.rigs.files import CONFIG
 
 
 @pytest.mark.parametrize("name", NAMES)

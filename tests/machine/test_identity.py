@@ -7,9 +7,7 @@ from importlib.metadata import EntryPoint, distribution
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.machine import identity as module
@@ -18,9 +16,9 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping import transfer
 from canshaper.shaping.registry import ADDED
+from tests.rigs.files import ROOT
 from tests.rigs.sent import status_frame
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = [
     path.name
     for path in sorted((ROOT / "config").glob("*.yaml"))
@@ -91,13 +89,6 @@ def test_every_shipped_deployment_sends_it(name: str) -> None:
     assert status.decode(frame.data) == {"Digest": deployment.identity.digest}
     assert frame[1:3] in deployment.routing.buses[frame.bus].sent
     assert status.decode(frame.data[:1]) is None
-
-
-def test_check_prints_it() -> None:
-    done = CliRunner().invoke(app, ["check", str(ROOT / "config" / "forwarder.yaml")])
-    identity = load_deployment(ROOT / "config" / "forwarder.yaml").identity
-    assert f"digest {identity.digest:#06x}" in done.output
-    assert identity.deployment in done.output
 
 
 def said(deployment: Deployment, *digests: int) -> list[str]:

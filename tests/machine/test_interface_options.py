@@ -95,12 +95,6 @@ def test_an_interface_that_python_can_does_not_have() -> None:
     ]
 
 
-def test_socketcan_has_none() -> None:
-    assert faults("socketcan", fd=True) == [
-        (("options",), "expected none with socketcan, which the system sets up, got some")
-    ]
-
-
 def test_two_buses_that_differ_in_an_option_are_two() -> None:
     first, second = (
         Bus(interface="socketcand", channel="can0", options={**CLIENT, "port": port})

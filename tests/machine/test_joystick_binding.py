@@ -25,16 +25,6 @@ def test_the_node_of_a_joystick_is_one_of_its_bus(machine: Machine) -> None:
     ]
 
 
-@pytest.mark.parametrize(("key", "text"), [("full", "full: 50"), ("invert", "invert: true")])
-def test_a_signal_means_the_same_to_two_axes(machine: Machine, key: str, text: str) -> None:
-    line = machine.in_yaml("signal: NearFar,", f"signal: Slew, {text},")
-    expected = (
-        f"machine.yaml:{line}: axes.near_far.command.{key}: expected the same as"
-        " axes.slew.command, which reads Slew too, got another"
-    )
-    assert expected in machine.problems()
-
-
 def test_a_multiplexed_joystick_is_read_from_the_chosen_frames(machine: Machine) -> None:
     machine.in_dbc(
         " SG_ Slew : 0|16", ' SG_ Page M : 40|4@1+ (1,0) [0|15] "" SHAPER\n SG_ Slew m3 : 0|16'

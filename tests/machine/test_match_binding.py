@@ -14,19 +14,16 @@ from canshaper.daemon.ports import open_ports
 from canshaper.errors import BusError, ConfigError, WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.bus.fake_devices import FakeDevices
+from tests.rigs.files import machine_file
 
-ROOT = Path(__file__).parents[2]
 ONE = "channel: vcan0, bitrate: 250000"
 TWO = "channel: vcan1, bitrate: 250000"
 
 
 def machine(folder: Path, first: str, second: str | None = None) -> Path:
     """Two cranes, with ``match`` put behind the bit rate of their buses."""
-    text = (ROOT / "config" / "two-cranes.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace(ONE, f"{ONE}, match: {first}")
-    file = folder / "machine.yaml"
-    file.write_text(text.replace(TWO, f"{TWO}, match: {second}" if second else TWO))
-    return file
+    changes = (ONE, f"{ONE}, match: {first}"), (TWO, f"{TWO}, match: {second}" if second else TWO)
+    return machine_file(folder, "two-cranes", *changes)
 
 
 def line_of(file: Path, text: str) -> int:

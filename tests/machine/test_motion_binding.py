@@ -74,6 +74,8 @@ def measured(**changes: str) -> str:
         ),
         (f"{FIXED}, radius: {{ {TIP} }}", ": expected one of radius and radius_m, got both"),
         ("slew: slew, radius_m: 3", ": expected near_far with a radius or an aim, got none"),
+        (f"{FIXED}, luffing: lift", ": expected luffing, luffing_rad_s and a radius together, got"),
+        (f"{FIXED}, luffing: lift, luffing_rad_s: 0.1", "expected an axis with sway, got 'lift'"),
         (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "expected 0.5 to 120 m, got 0.4"),
         (f"{FIXED}, max_pct: 51", ".max_pct: expected 1 to 50 % of full speed, got 51"),
         (f"{FIXED}, speed: 1", ".speed: expected one of the keys slew, near_far, radius"),
@@ -105,11 +107,6 @@ def test_what_does_not_fit_is_reported_with_its_line(
     assert problem.startswith(f"machine.yaml:{line}: motion.crane")
 
 
-def test_a_radius_in_the_joysticks_message_is_refused(machine: Machine) -> None:
-    moving(machine, measured(message="JoystickLeft", signal="Slew"))
-    assert any("which is used already by joysticks.left" in p for p in machine.problems())
-
-
 def test_an_axis_is_in_one_motion_only(machine: Machine) -> None:
     both = f"{{ a: {{ {FIXED} }}, b: {{ {FIXED} }} }}"
     line = machine.in_yaml("axes:\n", f"motion: {both}\naxes:\n")
@@ -118,13 +115,6 @@ def test_an_axis_is_in_one_motion_only(machine: Machine) -> None:
         f"machine.yaml:{line}: motion.b.slew: {text} 'slew' of motion.a.slew",
         f"machine.yaml:{line}: motion.b.near_far: {text} 'near_far' of motion.a.near_far",
     ]
-
-
-def test_slew_without_its_speed_is_refused(machine: Machine) -> None:
-    moving(machine, FIXED)
-    machine.in_yaml("    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n", "")
-    (problem,) = machine.problems()
-    assert "motion.crane.slew: expected an axis with slewing, got 'slew' without" in problem
 
 
 def test_a_full_speed_of_zero_is_refused(machine: Machine) -> None:
@@ -174,51 +164,6 @@ def radius_of(machine: Machine) -> RadiusInput:
 
 def tip(raw: int) -> bytes:
     return struct.pack("<hHh", 0, raw, 0)
-
-
-def test_it_counts_as_long_as_it_is_fresh(machine: Machine) -> None:
-    radius = radius_of(machine)
-    radius.receive(tip(3000), 5 * MS)
-    assert radius.fresh(105 * MS) == pytest.approx(3.0)
-    assert radius.fresh(105 * MS + 1) is None
-    radius.receive(tip(3100), 200 * MS)
-    assert radius.fresh(200 * MS) == pytest.approx(3.1)
-    radius.invalidate()
-    assert radius.fresh(200 * MS) is None
-
-
-@pytest.mark.parametrize(
-    ("data", "fault"),
-    [
-        (b"", FrameFault.WRONG_LENGTH),
-        (tip(3000)[:5], FrameFault.WRONG_LENGTH),
-        (tip(3000) + b"\0", FrameFault.WRONG_LENGTH),
-        (tip(60_001), FrameFault.INVALID_SIGNAL),
-        (tip(0xFFFF), FrameFault.INVALID_SIGNAL),
-    ],
-)
-def test_a_frame_that_is_no_radius_neither_counts_nor_refreshes(
-    machine: Machine, data: bytes, fault: FrameFault
-) -> None:
-    radius = radius_of(machine)
-    assert radius.receive(data, 0) is fault
-    assert radius.fresh(0) is None
-    radius.receive(tip(3000), 0)
-    assert radius.receive(data, 90 * MS) is fault
-    assert radius.fresh(100 * MS) == pytest.approx(3.0)
-    assert radius.fresh(101 * MS) is None
-
-
-def test_an_error_code_within_the_range_is_no_radius(machine: Machine) -> None:
-    machine.in_dbc(RADIUS, RADIUS.replace("[0|60]", "[0|65.535]"))
-    machine.in_dbc(
-        "VAL_ 272 Slew", 'VAL_ 1025 Radius 65534 "Error" 65535 "NotAvailable" ;\nVAL_ 272 Slew'
-    )
-    radius = radius_of(machine)
-    for raw in (65534, 65535):
-        assert radius.receive(tip(raw), 0) is FrameFault.INVALID_SIGNAL
-    assert radius.fresh(0) is None
-    assert radius.receive(tip(65533), 0) is FrameFault.NONE
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.1, 60.1])

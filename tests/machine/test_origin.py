@@ -13,16 +13,15 @@ from canshaper.config.bus import Bus
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.files import ROOT, text_of
 
-ROOT = Path(__file__).resolve().parents[2]
 MADE = "date: 2026-11-23, by: canshaper calibrate 0.1.0, source:"
 CURVE = "curve_command_pct: [-100, -5, 5, 100], curve_speed_pct: [-100, 0, 0, 100]"
 
 
 def machine(tmp_path: Path, *, curve: str = "", sway: str = "", channel: str = "can0") -> Path:
     """The shipped machine with origins."""
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace("vcan0", channel)
+    text = text_of("forwarder").replace("vcan0", channel)
     if curve:
         new = f"limits: {{ {CURVE}, curve_origin: {{ {MADE} {curve} }}"
         text = text.replace("limits: { deadband_pct: 5", new, 1)

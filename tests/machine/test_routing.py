@@ -9,8 +9,7 @@ from canshaper.config.bus import J1939, Bus, Canopen, CanopenNode, J1939Name
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import GroupRoute, Key, Role, Route, Routing, build_routing
-
-CONFIG = Path(__file__).parents[2] / "config"
+from tests.rigs.files import CONFIG, machine_file
 
 
 def machine(name: str) -> Deployment:
@@ -184,7 +183,6 @@ def test_only_the_two_buses_of_a_gateway_are_in_line() -> None:
 
 
 def test_groups_of_two_buses_of_j1939_do_not_mix(tmp_path: Path) -> None:
-    text = (CONFIG / "j1939-forwarder.yaml").read_text()
     name = "{ identity_number: 2, manufacturer_code: 2047 }"
     rear = f"""buses:
   rear:
@@ -197,13 +195,8 @@ def test_groups_of_two_buses_of_j1939_do_not_mix(tmp_path: Path) -> None:
         "buses:\n": rear,
         "bus: crane\n    message: BJM2": "bus: rear\n    message: BJM2",
         "bus: crane\n      message: AVC0": "bus: rear\n      message: AVC0",
-        "../dbc": str(CONFIG.parent / "dbc"),
     }
-    for old, new in changes.items():
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    file = tmp_path / "machine.yaml"
-    file.write_text(text)
+    file = machine_file(tmp_path, "j1939-forwarder", *changes.items())
     buses = load_deployment(file).routing.buses
     claims = {0xEE0000, 0xEA0000}
     bjm1, bjm2, feedback = 0xFDD600, 0xFDD800, {0xFE1000, 0xFE1100, 0xFE1200}

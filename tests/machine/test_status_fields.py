@@ -1,7 +1,6 @@
 """Fields of status messages: one declaration is enough, and no machine needs a new one."""
 
 import pickle
-from pathlib import Path
 
 import pytest
 
@@ -14,21 +13,11 @@ from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
+from tests.rigs.files import ROOT, Machine
 
-ROOT = Path(__file__).parents[2]
 ACTIVE_SET = "SG_ ActiveSet : 4|4@1+ (1,0) [0|15]"
 AT_REST = "SG_ AtRest : 4|1@1+ (1,0) [0|1]"
 FIELD: StatusField[status.ReportedAxis] = StatusField("AtRest", lambda one: one.axis.neutral, int)
-
-
-def machine(path: Path, old: str, new: str) -> Deployment:
-    """The shipped machine with a text of its DBC replaced in the status of its first axis."""
-    text = (ROOT / "dbc" / "forwarder.dbc").read_text()
-    assert old in text
-    (path / "forwarder.dbc").write_text(text.replace(old, new, 1))
-    file = path / "forwarder.yaml"
-    file.write_text((ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc/", ""))
-    return load_deployment(file)
 
 
 def shown(deployment: Deployment) -> tuple[dict[str, object], str]:
@@ -39,10 +28,11 @@ def shown(deployment: Deployment) -> tuple[dict[str, object], str]:
     return monitor.history.axes["slew"].values, screen(monitor, 0, 120, 40, plain=True).plain
 
 
-def test_a_field_added_from_outside_is_sent_decoded_and_shown(tmp_path: Path) -> None:
+def test_a_field_added_from_outside_is_sent_decoded_and_shown(machine: Machine) -> None:
+    machine.in_dbc(ACTIVE_SET, AT_REST)
     status.AXIS_STATUS.append(FIELD)
     try:
-        values, text = shown(machine(tmp_path, ACTIVE_SET, AT_REST))
+        values, text = shown(machine.load())
     finally:
         status.AXIS_STATUS.remove(FIELD)
     assert values["AtRest"] == 1
@@ -64,14 +54,16 @@ def test_its_absence_in_a_dbc_refuses_no_machine(name: str) -> None:
         assert axis.status is None or "AtRest" not in [one.name for one in axis.status.fields]
 
 
-def test_a_required_field_that_is_missing_is_named(tmp_path: Path) -> None:
+def test_a_required_field_that_is_missing_is_named(machine: Machine) -> None:
+    machine.in_dbc("SG_ PredictedSway", "SG_ Prediction")
     with pytest.raises(ConfigError, match="SlewStatus: lacks the signals PredictedSway"):
-        machine(tmp_path, "SG_ PredictedSway", "SG_ Prediction")
+        machine.load()
 
 
-def test_an_optional_field_that_cannot_carry_a_number_is_refused(tmp_path: Path) -> None:
+def test_an_optional_field_that_cannot_carry_a_number_is_refused(machine: Machine) -> None:
+    machine.in_dbc(ACTIVE_SET, ACTIVE_SET.replace("(1,0)", "(0,0)"))
     with pytest.raises(ConfigError, match="ActiveSet: expected an integer signal with a scale"):
-        machine(tmp_path, ACTIVE_SET, ACTIVE_SET.replace("(1,0)", "(0,0)"))
+        machine.load()
 
 
 def test_every_field_is_itself_in_a_reload() -> None:
@@ -80,19 +72,15 @@ def test_every_field_is_itself_in_a_reload() -> None:
         assert pickle.loads(pickle.dumps(field)) is field
 
 
-def test_a_status_that_is_multiplexed_or_missing(tmp_path: Path) -> None:
-    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text()
-    (tmp_path / "forwarder.dbc").write_text(dbc)
-    text = (ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc/", "")
-    line = next(line for line in text.splitlines() if "message: SlewStatus" in line)
-    file = tmp_path / "forwarder.yaml"
-    file.write_text(text.replace(line + "\n", ""))
-    axis = load_deployment(file).axes["slew"]
+def test_a_status_that_is_multiplexed_or_missing(machine: Machine) -> None:
+    line = "    status: { bus: crane, message: SlewStatus }\n"
+    machine.in_yaml(line, "")
+    axis = machine.load().axes["slew"]
     assert (axis.status, axis.status_ticks) == (None, 0)
-    file.write_text(text)
+    machine.in_yaml("    slewing:", f"{line}    slewing:")
     more = ' SG_ More m1 : 48|16@1- (1,0) [0|0] "" PLANT\n SG_ PredictedSway m0 :'
-    dbc = dbc.replace("SG_ ActiveSet :", "SG_ ActiveSet M :", 1)
-    (tmp_path / "forwarder.dbc").write_text(dbc.replace(" SG_ PredictedSway :", more, 1))
+    machine.in_dbc("SG_ ActiveSet :", "SG_ ActiveSet M :")
+    machine.in_dbc(" SG_ PredictedSway :", more)
     reason = "SlewStatus is multiplexed; without multiplexor nothing can be sent in it"
     with pytest.raises(ConfigError, match=reason):
-        load_deployment(file)
+        machine.load()

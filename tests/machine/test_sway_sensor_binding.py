@@ -5,11 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.errors import ConfigError
-from canshaper.machine.binding import load_deployment
 from canshaper.machine.sway_sensor import sensor_timing
 from canshaper.shaping.sway import Measured, SensorLimits, SensorTiming
-from tests.rigs.files import ROOT, Machine
+from tests.rigs.files import Machine, faults, machine_file
 
 ALONG = "bus: crane, message: GrappleSway, signal: SwayParallel, kind: angle, timeout_ms: 80"
 ACROSS = ALONG.replace("SwayParallel", "SwayPerpendicular")
@@ -241,14 +239,8 @@ def test_axes_may_read_messages_of_their_own(machine: Machine) -> None:
 
 
 def test_a_sensor_of_j1939_needs_a_known_source(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "j1939-sensor.yaml").read_text(encoding="utf-8")
     source = "      source: 0x19 # its address\n"
-    assert source in text
-    file = tmp_path / "machine.yaml"
-    file.write_text(text.replace("../dbc", str(ROOT / "dbc")).replace(source, ""))
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(file)
+    reported = faults(machine_file(tmp_path, "j1939-sensor", (source, "")))
     missing = "missing: in the DBC SSI2 may come from any source address"
     says = f"axes.slew.sway_sensor.source: {missing}; a sway sensor needs a known one"
-    reported = [str(one).partition(": ")[2] for one in caught.value.problems]
     assert [one for one in reported if "missing" in one] == [says]

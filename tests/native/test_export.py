@@ -17,7 +17,7 @@ from canshaper.cli.app import app
 from canshaper.cli.common import EXIT_WRONG
 from canshaper.machine.identity import program_sha256
 from tests.native.judge import needs_compiler
-from tests.rigs.files import CONFIG, ROOT, read
+from tests.rigs.files import CONFIG, machine_file, read
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -159,10 +159,8 @@ def test_what_c_has_no_part_for_is_refused_before_anything_is_written(tmp_path: 
 
 
 def test_a_stop_over_a_way_that_is_not_stated_is_refused(tmp_path: Path) -> None:
-    text = (ROOT / "config/forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc/", f"{ROOT}/dbc/").replace(", stop_distance_m: 4.7", "")
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
-    code, text = run(str(tmp_path / "machine.yaml"), "--out", str(tmp_path / "axis"))
+    file = machine_file(tmp_path, "forwarder", (", stop_distance_m: 4.7", ""))
+    code, text = run(str(file), "--out", str(tmp_path / "axis"))
     assert code == EXIT_WRONG
     assert "axes.slew.limits.stop_distance_m: missing: to stop, the limits allow" in text
 

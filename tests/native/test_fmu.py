@@ -174,6 +174,14 @@ def test_the_demo_through_both(
     assert differ_deg(swings, expected) <= NEAR_DEG
 
 
+def test_the_demo_with_the_plant_in_place_of_ours(
+    units: dict[str, Path], expected: list[tuple[float, float]]
+) -> None:
+    simulation = Simulation(ROBUST, SCRIPT, unit=units["plant"])
+    swings = [swing_deg(simulation.plant) for _ in simulation.ticks()]
+    assert differ_deg(swings, expected) <= NEAR_DEG
+
+
 def test_switches_states_and_steps(units: dict[str, Path], tmp_path: Path) -> None:
     with running(units["controller"], tmp_path) as slave:
         about = (slave.get("slew.state"), slave.get("slew.reason"))

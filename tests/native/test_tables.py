@@ -54,7 +54,7 @@ def test_every_key_of_the_file_is_in_the_tables_or_refused(pattern: Any) -> None
 
 def test_a_motion_has_no_other_key() -> None:
     known = {"slew", "near_far", "radius", "radius_m", "max_pct", "max_path_m", "max_s", "aim"}
-    assert set(Motion.model_fields) == known | {"waits"}
+    assert set(Motion.model_fields) == known | {"luffing", "luffing_rad_s", "waits"}
 
 
 def problems(machine: Machine) -> list[str]:

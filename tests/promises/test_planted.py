@@ -20,7 +20,8 @@ from tests.promises.worst import Worst
 SOME = ("forwarder", "forwarder-robust", "gateway-forwarder", "canfd-forwarder")
 # What is planted as right rises by 5 of full speed a second; those of cranes with a rope and the
 # multicopter may by less. The joints of the excavator are those of forwarder-joints.
-OTHERS = (*ALIKE, "bridge-crane", "tower-crane", "telehandler", "multicopter", "excavator")
+ROPES = ("bridge-crane", "bridge-crane-hook", "tower-crane", "telehandler", "multicopter")
+OTHERS = (*ALIKE, *ROPES, "excavator")
 MACHINES = ("forwarder", *(name for name in NAMES if name not in OTHERS))
 DIRECT = tuple(name for name in MACHINES if not name.startswith("gateway"))
 MOTION = ("forwarder-robust", "forwarder-pump")

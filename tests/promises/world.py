@@ -4,27 +4,20 @@ Frames are made and read by ``tests.faults``: plain YAML, and cantools for bits;
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
-from canshaper.machine.binding import load_deployment
-from canshaper.machine.deployment import Deployment
-from tests.faults.fields import Field
-from tests.faults.machine import Key, Machine
-from tests.faults.sealed import sealed
-from tests.faults.shipped import CONFIG, NAMES
+from tests.faults.machine import Key
+from tests.faults.shipped import NAMES
 from tests.promises.seen import Buses
+from tests.promises.valve_frames import ValveFrames
 
 REST = 25  # ticks until claims, nodes and neutral are seen
-ACTIVE = 0xF  # control word of CiA 408
 SMALLEST = 1e-9
 HOUR_NS = 3_600_000_000_000
 
@@ -66,13 +59,7 @@ class Evil(Controller):
         return self.substitute(super().refused(frame))
 
 
-@cache
-def loaded(path: Path) -> tuple[dict[str, Any], Machine, Deployment]:
-    """File, the machine as its files say, and the deployment."""
-    return yaml.safe_load(path.read_text()), Machine(path.stem, path), load_deployment(path)
-
-
-class World:
+class World(ValveFrames):
     """Hand, nodes and bus of a deployment.
 
     Attributes:
@@ -88,11 +75,9 @@ class World:
     """
 
     def __init__(self, name: str) -> None:
-        self.name = name
-        self.file, self.machine, self.deployment = loaded(CONFIG / f"{name}.yaml")
+        super().__init__(name)
         self.evil = Evil(self.deployment)
         self.guarded = Guarded(self.evil)
-        self.axes = self.machine.axes
         self.buses = Buses(self.machine)
         self.stick: dict[str, float] = {}
         self.raw: dict[str, dict[str, int]] = {}
@@ -106,7 +91,6 @@ class World:
         self.moved_by: dict[Key, list[str]] = {}
         for axis, one in self.axes.items():
             self.moved_by.setdefault(one.valve_key, []).append(axis)
-        self._commands = {axis: self._command(axis) for axis in self.axes}
         self._last = dict.fromkeys(self.axes, self.n)
         self._counts: dict[Key, int] = {}
         self._control: dict[str, int] = {}
@@ -115,65 +99,7 @@ class World:
     def now_ns(self) -> int:
         return self.n * self.machine.tick_ns
 
-    # --- bytes -----------------------------------------------------------------------------------
-
-    def encode(self, axis: str, data: bytes, steps: int) -> bytes:
-        """A valve's frame with another command, else as it was."""
-        of, word = self.axes[axis], int.from_bytes(data, "little")
-        also, codes, e2e = self._commands[axis]
-        put = [(of.valve, abs(steps) if of.direction else steps)]
-        if codes:
-            field, code = codes
-            put.append((field, code[(steps > 0) - (steps < 0)]))
-        put += [(field, round(field.full * abs(steps) / of.steps)) for field in also]
-        if of.words and steps:
-            put.append((of.words.control, ACTIVE))
-        for field, raw in put:
-            word = word & ~(field.mask << field.start) | field.put(raw)
-        return sealed(e2e, word.to_bytes(len(data), "little"))
-
-    def _command(self, axis: str) -> tuple[list[Field], tuple[Field, dict[int, int]] | None, Any]:
-        """Other fields with the command of an axis, code of the direction by sign, and E2E."""
-        of, valve = self.axes[axis], self.file["axes"][axis]["valve"]
-        signal = of.valve_message.get_signal_by_name
-        also = [Field(signal(name)) for name in valve.get("also", [])]
-        if not of.direction:
-            return also, None, valve.get("e2e")
-        name, signs = of.direction
-        codes = Field(signal(name)), {sign: code for code, sign in signs.items()}
-        return also, codes, valve.get("e2e")
-
-    def fields(self, axis: str) -> list[Field]:
-        """Where its command lies in the frame of its valve; the first one is the size."""
-        of, (also, codes, _) = self.axes[axis], self._commands[axis]
-        words = [of.words.control] if of.words else []
-        return [of.valve, *also, *([codes[0]] if codes else []), *words]
-
-    def count(self, axis: str, data: bytes) -> int:
-        """Alive counter of a valve's frame, where that is a signal."""
-        counter = self.axes[axis].valve_counter
-        return counter.get(int.from_bytes(data, "little")) if counter else 0
-
-    def counted(self, axis: str, data: bytes, ahead: int) -> bytes:
-        """A valve's frame whose alive counter, signal or of E2E, is so much ahead."""
-        if counter := self.axes[axis].valve_counter:
-            word, now = int.from_bytes(data, "little"), self.count(axis, data)
-            word += counter.put(now + ahead) - counter.put(now)
-            return word.to_bytes(len(data), "little")
-        return sealed(self.file["axes"][axis]["valve"].get("e2e"), data, ahead)
-
-    def decode(self, axis: str, data: bytes) -> int | None:
-        """Steps in a frame of the valve; None where it is no command."""
-        of, word = self.axes[axis], int.from_bytes(data, "little")
-        if len(data) != of.valve_message.length:
-            return None
-        steps = of.valve.get(word)
-        if of.direction and (codes := self._commands[axis][1]):
-            sign = of.direction[1].get(codes[0].get(word))
-            if sign is None or steps < 0 or (steps == 0) != (sign == 0):
-                return None
-            steps *= sign
-        return steps if abs(steps) <= of.steps else None
+    # --- frames of others ------------------------------------------------------------------------
 
     def joystick(self, name: str) -> Frame:
         """Its frame of this tick."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.errors import LogError
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 
 
 def kept(folder: Path, name: str, content: str) -> Path:
@@ -16,5 +16,5 @@ def kept(folder: Path, name: str, content: str) -> Path:
 
 def error_of(path: Path) -> str:
     with pytest.raises(LogError) as error:
-        list(read_log(path))
+        list(LogFile(path))
     return str(error.value)

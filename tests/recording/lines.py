@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from canshaper.errors import LogError
-from canshaper.recording.log import TimedFrame, read_log
+from canshaper.recording.log import LogFile, TimedFrame
 
 FRAMES = [
     TimedFrame(1_000_000_000, "1", 0x110, False, bytes(range(8))),
@@ -32,7 +32,7 @@ def prefix(path: Path) -> tuple[list[TimedFrame], LogError | None]:
     """Frames of a log until it ends or is wrong."""
     frames: list[TimedFrame] = []
     try:
-        frames.extend(read_log(path))  # keeps what came before the error
+        frames.extend(LogFile(path))  # keeps what came before the error
     except LogError as error:
         return frames, error
     return frames, None

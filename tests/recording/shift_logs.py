@@ -7,9 +7,14 @@ from typing import Any, NamedTuple
 
 import cantools
 
-ROOT = Path(__file__).parents[2]
+from canshaper.cli.common import loader
+from canshaper.recording.replay import look
+from canshaper.recording.shift import LogOfWork, Shifts, first_ns
+from tests.rigs.files import ROOT
+
 TICK_S = 0.02
 MONDAY_S = 1_790_000_000.0  # 2026-09-21 14:13:20
+HOUR_S = 3600.0
 FULL_M_S = {"slew": 1.5, "near_far": 1.0}
 # Of config/forwarder.yaml: a stopwatch on slew; grapple data on near-far.
 SWING = {
@@ -27,6 +32,16 @@ class Part(NamedTuple):
     joystick: tuple[float, float] = (0.0, 0.0)
     valve: tuple[float, float] = (0.0, 0.0)
     state: str | None = "ACTIVE"
+
+
+# Out, a tap on the way, a tap back against one, and the way back: one cycle. Then with anti-sway
+# off: near-far alone.
+OUT = [Part(1.0), Part(3.0, (100, 0), (80, 0)), Part(4.0)]
+TAPS = [Part(0.4, (-50, 0), (-48, 0)), Part(0.2), Part(0.4, (50, 0), (48, 0)), Part(5.0)]
+BACK = [Part(3.0, (-100, 0), (-80, 0)), Part(6.0)]
+SHORT = [Part(0.5), Part(0.5, (100, 0), (80, 0)), Part(0.2)]
+CYCLE = [*OUT, *TAPS, *BACK]
+OFF = [Part(2.0, (0, 100), (0, 60), "BYPASS_ON"), Part(6.0, state="READY")]
 
 
 def lines(
@@ -63,7 +78,9 @@ def dbc_signals(message: str) -> list[str]:
 
 
 def written(path: Path, parts: Iterable[Part], begin_s: float = MONDAY_S, **options: Any) -> Path:
-    path.write_text("".join(lines(parts, begin_s, **options)), encoding="ascii")
+    """A log, or more of one."""
+    with path.open("a", encoding="ascii") as log:
+        log.writelines(lines(parts, begin_s, **options))
     return path
 
 
@@ -109,3 +126,13 @@ def waited_s(parts: Sequence[Part], swing: Sequence[float], still_deg: float = 2
         total += TICK_S * (large[-1] - at + 1 if large else 0)
         at = end
     return total
+
+
+def counted(*logs: Path, file: str = "forwarder.yaml", by: str = "gap") -> tuple[Any, list[str]]:
+    """Rows and notes of logs, in their order."""
+    shifts, notes, deployment = Shifts(by, HOUR_S), [], loader(file)()
+    for log in logs:
+        drive = look(deployment, log, {}, own=False)
+        opened = LogOfWork("", log.name, first_ns(drive), deployment, drive)
+        notes += shifts.add(opened, lambda _part: None)
+    return shifts.rows(), notes

@@ -13,8 +13,7 @@ from canshaper.errors import LogError
 from canshaper.machine.binding import load_deployment
 from canshaper.recording.history import History, HistoryEvent
 from canshaper.recording.record import history_lines, pack, unpack
-
-ROOT = Path(__file__).parents[2]
+from tests.rigs.files import ROOT
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.cli.verbs.replay import _run
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from canshaper.recording.plot import figure
 
 DRIVE = Path(__file__).parents[1] / "golden" / "drive.log"
@@ -45,7 +45,7 @@ def test_the_new_log_can_be_replayed(tmp_path: Path) -> None:
     called(tmp_path / "forwarder.log", "--config", "forwarder.yaml", "--out", again)
 
     def sent(path: Path) -> list[tuple[int, bytes]]:
-        return [(f.can_id, f.data) for f in read_log(path) if f.can_id >= 0x200]
+        return [(f.can_id, f.data) for f in LogFile(path) if f.can_id >= 0x200]
 
     assert sent(again / "forwarder.log") == sent(tmp_path / "forwarder.log")
 

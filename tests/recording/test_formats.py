@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.recording.log import LogFile, TimedFrame, read_log
+from canshaper.recording.log import LogFile, TimedFrame
 from tests.recording.files import error_of, kept
 
 DAY_NS = 86_400 * 10**9
@@ -125,7 +125,7 @@ def test_candump_as_it_stands_on_the_screen(
 
 def test_candump_with_a_date(tmp_path: Path) -> None:
     content = " (2026-11-21 10:15:30.000001)  can0  110   [0]\n" * 2
-    first, second = read_log(kept(tmp_path, "a.log", content))
+    first, second = LogFile(kept(tmp_path, "a.log", content))
     assert first == second
     assert first.time_ns % 10**9 == 1000
 
@@ -169,7 +169,7 @@ def test_gvret(tmp_path: Path) -> None:
 
 def test_gvret_without_directions(tmp_path: Path) -> None:
     content = GVRET.replace("Dir,", "") + "5,21A,0,0,1,FE\n"
-    assert list(read_log(kept(tmp_path, "a.csv", content))) == [
+    assert list(LogFile(kept(tmp_path, "a.csv", content))) == [
         TimedFrame(5000, "0", 0x21A, False, b"\xfe")
     ]
 
@@ -197,7 +197,7 @@ def test_asc_with_times_from_line_to_line(tmp_path: Path) -> None:
    0.050000 1  110             Rx   d 1 0B
    0.000001 1  110             Rx   d 1 0C
 """
-    frames = list(read_log(kept(tmp_path, "a.asc", content)))
+    frames = list(LogFile(kept(tmp_path, "a.asc", content)))
     assert [f.time_ns for f in frames] == [100_000_000, 350_000_000, 350_001_000]
 
 

@@ -7,16 +7,14 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.bus.port import open_port
 from canshaper.cli.common import loader
-from canshaper.codec.frame import Frame, FrameFault
 from canshaper.commissioning.monitor.run import run_plain
 from canshaper.commissioning.nodes.parameters import _connected
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Listener, ReceivedFrame
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from canshaper.recording.record import Recording
 from tests.bus.lines import SerialLine, until
 
@@ -59,18 +57,6 @@ def test_a_garbled_line_costs_that_line(line: SerialLine, text: bytes) -> None:
     assert re.match("bus crane: .*Error", listener.last_error)
 
 
-@pytest.mark.processes
-def test_a_daemon_reads_on_behind_what_is_no_text(line: SerialLine) -> None:
-    faults: list[FrameFault] = []
-    port = open_port("crane", slcan(line), faults.append)
-    line.write(b"".join(GARBLED) + GOOD % 2)
-    frames: list[Frame] = []
-    until(lambda: frames.extend(port.frames()) or frames)
-    port.close()
-    assert [frame.data[0] for frame in frames] == [2]
-    assert faults == [FrameFault.BUS_ERROR] * len(GARBLED)
-
-
 @pytest.mark.parametrize("suffix", ["log", "mcap"])
 def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path, suffix: str) -> None:
     recording = Recording(deployment_on(line))
@@ -82,7 +68,7 @@ def test_a_recording_goes_on_and_counts(line: SerialLine, tmp_path: Path, suffix
 
     path = tmp_path / f"drive.{suffix}"
     recording.run(path, 30.0, going)
-    assert [frame.data[0] for frame in read_log(path)] == [0, 1, 2]
+    assert [frame.data[0] for frame in LogFile(path)] == [0, 1, 2]
     assert f"3 frames, {len(GARBLED)} ERRORS of the interface, the last bus crane: " in str(
         recording
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.recording.log import LogFile, TimedFrame, read_log
+from canshaper.recording.log import LogFile, TimedFrame
 from tests.recording.lines import FRAMES, HEADER, LINES, error_of, log, prefix
 from tests.recording.writing import messages, written
 
@@ -28,7 +28,7 @@ def test_every_format_gives_the_frames_that_were_written(
         expected = [f._replace(channel="") for f in FRAMES]
     if suffix in ("asc", "blf"):  # python-can's begin with their first frame
         expected = [f._replace(time_ns=f.time_ns - FRAMES[0].time_ns) for f in FRAMES]
-    assert list(read_log(path)) == expected
+    assert list(LogFile(path)) == expected
 
 
 @pytest.mark.parametrize("suffix", ["log", "asc", "blf", "csv"])
@@ -36,23 +36,23 @@ def test_a_packed_log_gives_the_same(tmp_path: Path, suffix: str) -> None:
     path = written(tmp_path / f"drive.{suffix}", messages(FRAMES))
     packed = tmp_path / f"other.{suffix}.gz"
     packed.write_bytes(gzip.compress(path.read_bytes()))
-    assert list(read_log(packed)) == list(read_log(path))
+    assert list(LogFile(packed)) == list(LogFile(path))
 
 
 def test_candump_as_it_stands(tmp_path: Path) -> None:
-    assert list(read_log(log(tmp_path, *LINES))) == [
+    assert list(LogFile(log(tmp_path, *LINES))) == [
         f._replace(channel=f"can{int(f.channel) - 1}") for f in FRAMES
     ]
 
 
 def test_candump_of_python_can_with_directions_and_of_nanoseconds(tmp_path: Path) -> None:
     path = log(tmp_path, "(7.000001) vcan0 110#0A0b R\n", "(7.123456789) vcan0 110# T\n")
-    assert [f.time_ns for f in read_log(path)] == [7_000_001_000, 7_123_456_789]
+    assert [f.time_ns for f in LogFile(path)] == [7_000_001_000, 7_123_456_789]
 
 
 def test_times_are_exact_at_the_date_of_today(tmp_path: Path) -> None:
     path = log(tmp_path, "(1763750000.249713) can0 110#\n", "(1763750000.249714) can0 110#\n")
-    assert [f.time_ns for f in read_log(path)] == [
+    assert [f.time_ns for f in LogFile(path)] == [
         1_763_750_000_249_713_000,
         1_763_750_000_249_714_000,
     ]
@@ -60,7 +60,7 @@ def test_times_are_exact_at_the_date_of_today(tmp_path: Path) -> None:
     frames = [f._replace(time_ns=start + i * 10_001_000) for i, f in enumerate(FRAMES)]
     blf = written(tmp_path / "a.blf", messages(frames))
     # The writer had floats; the reader adds no error of its own.
-    assert [round(f.time_ns, -3) for f in read_log(blf)] == [f.time_ns for f in frames]
+    assert [round(f.time_ns, -3) for f in LogFile(blf)] == [f.time_ns for f in frames]
 
 
 ASC = """date Sat Nov 21 10:15:30.400 am 2026
@@ -101,7 +101,7 @@ def test_asc_of_vectors_tools(tmp_path: Path) -> None:
 def test_asc_with_decimal_numbers(tmp_path: Path) -> None:
     path = log(tmp_path, "base dec  timestamps absolute\n", "1.5 1 272 Rx d 2 10 255\n")
     path = path.rename(path.with_suffix(".asc"))
-    assert list(read_log(path)) == [TimedFrame(1_500_000_000, "1", 272, False, b"\x0a\xff")]
+    assert list(LogFile(path)) == [TimedFrame(1_500_000_000, "1", 272, False, b"\x0a\xff")]
 
 
 def test_what_is_no_data_frame_is_left_out_and_counted(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_a_large_log_takes_no_more_memory(tmp_path: Path) -> None:
         path = log(tmp_path, *rows)
         tracemalloc.start()
         try:
-            assert sum(1 for _ in read_log(path)) == count
+            assert sum(1 for _ in LogFile(path)) == count
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
@@ -199,7 +199,7 @@ def test_a_large_log_takes_no_more_memory(tmp_path: Path) -> None:
 def test_progress_goes_from_nothing_to_all(tmp_path: Path) -> None:
     path = log(tmp_path, *(f"({i}.0) can0 110#0011223344556677\n" for i in range(40_000)))
     seen: list[float] = []
-    count = sum(1 for _ in read_log(path, seen.append))
+    count = sum(1 for _ in LogFile(path, seen.append))
     assert count == 40_000
     assert seen == sorted(seen)
     assert 0.0 <= seen[0] < 0.2

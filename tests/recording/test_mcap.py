@@ -18,7 +18,7 @@ from canshaper.bus.packet import FDF
 from canshaper.errors import CutOffError, LogError
 from canshaper.recording.form import Channel, Group
 from canshaper.recording.listen import ReceivedFrame
-from canshaper.recording.log import LogFile, read_log
+from canshaper.recording.log import LogFile
 from canshaper.recording.mcap_write import FRAME, McapWriter, Schema
 from tests.recording.exports import (
     START_NS,
@@ -71,7 +71,7 @@ def test_every_frame_comes_back_to_the_bit_and_the_nanosecond(tmp_path: Path) ->
     assert dict(log.left_out) == {"error": 1, "remote": 2}
     packed = tmp_path / "a.mcap.gz"
     packed.write_bytes(gzip.compress((tmp_path / "a.mcap").read_bytes()))
-    assert list(read_log(packed)) == [timed(one) for one in frames()]
+    assert list(LogFile(packed)) == [timed(one) for one in frames()]
 
 
 def flags_of(frame: ReceivedFrame) -> int:
@@ -98,7 +98,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
 
 def test_a_replay_of_the_export_is_that_of_the_drive(drive: tuple[Path, list[Any]]) -> None:
     path, ticks = drive
-    assert list(read_log(path)) == frames_of(ticks)
+    assert list(LogFile(path)) == frames_of(ticks)
     assert [r.sent for _, r in replayed(path)] == [r.sent for _, r in ticks]
 
 
@@ -200,7 +200,7 @@ def test_a_file_cut_off_anywhere_gives_whole_frames_and_says_so(tmp_path: Path) 
         path.write_bytes(whole[:size])
         got = []
         with pytest.raises(CutOffError) as error:
-            for one in read_log(path):
+            for one in LogFile(path):
                 got.append(one)
         assert str(error.value).startswith(str(path))
         assert "the log is cut off" in str(error.value)

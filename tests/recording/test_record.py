@@ -21,12 +21,12 @@ from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.recording.listen import Listener
 from canshaper.recording.record import Recording, unpack
+from tests.rigs.files import machine_file
 
 # Of this process alone: two runs of the tests on one machine must not receive each other's frames.
 GROUP = f"239.74.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 BUS = ("--interface", "udp_multicast", "--channel", GROUP)
 ANSWER_S = 120.0
-ROOT = Path(__file__).parents[2]
 
 
 @contextmanager
@@ -62,10 +62,8 @@ def test_what_a_daemon_does_is_recorded(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_running_daemon_writes_its_last_minute(tmp_path: Path) -> None:
     """A real one, with a clock, a bus and a control socket; what it did is played the same."""
-    shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
     control = "control: { adjustable: { axes.slew.filter.a1: [0.5, 1.0] } }\n"
-    file, socket = tmp_path / "machine.yaml", str(tmp_path / "socket")
-    file.write_text(shipped.replace("../dbc", str(ROOT / "dbc")) + control)
+    file, socket = machine_file(tmp_path, "forwarder", more=control), str(tmp_path / "socket")
     boxes = tmp_path / "boxes"
     boxes.mkdir()
     last = ["record", str(file), "--last", "--control", socket]

@@ -8,7 +8,7 @@ import can
 import pytest
 
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording.log import read_log
+from canshaper.recording.log import LogFile
 from tests.recording.lines import FRAMES, HEADER, LINES, error_of, log, prefix
 from tests.recording.writing import messages, written
 
@@ -18,7 +18,7 @@ def test_a_text_cut_off_anywhere_gives_whole_frames_and_says_so(
     tmp_path: Path, suffix: str
 ) -> None:
     whole = written(tmp_path / f"a.{suffix}", messages(FRAMES))
-    content, frames = whole.read_bytes(), list(read_log(whole))
+    content, frames = whole.read_bytes(), list(LogFile(whole))
     cut = tmp_path / f"cut.{suffix}"
     for size in range(1, len(content)):
         cut.write_bytes(content[:size])
@@ -210,5 +210,5 @@ def test_a_damaged_object_of_a_blf(tmp_path: Path, at: int, value: bytes, text: 
     content[at : at + len(value)] = value
     path.write_bytes(content)
     with pytest.raises(LogError) as error:
-        list(islice(read_log(path), 5))  # without end where an object has no length
+        list(islice(LogFile(path), 5))  # without end where an object has no length
     assert f"{path}: {text}" in str(error.value)

@@ -8,9 +8,8 @@ import cantools
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from tests.rigs.files import read
+from tests.rigs.files import ROOT, machine_file, read
 
-ROOT = Path(__file__).parents[2]
 FILE, DBC_FILE = "canopen-forwarder.yaml", "canopen-cia401-cia408.dbc"
 TICK_NS = 20_000_000
 JOYSTICKS = {"left": 0x10, "right": 0x11}
@@ -24,13 +23,7 @@ UP = {INIT: DISABLED, DISABLED: HOLD, HOLD: ACTIVE}
 
 def write_variant(tmp_path: Path, *changes: tuple[str, str]) -> Path:
     """The shipped deployment with pieces replaced."""
-    text = (ROOT / "config" / FILE).read_text().replace("../dbc", str(ROOT / "dbc"))
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    file = tmp_path / "machine.yaml"
-    file.write_text(text)
-    return file
+    return machine_file(tmp_path, FILE, *changes)
 
 
 class ValveNode:

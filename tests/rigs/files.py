@@ -20,6 +20,30 @@ def read(path: Path) -> Deployment:
     return _shipped(path) if path.parent == CONFIG else load_deployment(path)
 
 
+def text_of(file: Path | str) -> str:
+    """Text of a deployment, of config/ by its name; its DBC files are found from anywhere."""
+    path = (CONFIG / file).with_suffix(".yaml")
+    return path.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+
+
+def machine_file(folder: Path, file: Path | str, *changes: tuple[str, str], more: str = "") -> Path:
+    """Write a deployment with these texts replaced, everywhere that they stand, and more lines."""
+    text = text_of(file)
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    path = folder / "machine.yaml"
+    path.write_text(text + more, encoding="utf-8")
+    return path
+
+
+def faults(file: Path) -> list[str]:
+    """Every problem of a deployment, without file and line."""
+    with pytest.raises(ConfigError) as caught:
+        load_deployment(file)
+    return [str(one).partition(": ")[2] for one in caught.value.problems]
+
+
 class Machine:
     """Deployment file and DBC file in a directory of their own."""
 

@@ -10,9 +10,8 @@ import pytest
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.shaping.states import State
-from tests.rigs.files import read
+from tests.rigs.files import ROOT, read
 
-ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
 
 # What a joystick sends that nobody touches, raw.

@@ -8,8 +8,8 @@ import cantools
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
 JOYSTICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
 CENTRED = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}

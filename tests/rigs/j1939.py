@@ -8,9 +8,8 @@ import cantools
 from canshaper.codec.frame import GLOBAL, Frame, name_bytes
 from canshaper.controller.controller import Controller
 from canshaper.shaping.states import State
-from tests.rigs.files import read
+from tests.rigs.files import ROOT, read
 
-ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
 OWN, JOYSTICK, OTHER = 0x9C, 0x33, 0x21
 NETWORK: Any = cantools.database.load_file(ROOT / "dbc" / "j1939-bjm-avc.dbc")

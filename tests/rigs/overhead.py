@@ -7,7 +7,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.rigs.files import CONFIG, ROOT, read
+from tests.rigs.files import CONFIG, machine_file, read
 
 FILE = CONFIG / "bridge-crane.yaml"
 TICK_NS = 20_000_000
@@ -15,13 +15,7 @@ TICK_NS = 20_000_000
 
 def changed(directory: Path, *changes: tuple[str, str]) -> Path:
     """The file with other lines, everywhere that they stand."""
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    path = directory / "bridge-crane.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
+    return machine_file(directory, FILE, *changes)
 
 
 class OverheadRig:

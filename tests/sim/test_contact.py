@@ -7,7 +7,6 @@ import pytest
 from canshaper_sim.contact import ContactParameters
 from canshaper_sim.crane import LIFT, NEAR_FAR, SLEW, Crane, CraneParameters
 from canshaper_sim.grapple import Grapple, Sway
-from canshaper_sim.parameters import changed_parameters
 
 TICK_S = 0.02
 # By default the tip stands 4 m high, the end of the grapple at 4 - 0.2 - 1.2 - 0.3 = 2.3 m.
@@ -116,8 +115,3 @@ def test_a_pile_next_to_the_boom_is_met_by_slewing_on_both_sides_alike() -> None
             one.step(TICK_S, {SLEW: side})
         turned.append(one.state.theta5_rad)
     assert turned[0] == pytest.approx(-turned[1], abs=1e-9)
-
-
-def test_it_is_set_by_name() -> None:
-    changed = changed_parameters(["contact.ground_m=0.5", "contact.pile_height_m=1"])
-    assert (changed.contact.ground_m, changed.contact.pile_height_m) == (0.5, 1.0)

@@ -8,8 +8,8 @@ from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import random_script
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 SIGNED = ' SG_ Slew : 0|16@1- (0.1,0) [-100|100] "%" SHAPER'
 FLAGGED = """ SG_ SlewNeutral : 0|2@1+ (1,0) [0|3] "" SHAPER
  SG_ SlewNegative : 2|2@1+ (1,0) [0|3] "" SHAPER

@@ -1,6 +1,5 @@
 """Motion of a hand at the joysticks is in their frames, as a daemon reads them."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,9 +7,8 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
-from tests.rigs.files import read
+from tests.rigs.files import CONFIG, read
 
-CONFIG = Path(__file__).parents[2] / "config"
 FILES = [
     "forwarder",
     "forwarder-joints",

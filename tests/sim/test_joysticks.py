@@ -15,8 +15,8 @@ from canshaper.shaping.states import State
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import SCRIPTS, random_script
 from tests.codec.checksum_reference import PLACES, with_checksum
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[2]
 SCRIPT = random_script(1)
 
 RESET = ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n'

@@ -7,18 +7,15 @@ import pytest
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
-from tests.rigs.files import ROOT
+from tests.rigs.files import machine_file
 
 LOG = ["log.grip_s=0.25", "log.mass_kg=600"]
 
 
 def said(tmp_path: Path, signal: str, most: int) -> list[int]:
     """Raw values in half a second."""
-    text = (ROOT / "config" / "forwarder-load.yaml").read_text(encoding="utf-8")
-    file = tmp_path / "machine.yaml"
-    text = text.replace("../dbc", str(ROOT / "dbc")).replace("signal: Weight", f"signal: {signal}")
-    text = text.replace("breakpoint: 600", f"breakpoint: {most}")
-    file.write_text(text, encoding="utf-8")
+    changes = {"signal: Weight": f"signal: {signal}", "breakpoint: 600": f"breakpoint: {most}"}
+    file = machine_file(tmp_path, "forwarder-load", *changes.items())
     plant = PlantNode(load_deployment(file), changed_parameters(LOG), listeners=False)
     raw = []
     for _ in range(25):

@@ -8,15 +8,14 @@ from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 from canshaper_sim.plant import PlantNode
 from tests.machine import protected_machine
+from tests.rigs.files import Machine
 
-ROOT = Path(__file__).parents[2]
 IDS = list(range(1, 17))
 SLEW = (
     "BO_ 512 SlewCommand: 2 SHAPER\n"
@@ -33,18 +32,12 @@ STEP_S = 0.02
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Deployment:
+def protected(machine: Machine) -> Deployment:
     """The shipped machine with its slew valve under profile 2."""
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc/forwarder.dbc", "machine.dbc")
     e2e = f"e2e: {{ profile: p02, data_ids: {IDS} }}"
-    assert VALVE in text
-    text = text.replace(VALVE, VALVE.replace("alive_counter: AliveCounter", e2e))
-    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
-    assert SLEW in dbc
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "machine.dbc").write_text(dbc.replace(SLEW, PROTECTED_SLEW), encoding="cp1252")
-    return load_deployment(tmp_path / "machine.yaml")
+    machine.in_yaml(VALVE, VALVE.replace("alive_counter: AliveCounter", e2e))
+    machine.in_dbc(SLEW, PROTECTED_SLEW)
+    return machine.load()
 
 
 def frame(count: int, steps: int = 100) -> Frame:
@@ -65,14 +58,14 @@ def drive(plant: PlantNode, frames: list[Frame | None]) -> list[float]:
     return rates
 
 
-def test_a_valve_follows_right_frames(machine: Deployment) -> None:
-    rates = drive(PlantNode(machine), [frame(n) for n in range(100)])
+def test_a_valve_follows_right_frames(protected: Deployment) -> None:
+    rates = drive(PlantNode(protected), [frame(n) for n in range(100)])
     assert rates[-1] > 0.1
 
 
 @pytest.mark.parametrize("bit", [0, 9, 13, 20, 31])
-def test_a_valve_closes_when_only_wrong_frames_come(machine: Deployment, bit: int) -> None:
-    plant = PlantNode(machine)
+def test_a_valve_closes_when_only_wrong_frames_come(protected: Deployment, bit: int) -> None:
+    plant = PlantNode(protected)
     moving = drive(plant, [frame(n) for n in range(100)])[-1]
     wrong: list[Frame | None] = []
     for n in range(100, 200):
@@ -85,15 +78,15 @@ def test_a_valve_closes_when_only_wrong_frames_come(machine: Deployment, bit: in
     assert drive(plant, [frame(n) for n in range(200, 300)])[-1] > 0.9 * moving
 
 
-def test_a_valve_closes_when_the_same_frame_comes_again_and_again(machine: Deployment) -> None:
+def test_a_valve_closes_when_the_same_frame_comes_again_and_again(protected: Deployment) -> None:
     """What a controller sends that hangs with its bus still at work."""
-    plant = PlantNode(machine)
+    plant = PlantNode(protected)
     moving = drive(plant, [frame(n) for n in range(100)])[-1]
     assert abs(drive(plant, [frame(99)] * 100)[-1]) < 0.01 * moving
 
 
-def test_a_controller_that_starts_again_is_followed_again(machine: Deployment) -> None:
-    plant = PlantNode(machine)
+def test_a_controller_that_starts_again_is_followed_again(protected: Deployment) -> None:
+    plant = PlantNode(protected)
     moving = drive(plant, [frame(n) for n in range(100)])[-1]
     still = drive(plant, [None] * 100)[-1]
     assert abs(still) < 0.01 * moving
@@ -103,9 +96,9 @@ def test_a_controller_that_starts_again_is_followed_again(machine: Deployment) -
     assert rates[-1] > 0.9 * moving
 
 
-def test_the_controller_is_followed(machine: Deployment) -> None:
-    plant, controller = PlantNode(machine), Controller(machine)
-    joysticks = JoystickNode(machine, random_script(1))
+def test_the_controller_is_followed(protected: Deployment) -> None:
+    plant, controller = PlantNode(protected), Controller(protected)
+    joysticks = JoystickNode(protected, random_script(1))
     fastest = 0.0
     for time_ms in range(0, 10_000, 20):
         for sent in joysticks.frames(time_ms):
@@ -136,26 +129,19 @@ def test_the_joysticks_of_a_machine_with_headers_are_received(tmp_path: Path) ->
     assert controller.counters.last_fault == 0
 
 
-def test_a_measured_radius_is_sent_as_the_deployment_asks(tmp_path: Path) -> None:
-    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc/forwarder.dbc", "machine.dbc")
+def test_a_measured_radius_is_sent_as_the_deployment_asks(machine: Machine) -> None:
     radius = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
     e2e = "e2e: { profile: p01, data_id: 0x123, data_id_mode: both }"
     motion = f"slew: slew, near_far: near_far, radius: {{ {radius}, {e2e} }}"
-    text += f"motion: {{ crane: {{ {motion} }} }}\n"
-    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+    machine.yaml += f"motion: {{ crane: {{ {motion} }} }}\n"
     for old, new in (
         ("TipPosition: 6", "TipPosition: 8"),
         ("Height : 32|16@1-", "Height : 48|16@1-"),
         ("Radius : 16|16@1+", "Radius : 32|16@1+"),
         ("SlewAngle : 0|16@1- (0.01,0) [-327|327]", "SlewAngle : 16|16@1- (0.01,0) [-327|327]"),
     ):
-        start = dbc.index("BO_ 1025 ")
-        assert old in dbc[start:]
-        dbc = dbc[:start] + dbc[start:].replace(old, new, 1)
-    (tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "machine.dbc").write_text(dbc, encoding="cp1252")
-    deployment = load_deployment(tmp_path / "machine.yaml")
+        machine.in_dbc(old, new)
+    deployment = machine.load()
     controller, plant = Controller(deployment), PlantNode(deployment)
     for n in range(20):
         (sent,) = (f for f in plant.feedback() if f.can_id == 1025)

@@ -72,3 +72,8 @@ def test_a_pump_with_a_lag_delivers_later() -> None:
 def test_a_pump_that_delivers_nothing_is_refused(flow: float) -> None:
     with pytest.raises(DesignError, match=r"crane: pump_flow: expected 0\.1 \.\. inf"):
         replace(CraneParameters(), pump_flow=flow)
+
+
+def test_a_part_of_sharing_is_refused() -> None:
+    with pytest.raises(DesignError, match=r"pump: shares_flow: expected 0 or 1, got 0.3"):
+        crane("pump.shares_flow=0.3")

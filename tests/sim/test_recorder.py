@@ -1,7 +1,6 @@
 """Where tip and grapple are, from the frames of a drive."""
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -12,8 +11,7 @@ from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.strokes import Script
-
-CONFIG = Path(__file__).resolve().parents[2] / "config"
+from tests.rigs.files import CONFIG
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,13 @@ import math
 import mujoco
 import pytest
 
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.crane import CraneParameters, RopeCrane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.overhead import OverheadBoom, OverheadParameters
+from canshaper_sim.plant import PlantNode
 from canshaper_sim.sling import SlingParameters, Vector, dot, plus
+from tests.rigs.files import CONFIG
 
 G, STEP_S = 9.81, 0.01
 STRETCHED_M = G / 40.0**2  # a sling at rest
@@ -157,3 +160,27 @@ def test_a_load_on_the_ground_stands_until_it_is_lifted_and_then_swings() -> Non
         one.run(STEP_S)
         swing.append(one.slung.position[0])
     assert max(swing) - min(swing) > 0.1
+
+
+def test_a_crane_whose_dbc_has_it_sends_how_the_sling_hangs() -> None:
+    deployment = load_deployment(CONFIG / "bridge-crane-hook.yaml")
+    node = PlantNode(deployment)
+    boom = node.crane.boom
+    assert isinstance(boom, OverheadBoom)
+    assert boom.slung
+    node.crane.step(1.5, {"bridge": 1.0, "trolley": -0.5})
+    (_, message), frames = deployment.messages.find("SlingSway"), node.feedback()
+    (data,) = (one.data for one in frames if one.can_id == message.frame_id)
+    along, across = (math.radians(float(angle)) for angle in message.decode(data).values())
+    down = boom.load[2] - boom.slung.position[2]
+    bridge, trolley, _ = boom.axes.values()
+    hook = bridge.position + boom.load[0], trolley.position + boom.load[1]
+    below = hook[0] + down * math.tan(along), hook[1] + down * math.tan(across)
+    assert below == pytest.approx(boom.slung.position[:2], abs=0.002)
+    assert math.dist(below, hook) > 0.1
+
+
+def test_without_a_sling_it_hangs_as_the_rope_does() -> None:
+    boom = RopeCrane(CraneParameters(), Sway(0.2, -0.1)).boom
+    assert isinstance(boom, OverheadBoom)
+    assert boom.sling_angles == pytest.approx((0.2, -0.1))

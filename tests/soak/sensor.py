@@ -13,7 +13,8 @@ from pathlib import Path
 import can
 
 from tests.hil.hand import CYCLE_S, write_deployment
-from tests.hil.machine import ROOT, open_bus
+from tests.hil.machine import open_bus
+from tests.rigs.files import ROOT
 
 SWAY = 0x410
 DEGREES = 0.01  # of a step of the signal

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from canshaper.commissioning import control_client as client
+from tests.rigs.files import machine_file
 from tests.studio.conftest import ROOT, Studio, free_groups
 
 PERIOD, A1 = "axes.slew.sway.period_s", "axes.slew.filter.a1"
@@ -15,12 +16,10 @@ class Machine:
     """A daemon on a bus of its own, and a studio with ``--adjust``."""
 
     def __init__(self, folder: Path) -> None:
-        self.file, self.control = folder / "machine.yaml", folder / "control.sock"
-        text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-        text = text.replace("../dbc/", f"{ROOT}/dbc/")
+        self.control = folder / "control.sock"
         ranges = f"{PERIOD}: [1.8, 3.0], {A1}: [0.3, 1.4]"
-        text += f"\ncontrol: {{ socket: {self.control}, adjustable: {{ {ranges} }} }}\n"
-        self.file.write_text(text, encoding="utf-8")
+        control = f"\ncontrol: {{ socket: {self.control}, adjustable: {{ {ranges} }} }}\n"
+        self.file = machine_file(folder, "forwarder", more=control)
         self.groups = free_groups()
         self.log = folder / "daemon.log"
         self.start_daemon()

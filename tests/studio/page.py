@@ -16,6 +16,7 @@ TRIES = 8
 DISTURBED = re.compile(
     "is silent|no joystick message|joystick messages are not|too late|stood still"
 )
+LATE = re.compile("the daemon is too late|the daemon stood still")
 
 
 class Page:
@@ -71,7 +72,14 @@ class Page:
         self.until(lambda s: s["driver"] == self.hello["page"], "driver")
         self.until(lambda s: not s["enable"], "enable released by the last one")
         self.send(do="enable")
-        self.until(lambda s: self.states() == {"ready"}, "axes ready")
+        limit = time.monotonic() + WAIT_S
+        while self.states() != {"ready"}:
+            self.look()
+            if time.monotonic() > limit:
+                axes = [a for c in self.shown["cranes"].values() for a in c["axes"].values()]
+                if any(LATE.search(axis["reason"] or "") for axis in axes):
+                    pytest.skip(f"the machine was too busy for {WAIT_S} s: daemons were late")
+                pytest.fail(f"axes ready not within {WAIT_S} s: {self.shown}")
 
     def hold(
         self, level: float, condition: Callable[[dict[str, Any]], bool], what: str = ""

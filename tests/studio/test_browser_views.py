@@ -144,7 +144,13 @@ HANGS_M = """async ([hello, shown]) => {
 
 @pytest.mark.parametrize(
     ("file", "hangs_m"),
-    [("tower-crane", 30.0), ("telehandler", 8.0), ("bridge-crane", 8.0), ("multicopter", 5.0)],
+    [
+        ("tower-crane", 30.0),
+        ("telehandler", 8.0),
+        ("bridge-crane", 8.0),
+        ("bridge-crane-hook", 10.0),
+        ("multicopter", 5.0),
+    ],
 )
 def test_a_crane_with_a_rope_is_drawn_in_both_views(
     own: Callable[..., Studio], tab: Callable[..., Page], file: str, hangs_m: float
@@ -158,6 +164,41 @@ def test_a_crane_with_a_rope_is_drawn_in_both_views(
     for inside, below, hangs in page.evaluate(HANGS_M, [other.hello, shown]):
         assert inside and below
         assert hangs == pytest.approx(hangs_m, abs=0.02)
+
+
+def test_a_multicopter_that_is_far_away_is_in_the_picture(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    studio = own(file="config/multicopter.yaml", groups=())
+    page = tab(studio)
+    with studio.page() as other:
+        shown = other.until(lambda s: all(crane["measured"] for crane in s["cranes"].values()))
+    for crane in shown["cranes"].values():
+        crane["trolley"] = [400.0, -60.0, 5.0]
+    assert max(page.evaluate(GRAPPLES_SEEN, [other.hello, shown])) < 1.0
+    (_, _, hangs), *_ = page.evaluate(HANGS_M, [other.hello, shown])
+    assert hangs == pytest.approx(5.0, abs=0.02)
+
+
+# What a crane is made of below each group, and where the parts of its base and its turntable are.
+PARTS = """async (hello) => {
+    const { Crane } = await import("/static/crane.js");
+    const crane = new Crane(hello, "one", "--raw");
+    return [crane.base, crane.slew].map((group) => group.children.map((one) => one.position.z));
+}"""
+
+
+def test_an_excavator_has_tracks_and_a_house(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    studio = own(file="config/excavator.yaml", groups=())
+    page = tab(studio)
+    with studio.page() as other:
+        base, slew = page.evaluate(PARTS, other.hello)
+        forwarder, _ = page.evaluate(PARTS, {**other.hello, "drawn": None})
+    assert base == pytest.approx([0.45, 0.45, 0.85])
+    assert slew[:3] == pytest.approx([1.5, 1.6, 1.9])
+    assert len(forwarder) == 8
 
 
 def test_the_hint_covers_no_words_of_a_view(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.commissioning.procedure.procedure import STEPS
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.studio.server import STATIC
 from canshaper.studio.words import said

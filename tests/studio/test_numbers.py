@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 
 from canshaper.cli.app import app
 from canshaper.commissioning import control_client as client
+from tests.rigs.files import machine_file
 from tests.studio.machine import A1, PERIOD, Machine
 from tests.studio.page import Page
 
@@ -207,10 +208,5 @@ def test_only_a_machine_of_ones_own_file_is_adjusted(tmp_path: Path) -> None:
 
     assert "--adjust, --control: expected with --shadow --adjust" in refusal("--adjust")
     assert "--adjust: shipped with the package; copy it" in refusal("--shadow", "--adjust")
-    text = (
-        (Path("config/forwarder.yaml")).read_text().replace("../dbc/", f"{Path('dbc').resolve()}/")
-    )
-    (tmp_path / "own.yaml").write_text(text)
-    assert "this file has no control section" in refusal(
-        str(tmp_path / "own.yaml"), "--shadow", "--adjust"
-    )
+    own = str(machine_file(tmp_path, "forwarder"))
+    assert "this file has no control section" in refusal(own, "--shadow", "--adjust")

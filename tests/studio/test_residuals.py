@@ -7,7 +7,7 @@ from urllib.request import urlopen
 import pytest
 
 from canshaper.cli.common import loader
-from canshaper.studio.swing import residuals
+from canshaper.studio.seen import residuals
 from tests.studio.conftest import Studio
 from tests.studio.page import WAIT_S
 

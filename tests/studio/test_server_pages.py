@@ -139,50 +139,6 @@ def test_a_huge_message_closes_the_page(shared: Studio) -> None:
 
 
 @pytest.mark.slow
-def test_a_silent_page_loses_the_joysticks_then_enable(shared: Studio) -> None:
-    with shared.page() as page:
-        page.drive()
-        assert page.joysticks is not None
-        page.joysticks["lift"] = -0.4
-        page.until(lambda s: valves(s, "shaped")[2] < -0.2)
-        page.joysticks = None
-        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
-        assert page.shown["enable"]
-        page.until(lambda s: not s["enable"])
-        # At rest by then, so it is no trip.
-        page.until(lambda _: page.states() == {"wait"}, "enable off")
-        assert any("is silent; joysticks in neutral" in text for text in page.texts())
-
-
-@pytest.mark.slow
-def test_a_second_driver_stops_the_first(shared: Studio) -> None:
-    with shared.page() as page, shared.page() as other:
-        page.drive()
-        assert page.joysticks is not None
-        page.joysticks["lift"] = 0.4
-        page.until(lambda s: valves(s, "shaped")[2] > 0.2)
-        other.send(do="take")
-        page.until(lambda s: s["driver"] == other.hello["page"])
-        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
-        page.until(lambda s: not s["enable"], "enable released")
-        assert any("takes the joysticks from" in text for text in page.texts())
-
-
-@pytest.mark.slow
-def test_a_page_that_is_closed_leaves_the_joysticks_in_neutral(shared: Studio) -> None:
-    with shared.page() as other:
-        with shared.page() as page:
-            page.drive()
-            assert page.joysticks is not None
-            page.joysticks["lift"] = -0.4
-            page.until(lambda s: valves(s, "shaped")[2] < -0.2)
-        other.now()
-        other.until(lambda s: s["driver"] is None, "no driver")
-        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
-        other.until(lambda s: not s["enable"], "enable released")
-
-
-@pytest.mark.slow
 def test_pages_beyond_the_most_are_refused_with_the_reason(shared: Studio) -> None:
     with ExitStack() as stack:
         for _ in range(MOST_PAGES):

@@ -11,8 +11,8 @@ from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.studio.crane import copied
 from canshaper.studio.sliders import LENGTH, RANGES, adjustable, sliders, values
+from tests.rigs.files import CONFIG, machine_file
 
-CONFIG = Path(__file__).parents[2] / "config"
 FILES = sorted(path.name for path in CONFIG.glob("*.yaml") if "axes:" in path.read_text())
 
 
@@ -48,10 +48,8 @@ def test_the_copy_of_every_shipped_file_is_a_deployment(file: str, tmp_path: Pat
 
 
 def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
-    text = (CONFIG / "forwarder.yaml").read_text().replace("../dbc", str(CONFIG.parent / "dbc"))
-    text += "\ncontrol: { adjustable: { axes.slew.limits.max_pct: [50, 100] } }\n"
-    file = tmp_path / "own.yaml"
-    file.write_text(text)
+    control = "\ncontrol: { adjustable: { axes.slew.limits.max_pct: [50, 100] } }\n"
+    file = machine_file(tmp_path, "forwarder", more=control)
     (tmp_path / "copy").mkdir()
     _, copy = copied(file, tmp_path / "copy")
     assert copy.config.control

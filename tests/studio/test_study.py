@@ -16,10 +16,10 @@ from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.shipped import deployment_path
 from canshaper.studio.in_process import InProcessCrane
-from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, plan
-from canshaper.studio.study_files import KEY, Key, Table, read_key, rows_of
+from canshaper.studio.study import LIMIT_S, ORDERS, SHOWN_S, Session, Table, plan, rows_of
 from canshaper.studio.study_stage import CRANE, RealJoysticks, StudyStage, setting
 from canshaper.studio.view import CraneView
 from canshaper_sim.hand import Hand, Held
@@ -168,33 +168,17 @@ def test_a_row_that_was_cut_off_is_taken_away(tmp_path: Path) -> None:
     person = Person(tmp_path)
     person.begin()
     person.place()
-    path = person.table.path
-    path.write_bytes(path.read_bytes() + b"0123abcd,P01,keyb")
+    with (path := person.table.path).open("ab") as file:
+        file.write(b"0123abcd,P01,keyb")
     assert len(Table(path, dict(COMMON)).rows) == 1
     assert len(rows_of(path, COMMON["study"])) == 1
     with pytest.raises(UsageError, match="expected placements of the study 77777777"):
         Table(path, {**COMMON, "study": "77777777"})
 
 
-def test_the_key_is_sealed_and_that_of_one_study(tmp_path: Path) -> None:
-    settings, task = {"raw": "1", "a.yaml": "1", "b.yaml": "2"}, {"practice": 2}
-    key = Key(tmp_path / KEY, settings, task)
-    assert set(key.letters) == set("ABC") and set(key.letters.values()) == set(settings)
-    again = Key(tmp_path / KEY, settings, task)
-    assert (again.letters, again.seed, again.mark) == (key.letters, key.seed, key.mark)
-    assert b"raw" not in (tmp_path / KEY).read_bytes()
-    assert read_key(tmp_path / KEY)["letters"] == key.letters
-    with pytest.raises(UsageError, match="expected the settings that the study began with"):
-        Key(tmp_path / KEY, settings | {"b.yaml": "3"}, task)
-    with pytest.raises(UsageError, match="expected the task that the study began with"):
-        Key(tmp_path / KEY, settings, task | {"practice": 3})
-    (tmp_path / KEY).write_text("{")
-    with pytest.raises(UsageError, match="expected the key of a study"):
-        read_key(tmp_path / KEY)
-
-
-def swing_of(crane: InProcessCrane, view: CraneView, *, anti_sway: bool) -> float:
+def swing_deg(deployment: Deployment, *, anti_sway: bool) -> float:
     """Largest sway of a slew of a second."""
+    crane, view = InProcessCrane(deployment), CraneView(deployment, lambda _text, _level: None)
     largest = 0.0
     for k in range(200):
         held = Held({"slew": 1.0 if 20 < k < 70 else 0.0}, enable=True, anti_sway=anti_sway)
@@ -209,29 +193,20 @@ def test_a_raw_setting_is_the_crane_with_anti_sway_off(name: str, tmp_path: Path
     path = deployment_path(name)
     own = load_deployment(path)
     raw, shaped = setting(path, tmp_path, raw=True), setting(path, tmp_path)
-
-    def swing(deployment: Any, *, anti_sway: bool) -> float:
-        view = CraneView(deployment, lambda _text, _level: None)
-        return swing_of(InProcessCrane(deployment), view, anti_sway=anti_sway)
-
-    off = swing(own, anti_sway=False)
+    off = swing_deg(own, anti_sway=False)
     assert off > 15.0
-    assert swing(raw, anti_sway=True) == pytest.approx(off, abs=0.2)
-    assert swing(shaped, anti_sway=False) == swing(shaped, anti_sway=True) < 0.7 * off
+    assert swing_deg(raw, anti_sway=True) == pytest.approx(off, abs=0.2)
+    assert swing_deg(shaped, anti_sway=False) == swing_deg(shaped, anti_sway=True) < 0.7 * off
 
 
 def stage_of(folder: Path, joysticks: RealJoysticks | None = None) -> StudyStage:
     robust = deployment_path("forwarder-robust.yaml")
-    settings = {
-        "A": setting(robust, folder, raw=True),
-        "B": setting(robust, folder),
-        "C": setting(deployment_path("forwarder-gff.yaml"), folder),
-    }
+    settings = {"A": setting(robust, folder, raw=True), "B": setting(robust, folder)}
+    settings["C"] = setting(deployment_path("forwarder-gff.yaml"), folder)
     table = Table(folder / "P01.csv", dict(COMMON))
-    planned = plan(COUNTS, 5.0, "ABC", "1 P01")
     return StudyStage(
-        settings, planned, 1.0, table, parameters=changed_parameters(START), changes=START,
-        joysticks=joysticks, done=lambda: None,
+        settings, plan(COUNTS, 5.0, "ABC", "1 P01"), 1.0, table,
+        parameters=changed_parameters(START), changes=START, joysticks=joysticks, done=lambda: None,
     )  # fmt: skip
 
 
@@ -253,8 +228,7 @@ def test_nothing_that_a_page_gets_depends_on_the_setting(stage: StudyStage) -> N
                 session.view.receive(frame, k * 0.02)
         shown = stage.snapshot()
         crane = shown["cranes"][CRANE]
-        for name in ("pose", "sway"):
-            crane.pop(name)
+        del crane["pose"], crane["sway"]
         assert [axis["joystick"] for axis in crane["axes"].values()] == [1.0, 0.0, 0.0]
         seen.append({**shown, "t": 0.0})
     assert seen[0] == seen[1] == seen[2]
@@ -274,6 +248,9 @@ def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> No
     bus = Bus(interface="udp_multicast", channel=free_groups()[0])
     deployment = load_deployment(deployment_path("forwarder-robust.yaml"))
     deployment.config.buses["crane"] = bus
+    for wrong in ("JoystickRight", "JoystickRight.Nothing", "Nothing.Grip"):
+        with pytest.raises(UsageError, match="--grip: expected MESSAGE"):
+            RealJoysticks(deployment, wrong)
     joysticks = RealJoysticks(deployment, "JoystickRight.Reset")
     sender, listener = open_port("crane", bus, lambda _: None), Listener(bus.channel)
     try:
@@ -300,13 +277,6 @@ def test_real_joysticks_drive_and_grip_and_nothing_is_sent(tmp_path: Path) -> No
     finally:
         for port in (joysticks, sender, listener.port):
             port.close()
-
-
-def test_what_a_grip_is_has_to_be_a_signal() -> None:
-    deployment = load_deployment(deployment_path("forwarder-robust.yaml"))
-    for wrong in ("JoystickRight", "JoystickRight.Nothing", "Nothing.Grip"):
-        with pytest.raises(UsageError, match="--grip: expected MESSAGE"):
-            RealJoysticks(deployment, wrong)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.studio.study_files import COLUMNS, KEY, Key
+from canshaper.errors import UsageError
+from canshaper.studio.study import COLUMNS, KEY, Key, read_key
 from canshaper.studio.study_results import SPREAD, person_page, power, rows_of
 from tests.studio.second_program import figures, of_page
 
@@ -54,6 +55,23 @@ def folder(tmp_path: Path) -> Path:
         written(tmp_path / f"P{number:02}.csv", key.mark)
     written(tmp_path / "P09.csv", key.mark, missing=1)
     return tmp_path
+
+
+def test_the_key_is_sealed_and_that_of_one_study(tmp_path: Path) -> None:
+    settings, task = {"raw": "1", "a.yaml": "1", "b.yaml": "2"}, {"practice": 2}
+    key = Key(tmp_path / KEY, settings, task)
+    assert set(key.letters) == set("ABC") and set(key.letters.values()) == set(settings)
+    again = Key(tmp_path / KEY, settings, task)
+    assert (again.letters, again.seed, again.mark) == (key.letters, key.seed, key.mark)
+    assert b"raw" not in (tmp_path / KEY).read_bytes()
+    assert read_key(tmp_path / KEY)["letters"] == key.letters
+    with pytest.raises(UsageError, match="expected the settings that the study began with"):
+        Key(tmp_path / KEY, settings | {"b.yaml": "3"}, task)
+    with pytest.raises(UsageError, match="expected the task that the study began with"):
+        Key(tmp_path / KEY, settings, task | {"practice": 3})
+    (tmp_path / KEY).write_text("{")
+    with pytest.raises(UsageError, match="expected the key of a study"):
+        read_key(tmp_path / KEY)
 
 
 def joined(folder: Path, *options: str) -> str:

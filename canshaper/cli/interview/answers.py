@@ -9,7 +9,7 @@ from typing import TypeVar
 import typer
 
 from canshaper.cli.common import echo
-from canshaper.errors import ConfigError, Problem, UsageError
+from canshaper.errors import ConfigError, Problem, UsageError, did_you_mean
 
 _T = TypeVar("_T")
 NONE = "-"
@@ -120,10 +120,9 @@ _given: Given | Proposed | None = None
 
 
 @contextmanager
-def answered_with(proposed: Proposed) -> Iterator[None]:
-    """Answer all questions in the block by their proposals."""
+def _answered(given: Given | Proposed | None) -> Iterator[None]:
     global _given  # noqa: PLW0603  # of the one command that runs
-    _given = proposed
+    _given = given
     try:
         yield
     finally:
@@ -136,14 +135,11 @@ def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
 
     With ``yes`` what has no line in it is answered as by Enter, without a file everything.
     """
-    global _given  # noqa: PLW0603  # of the one command that runs
-    _given = given = Given(path) if path or yes else None
-    try:
+    given = Given(path) if path or yes else None
+    with _answered(given):
         yield
         if given:
             given.check_all_used()
-    finally:
-        _given = None
 
 
 def confirmed(text: str, *, default: bool) -> bool:
@@ -190,8 +186,6 @@ def channel(text: str) -> str:
 
 def _listed(allowed: Sequence[str], text: str) -> str:
     """Those that are allowed, not more than a person reads, and the one that looks like a text."""
-    from canshaper.errors import did_you_mean
-
     names = ", ".join(allowed[:MOST_LISTED])
     more = f" and {len(allowed) - MOST_LISTED} more" if len(allowed) > MOST_LISTED else ""
     return f"{names}{more}, got {text!r}{did_you_mean(text, allowed)}"
@@ -269,7 +263,7 @@ def accepted(ask: Callable[[], _T]) -> _T | None:
 
     proposed = Proposed()
     made = None
-    with suppress(UsageError, ValueError), answered_with(proposed):
+    with suppress(UsageError, ValueError), _answered(proposed):
         made = ask()
     if made is None:
         return None

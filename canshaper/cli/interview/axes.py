@@ -1,32 +1,41 @@
-"""Questions of ``canshaper init`` on the axes of a joystick and their valves."""
+"""Questions of ``canshaper init`` on the axes of a joystick, their valves and their signals."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+
+from cantools.database.can import Message, Signal
 
 from canshaper.cli.common import echo
-from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, name, one, period_ms, whole
+from canshaper.cli.interview.answers import (
+    MOST_OFFERED,
+    NONE,
+    ask,
+    confirmed,
+    name,
+    number,
+    one,
+    period_ms,
+    whole,
+)
+from canshaper.cli.interview.first import VALVE_TIMEOUT_MS, FirstAxis, FirstJoystick, FirstScaling
 from canshaper.cli.interview.nodes import Nodes
-from canshaper.cli.interview.scaling import code_meanings, command_scaling, valve_scaling
-from canshaper.cli.interview.swing import sensor_of, slewing_of, swing_of
+from canshaper.cli.interview.swing import code_meanings, sensor_of, slewing_of, swing_of
+from canshaper.codec.signals import magnitude_range, symmetrical_range
+from canshaper.commissioning import suggest
+from canshaper.config.load import limits
+from canshaper.config.schema import Valve
 from canshaper.errors import UsageError
-
-if TYPE_CHECKING:
-    from cantools.database.can import Message, Signal
-
-    from canshaper.cli.interview.first import FirstAxis, FirstJoystick
+from canshaper.machine.valves import FRAMES_PER_TIMEOUT
 
 
 def add_axes(
-    axes: "list[FirstAxis]",
-    joystick: "FirstJoystick",
-    message: "Message",
-    others: "list[Message]",
+    axes: list[FirstAxis],
+    joystick: FirstJoystick,
+    message: Message,
+    others: list[Message],
     nodes: Nodes,
 ) -> None:
     """Ask for the axes of a joystick and add them; ``others`` are the messages of no joystick."""
-    from canshaper.cli.interview.first import FirstAxis
-    from canshaper.commissioning import suggest
-
     two_sided = suggest.velocities(message)
     for command in two_sided or suggest.one_sided(message):
         names = [axis.name for axis in axes]
@@ -52,34 +61,30 @@ def add_axes(
             sensor = replace(sensor, node=nodes.supervised(sensor.message))
         axes.append(
             FirstAxis(
-                axis,
-                joystick.name,
-                command.name,
-                sender.name,
-                signal.name,
-                timeout_ms,
-                suggest.counter(sender),
-                status.name if status else None,
-                swing,
-                slewing,
-                sensor,
-                scaling,
-                of_valve,
-                None if sender.cycle_time else cycle,
-                cia408,
-                None if cia408 else nodes.supervised(sender.name),
-                codes,
-                known,
+                name=axis,
+                joystick=joystick.name,
+                command_signal=command.name,
+                valve=sender.name,
+                signal=signal.name,
+                timeout_ms=timeout_ms,
+                alive_counter=suggest.counter(sender),
+                status=status.name if status else None,
+                swing=swing,
+                slewing=slewing,
+                sensor=sensor,
+                scaling=scaling,
+                valve_scaling=of_valve,
+                cycle_ms=None if sender.cycle_time else cycle,
+                cia408=cia408,
+                node=None if cia408 else nodes.supervised(sender.name),
+                codes=codes,
+                timeout_known=known,
             )
         )
 
 
-def _valve_of(
-    axis: str, command: "Signal", others: "list[Message]"
-) -> "tuple[Message, Signal] | None":
+def _valve_of(axis: str, command: Signal, others: list[Message]) -> tuple[Message, Signal] | None:
     """Message and signal of the valve of an axis; it is taken from those that are left."""
-    from canshaper.commissioning import suggest
-
     candidates = suggest.valves(others, command.name)
     possible = [m for m in candidates if _valve_timeouts(m.cycle_time or 0) is not None]
     commands = {f"{m.name}.{s.name}": (m, s) for m in possible for s in suggest.valve_signals(m)}
@@ -98,10 +103,6 @@ def _valve_of(
 
 def _valve_timeouts(cycle_ms: int) -> tuple[int, int] | None:
     """Shortest and longest of a valve that is commanded so often; None where there is none."""
-    from canshaper.config.load import limits
-    from canshaper.config.schema import Valve
-    from canshaper.machine.valves import FRAMES_PER_TIMEOUT
-
     least, most = (int(ms) for ms in limits(Valve, "timeout_ms"))
     shortest = max(least, FRAMES_PER_TIMEOUT * cycle_ms)
     return (shortest, most) if shortest <= most else None
@@ -113,8 +114,6 @@ def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
     Returns:
         The timeout in ms, and whether EDS or operator say it: else it is our proposal.
     """
-    from canshaper.cli.interview.first import VALVE_TIMEOUT_MS
-
     timeouts = _valve_timeouts(cycle_ms)
     if timeouts is None:
         raise UsageError(f"{axis}: its valve has no timeout of three periods of {cycle_ms} ms")
@@ -123,3 +122,74 @@ def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
     likely = min(max(set_ms or VALVE_TIMEOUT_MS, shortest), most)
     answer = ask(text, whole(shortest, most), str(likely))
     return answer, bool(set_ms) or answer != likely
+
+
+_LARGEST = 1e9
+MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
+
+
+def command_scaling(signal: Signal, message: Message) -> FirstScaling:
+    """Ask how a joystick signal gives a command: around a value, with flags, or by two signals."""
+    if symmetrical_range(signal) is None:
+        return FirstScaling()
+    if suggest.two_sided(signal):
+        return _around_zero(signal)
+    flags = [s.name for s in suggest.switches(message)]
+    rockers = [s.name for s in suggest.one_sided(message) if s.name != signal.name]
+    kinds = [MIDDLE, *([FLAGS] if len(flags) > 2 else []), *([SECOND] if rockers else [])]
+    guess = suggest.direction_flags(message, signal)
+    text = f"  {signal.name}: direction by a middle value, flags or a second signal, of"
+    kind = ask(f"{text} {', '.join(kinds)}", one(kinds), FLAGS if guess else MIDDLE)
+    if kind == MIDDLE:
+        return _around_middle(signal)
+    full = None if magnitude_range(signal) is None else _full(signal, 0.0)
+    if kind == SECOND:
+        text = f"  {signal.name}: the signal of the other direction, of {', '.join(rockers)}"
+        return FirstScaling(full, negative=ask(text, one(rockers), rockers[0]))
+    text = f"  {signal.name}: flags of neutral, negative and positive, of {', '.join(flags)}"
+    chosen = ask(text, _three(flags), " ".join(guess or flags[:3]))
+    return FirstScaling(full, flags=chosen)
+
+
+def valve_scaling(signal: Signal) -> FirstScaling:
+    """Ask for the scaling of a valve's signal."""
+    if symmetrical_range(signal) is None:
+        return FirstScaling()
+    return _around_zero(signal) if suggest.two_sided(signal) else _around_middle(signal)
+
+
+def _around_zero(signal: Signal) -> FirstScaling:
+    return FirstScaling(_full(signal, 0.0), invert=_inverted(signal))
+
+
+def _around_middle(signal: Signal) -> FirstScaling:
+    low, high = suggest.reach(signal)
+    middle = suggest.likely_middle(signal)
+    text = f"  {signal.name}: its value in the middle, at zero command"
+    zero = ask(text, number(low, high), f"{middle:.12g}")
+    return FirstScaling(_full(signal, zero), zero, _inverted(signal))
+
+
+def _full(signal: Signal, zero: float) -> float:
+    """Ask for the value from zero to full command."""
+    likely = suggest.likely_full(signal, zero)
+    distance = f", from {zero:g}" if zero else ""
+    text = f"  {signal.name}: its value at full{distance}"
+    return ask(text, number(1e-6, _LARGEST), f"{likely:.12g}")
+
+
+def _inverted(signal: Signal) -> bool:
+    text = f"  {signal.name}: does it count the other way round (invert)"
+    return confirmed(text, default=False)
+
+
+def _three(allowed: Sequence[str]) -> Callable[[str], tuple[str, str, str]]:
+    """Takes three different ones of these, with spaces or commas between."""
+
+    def parse(text: str) -> tuple[str, str, str]:
+        names = text.replace(",", " ").split()
+        if len({*names}) != 3 or len(names) != 3 or not {*names} <= {*allowed}:
+            raise ValueError(f"expected three of {', '.join(allowed)}, got {text!r}")
+        return names[0], names[1], names[2]
+
+    return parse

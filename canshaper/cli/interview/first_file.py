@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from canshaper.cli.interview.first import (
     FIRST_MAX_PCT,
@@ -12,7 +12,6 @@ from canshaper.cli.interview.first import (
     TEN_SWINGS_S,
     FirstAxis,
     FirstCanopen,
-    FirstCia408,
     FirstJoystick,
     FirstLoad,
     FirstMachine,
@@ -30,6 +29,28 @@ def first_deployment(machine: FirstMachine) -> str:
     return "\n".join(_lines(machine)) + "\n"
 
 
+def _text(value: object) -> str:
+    """A value as it is written; texts are as they are, a mapping is one line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    return _flow(**value) if isinstance(value, Mapping) else str(value)
+
+
+def _flow(**values: object) -> str:
+    """A section in one line; keys without a value are left out."""
+    texts = (f"{key}: {_text(value)}" for key, value in values.items() if value is not None)
+    return f"{{ {', '.join(texts)} }}"
+
+
+def _block(indent: int, **values: object) -> Iterator[str]:
+    """A section, a key a line; those without a value are left out."""
+    for key, value in values.items():
+        if value is not None:
+            yield f"{' ' * indent}{key}: {_text(value)}"
+
+
 def _lines(machine: FirstMachine) -> Iterator[str]:
     yield "# Written by canshaper init. Every key: docs/deployment.md."
     yield from (f"# {note}" for note in machine.notes)
@@ -38,14 +59,14 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     yield "tick_ms: 20 # period of the control loop"
     yield ""
     yield "buses:"
-    channel = plain(machine.channel)
-    bus = f"interface: {machine.interface}, channel: {channel}, bitrate: {machine.bitrate}"
+    bus: dict[str, object] = {"interface": machine.interface, "channel": plain(machine.channel)}
+    bus["bitrate"] = machine.bitrate
     if machine.data_bitrate:
-        bus += f", fd: true, data_bitrate: {machine.data_bitrate}"
+        bus |= {"fd": True, "data_bitrate": machine.data_bitrate}
     if machine.canopen:
         yield from _canopen(bus, machine.canopen)
     else:
-        yield f"  crane: {{ {bus} }}"
+        yield from _block(2, crane=bus)
     yield ""
     yield f"dbc: [{', '.join(plain(path) for path in machine.dbc)}] # relative to this file"
     yield ""
@@ -62,12 +83,14 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     if machine.motion:
         yield from _motion(machine.motion)
         yield ""
-    if machine.load and machine.load.message:
-        yield from _load(machine.load)
+    if (load := machine.load) and load.message:
+        keys = {"message": load.message, "signal": load.signal, "timeout_ms": load.timeout_ms}
+        yield "# What the grapple holds; silent for so long, and the axes' own filters hold."
+        yield f"load_state: {_flow(bus='crane', **keys, codes=_codes(load.codes))}"
         yield ""
     for key in ("status", "identity"):
         if (message := getattr(machine, key)) is not None:
-            yield f"{key}: {{ bus: crane, message: {message} }}"
+            yield f"{key}: {_flow(bus='crane', message=message)}"
             yield ""
     if assumed := [key for axis in machine.axes for key in axis.assumed()]:
         yield "# Guesses that no one has measured or typed: a verb with --write takes out what it"
@@ -92,49 +115,36 @@ def _adjustable(machine: FirstMachine) -> Iterator[str]:
             yield f"    axes.{axis.name}.sway.period_s: [{low}, {high}]"
 
 
-def _canopen(bus: str, canopen: FirstCanopen) -> Iterator[str]:
+def _canopen(bus: Mapping[str, object], canopen: FirstCanopen) -> Iterator[str]:
     yield "  crane:"
-    yield from (f"    {part}" for part in bus.split(", "))
+    yield from _block(4, **bus)
     yield "    canopen:"
     yield f"      node: {canopen.node} # ours"
-    yield f"      master: {str(canopen.master).lower()} # false where another one starts the nodes"
+    yield f"      master: {_text(canopen.master)} # false where another one starts the nodes"
     if canopen.nodes:
         yield "      nodes: # heartbeat_ms: silence after which one is lost"
     for name, (number, heartbeat_ms) in canopen.nodes.items():
-        yield f"        {name}: {{ id: {number}, heartbeat_ms: {heartbeat_ms} }}"
-
-
-def _cia408(valve: str, cia408: FirstCia408) -> Iterator[str]:
-    yield "    valve:"
-    yield from (f"      {part}" for part in ("bus: crane", *valve.split(", ")))
-    yield "      cia408:"
-    yield f"        control: {cia408.control}"
-    status = f"message: {cia408.message}, signal: {cia408.signal}, timeout_ms: {cia408.timeout_ms}"
-    yield f"        status: {{ bus: crane, {status} }}"
-    if cia408.node:
-        yield f"        node: {cia408.node}"
+        yield f"        {name}: {_flow(id=number, heartbeat_ms=heartbeat_ms)}"
 
 
 def _joystick(joystick: FirstJoystick) -> Iterator[str]:
+    enable = f"{joystick.name}_enable" if joystick.switch else joystick.enable
     yield f"  {joystick.name}:"
-    yield "    bus: crane"
-    yield f"    message: {joystick.message}"
-    yield f"    timeout_ms: {joystick.timeout_ms} # five lost messages"
-    if joystick.cycle_ms:
-        yield f"    cycle_ms: {joystick.cycle_ms}"
-    if joystick.node:
-        yield f"    node: {joystick.node}"
-    if joystick.multiplexor is not None:
-        yield f"    multiplexor: {joystick.multiplexor}"
-    if joystick.enable_of:
-        yield f"    enable_of: {joystick.enable_of}"
-    elif joystick.enable:
-        yield f"    enable: {f'{joystick.name}_enable' if joystick.switch else joystick.enable}"
-    else:
+    yield from _block(
+        4,
+        bus="crane",
+        message=joystick.message,
+        timeout_ms=f"{joystick.timeout_ms} # five lost messages",
+        cycle_ms=joystick.cycle_ms,
+        node=joystick.node,
+        multiplexor=joystick.multiplexor,
+        enable_of=joystick.enable_of,
+        enable=None if joystick.enable_of else enable,
+    )
+    if not (joystick.enable_of or enable):
         yield "    # enable: the switch that is held; without one this file is refused"
-    for key in ("reset", "anti_sway_off", "alive_counter"):
-        if (signal := getattr(joystick, key)) is not None:
-            yield f"    {key}: {signal}"
+    keys = ("reset", "anti_sway_off", "alive_counter")
+    yield from _block(4, **{key: getattr(joystick, key) for key in keys})
 
 
 def _switches(machine: FirstMachine) -> Iterator[str]:
@@ -143,57 +153,49 @@ def _switches(machine: FirstMachine) -> Iterator[str]:
     if not having:
         return
     yield "switches:"
-    for joystick in having:
-        yield f"  {joystick.name}_enable:"
-        yield "    bus: crane"
-        yield f"    message: {joystick.switch}"
-        yield f"    signal: {joystick.enable}"
-        if joystick.code is not None:
-            yield f"    code: {joystick.code} # the only value that enables"
-        yield f"    timeout_ms: {joystick.timeout_ms}"
-        if joystick.cycle_ms:
-            yield f"    cycle_ms: {joystick.cycle_ms}"
+    for one in having:
+        code = None if one.code is None else f"{one.code} # the only value that enables"
+        times = {"timeout_ms": one.timeout_ms, "cycle_ms": one.cycle_ms}
+        yield f"  {one.name}_enable:"
+        yield from _block(4, bus="crane", message=one.switch, signal=one.enable, code=code, **times)
     yield ""
 
 
 def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> Iterator[str]:
-    counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
-    valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
+    command = {"joystick": axis.joystick, "signal": axis.command_signal, **_scaling(axis.scaling)}
+    valve: dict[str, object] = {"bus": "crane", "message": axis.valve, "signal": axis.signal}
+    valve |= {"timeout_ms": axis.timeout_ms, "alive_counter": axis.alive_counter}
+    valve |= _scaling(axis.valve_scaling) | {"cycle_ms": axis.cycle_ms, "node": axis.node}
     yield f"  {axis.name}:"
-    command = f"joystick: {axis.joystick}, signal: {axis.command_signal}"
-    command += _scaling(axis.scaling) + _codes(axis.codes)
-    valve += _scaling(axis.valve_scaling)
-    valve += f", cycle_ms: {axis.cycle_ms}" if axis.cycle_ms else ""
-    valve += f", node: {axis.node}" if axis.node else ""
-    yield f"    command: {{ {command}, neutral_pct: 2 }}"
-    if axis.cia408:
-        yield from _cia408(valve, axis.cia408)
+    yield f"    command: {_flow(**command, codes=_codes(axis.codes), neutral_pct=2)}"
+    if cia408 := axis.cia408:
+        status = {"bus": "crane", "message": cia408.message, "signal": cia408.signal}
+        status["timeout_ms"] = f"{cia408.timeout_ms}"
+        yield "    valve:"
+        yield from _block(6, **valve)
+        yield "      cia408:"
+        yield from _block(8, control=cia408.control, status=status, node=cia408.node)
     else:
-        yield f"    valve: {{ bus: crane, {valve} }}"
+        yield from _block(4, valve=valve)
     if axis.status:
-        yield f"    status: {{ bus: crane, message: {axis.status} }}"
-    limits = f"max_pct: {FIRST_MAX_PCT}, deadband_pct: 0, rise_per_s: 5, fall_per_s: 5"
+        yield f"    status: {_flow(bus='crane', message=axis.status)}"
+    limits = {"max_pct": FIRST_MAX_PCT, "deadband_pct": 0, "rise_per_s": 5, "fall_per_s": 5}
     if axis.swing is None:
         yield "    filter: { kind: off } # it makes nothing swing"
-        yield f"    limits: {{ {limits}, tail_s: 0.5, stop_s: 0.5 }}"
+        yield f"    limits: {_flow(**limits, tail_s=0.5, stop_s=0.5)}"
         return
     swing = axis.swing
-    if slewing := axis.slewing:
-        speeds = f"full_speed_rad_s: {slewing.full_speed_rad_s:g}"
-        yield f"    slewing: {{ {speeds}, largest_radius_m: {slewing.largest_radius_m:g} }}"
+    yield from _block(4, slewing=axis.slewing and asdict(axis.slewing))
     guess = " Assumed: no one has measured it." if swing.ten_swings_s == TEN_SWINGS_S else ""
     ten_s = f"Ten swings in {swing.ten_swings_s:g} s"
     yield f"    # {ten_s}, from {swing.first:g} to {swing.last:g}.{guess}"
-    sway = swing.sway
     yield f"    {_sway(swing)}"
     if sensor := axis.sensor:
-        fusion = "" if sensor.fusion_s is None else f", fusion_s: {sensor.fusion_s:g}"
-        keys = f"message: {sensor.message}, signal: {sensor.signal}, kind: {sensor.kind}{fusion}"
-        keys += _codes(sensor.codes)
+        keys: dict[str, object] = {"message": sensor.message, "signal": sensor.signal}
+        keys |= {"kind": sensor.kind, "fusion_s": sensor.fusion_s, "codes": _codes(sensor.codes)}
+        keys |= {"use": "watch", "timeout_ms": sensor.timeout_ms, "node": sensor.node}
         yield "    # Sign, delay and noise: `canshaper sensor FILE --live --write`. Then use: damp."
-        timeout = f"timeout_ms: {sensor.timeout_ms}"
-        timeout += f", node: {sensor.node}" if sensor.node else ""
-        yield f"    sway_sensor: {{ bus: crane, {keys}, use: watch, {timeout} }}"
+        yield f"    sway_sensor: {_flow(bus='crane', **keys)}"
     yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."
     yield f"    {_filter(swing)}"
     if load and load.message:
@@ -201,12 +203,12 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> 
     yield "    # First motion at reduced speed: raise max_pct when all is well."
     speed = axis.slewing.full_speed_m_s if axis.slewing else swing.full_speed_m_s
     # One response for a range of pendulums runs on a third longer.
-    longest_s = load.ten_swings_s[axis.name] / 7.5 if load else sway.mode().period_s
-    distance = stop_distance_m(speed, longest_s, joystick_timeout_ms, axis.timeout_ms)
+    longest_s = load.ten_swings_s[axis.name] / 7.5 if load else swing.sway.mode().period_s
+    distance_m = stop_distance_m(speed, longest_s, joystick_timeout_ms, axis.timeout_ms)
     yield "    # stop_distance_m: write how far the tip may travel when it stops from full speed."
     yield "    # It is a limit, here a guess; `canshaper check` shows what the filter needs."
-    tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
-    yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
+    tail = {"reversal": "brake_shaped", "tail_s": FIRST_TAIL_S, "stop_s": FIRST_TAIL_S}
+    yield f"    limits: {_flow(**limits, **tail, stop_distance_m=distance_m)}"
 
 
 def _schedule(swing: Stopwatch, load: FirstLoad, ten_swings_s: float) -> Iterator[str]:
@@ -220,9 +222,8 @@ def _schedule(swing: Stopwatch, load: FirstLoad, ten_swings_s: float) -> Iterato
 
 
 def _sway(swing: Stopwatch) -> str:
-    sway = swing.sway
-    shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
-    return f"sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
+    keys = ("period_s", "decay_per_swing", "full_speed_m_s")
+    return f"sway: {_flow(**{key: getattr(swing.sway, key) for key in keys})}"
 
 
 def _filter(swing: Stopwatch) -> str:
@@ -230,28 +231,22 @@ def _filter(swing: Stopwatch) -> str:
     return f"filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
 
 
-def _load(load: FirstLoad) -> Iterator[str]:
-    yield "# What the grapple holds; silent for so long, and the axes' own filters hold."
-    keys = f"message: {load.message}, signal: {load.signal}, timeout_ms: {load.timeout_ms}"
-    yield f"load_state: {{ bus: crane, {keys}{_codes(load.codes)} }}"
+def _scaling(scaling: FirstScaling) -> dict[str, object]:
+    """Its keys."""
+    full, zero = (v if v is None else f"{v:.12g}" for v in (scaling.full, scaling.zero))
+    names = ("neutral", "negative", "positive")
+    return {
+        "full": full,
+        "zero": zero,
+        "invert": scaling.invert or None,
+        "negative": scaling.negative,
+        "flags": scaling.flags and dict(zip(names, scaling.flags, strict=True)),
+    }
 
 
-def _scaling(scaling: FirstScaling) -> str:
-    """Its keys, each after a comma."""
-    text = "" if scaling.full is None else f", full: {scaling.full:.12g}"
-    text += "" if scaling.zero is None else f", zero: {scaling.zero:.12g}"
-    text += ", invert: true" if scaling.invert else ""
-    text += f", negative: {scaling.negative}" if scaling.negative else ""
-    if scaling.flags:
-        names = zip(("neutral", "negative", "positive"), scaling.flags, strict=True)
-        text += f", flags: {{ {', '.join(f'{key}: {name}' for key, name in names)} }}"
-    return text
-
-
-def _codes(codes: Mapping[str, str]) -> str:
-    """Key ``codes`` of a section, after a comma."""
-    means = ", ".join(f"{json.dumps(n, ensure_ascii=False)}: {m}" for n, m in codes.items())
-    return f", codes: {{ {means} }}" if means else ""
+def _codes(codes: Mapping[str, str]) -> dict[str, str] | None:
+    """Key ``codes`` of a section."""
+    return {json.dumps(name, ensure_ascii=False): means for name, means in codes.items()} or None
 
 
 def _motion(motion: FirstMotion) -> Iterator[str]:
@@ -259,10 +254,8 @@ def _motion(motion: FirstMotion) -> Iterator[str]:
     yield "# It waits until the first motion is done: the step motion of commission takes that out."
     yield "motion:"
     yield "  crane:"
-    yield "    waits: true"
-    yield f"    slew: {motion.slew}"
-    yield f"    near_far: {motion.near_far}"
+    yield from _block(4, waits=True, slew=motion.slew, near_far=motion.near_far)
     if motion.radius:
         message, _, signal = motion.radius.partition(".")
-        where = f"bus: crane, message: {message}, signal: {signal}{_codes(motion.radius_codes)}"
-        yield f"    radius: {{ {where}, timeout_ms: {RADIUS_TIMEOUT_MS} }}"
+        keys = {"message": message, "signal": signal, "codes": _codes(motion.radius_codes)}
+        yield f"    radius: {_flow(bus='crane', **keys, timeout_ms=RADIUS_TIMEOUT_MS)}"

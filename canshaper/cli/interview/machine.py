@@ -2,7 +2,8 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+
+from cantools.database.can import Message, Signal
 
 from canshaper.cli.common import echo
 from canshaper.cli.interview.answers import (
@@ -17,22 +18,25 @@ from canshaper.cli.interview.answers import (
     whole,
 )
 from canshaper.cli.interview.axes import add_axes
+from canshaper.cli.interview.first import FirstAxis, FirstJoystick, FirstMachine, FirstMotion
 from canshaper.cli.interview.nodes import Nodes, uses_of
 from canshaper.cli.interview.swing import load_of, motion_of
+from canshaper.codec.layout import is_fd
+from canshaper.commissioning import suggest
+from canshaper.config.bus import Bus
+from canshaper.config.inputs import Protected
+from canshaper.config.load import limits
+from canshaper.config.schema import Joystick
 from canshaper.errors import UsageError
-
-if TYPE_CHECKING:
-    from cantools.database.can import Message, Signal
-
-    from canshaper.cli.interview.first import FirstAxis, FirstJoystick, FirstMachine, FirstMotion
+from canshaper.machine.corrections import corrected, multiplexor
 
 FEWEST_CYCLES = 5  # of a joystick's message in its timeout
 FIRST_DATA_BITRATE = 2_000_000  # of most buses of CAN FD
 
 
 def machine_of(
-    messages: "list[Message]", dbc: Sequence[str], interface: str, nodes: Nodes
-) -> "FirstMachine":
+    messages: list[Message], dbc: Sequence[str], interface: str, nodes: Nodes
+) -> FirstMachine:
     """Ask for a machine.
 
     Args:
@@ -44,11 +48,6 @@ def machine_of(
     Raises:
         UsageError: no machine can be made of these messages, or of the answers.
     """
-    from canshaper.cli.interview.first import FirstMachine
-    from canshaper.commissioning import suggest
-    from canshaper.config.bus import Bus
-    from canshaper.config.load import limits
-
     possible = suggest.joysticks(messages)
     if not messages:
         raise UsageError("no message of these files can be used")
@@ -76,15 +75,15 @@ def machine_of(
     load = load_of(axes, left, _meanings([joystick for joystick, _ in joysticks], axes, motion))
     status, identity = suggest.service_status(messages), suggest.identity(messages)
     machine = FirstMachine(
-        channel_name,
-        bitrate,
-        dbc,
-        [joystick for joystick, _ in joysticks],
-        axes,
-        status.name if status else None,
-        identity.name if identity else None,
-        motion,
-        interface,
+        channel=channel_name,
+        bitrate=bitrate,
+        dbc=dbc,
+        joysticks=[joystick for joystick, _ in joysticks],
+        axes=axes,
+        status=status.name if status else None,
+        identity=identity.name if identity else None,
+        motion=motion,
+        interface=interface,
         load=load,
     )
     uses = uses_of(machine, messages)
@@ -95,7 +94,7 @@ def machine_of(
 
 
 def _meanings(
-    joysticks: "Sequence[FirstJoystick]", axes: "Sequence[FirstAxis]", motion: "FirstMotion | None"
+    joysticks: Sequence[FirstJoystick], axes: Sequence[FirstAxis], motion: FirstMotion | None
 ) -> set[str]:
     """MESSAGE.SIGNAL of what was given a meaning."""
     used = {f"{one.switch or one.message}.{one.enable}" for one in joysticks}
@@ -108,12 +107,8 @@ def _meanings(
     return used | ({motion.radius} if motion and motion.radius else set())
 
 
-def _data_bitrate(messages: "list[Message]", uses: Collection[str], bitrate: int) -> int | None:
+def _data_bitrate(messages: list[Message], uses: Collection[str], bitrate: int) -> int | None:
     """Ask for the bit rate of the data where a message that is used is one of CAN FD."""
-    from canshaper.codec.layout import is_fd
-    from canshaper.config.bus import Bus
-    from canshaper.config.load import limits
-
     if not any(is_fd(message) for message in messages if message.name in uses):
         return None
     most = limits(Bus, "data_bitrate")[1]
@@ -121,10 +116,8 @@ def _data_bitrate(messages: "list[Message]", uses: Collection[str], bitrate: int
     return ask(text, whole(bitrate, most), str(FIRST_DATA_BITRATE))
 
 
-def _chosen(messages: "list[Message]") -> list[str]:
+def _chosen(messages: list[Message]) -> list[str]:
     """Ask for the messages of the joysticks."""
-    from canshaper.commissioning import suggest
-
     possible, likely = suggest.joysticks(messages), suggest.likely_joysticks(messages)
     enabled = [m.name for m in likely if suggest.named(suggest.switches(m), suggest.ENABLE)]
     offered = [message.name for message in likely]
@@ -133,11 +126,8 @@ def _chosen(messages: "list[Message]") -> list[str]:
     return ask(text, several(names), " ".join(enabled or offered[:1]))
 
 
-def _page(message: "Message") -> "tuple[Message, int | None]":
+def _page(message: Message) -> tuple[Message, int | None]:
     """A message as it is with the multiplexor with which it is meant, and that."""
-    from canshaper.config.inputs import Protected
-    from canshaper.machine.corrections import corrected, multiplexor
-
     signal = multiplexor(message)
     if signal is None:
         return message, None
@@ -150,17 +140,12 @@ def _page(message: "Message") -> "tuple[Message, int | None]":
 
 
 def _joystick(
-    whole_message: "Message",
-    messages: "list[Message]",
-    before: "Sequence[FirstJoystick]",
+    whole_message: Message,
+    messages: list[Message],
+    before: Sequence[FirstJoystick],
     nodes: Nodes,
-) -> "tuple[FirstJoystick, Message]":
+) -> tuple[FirstJoystick, Message]:
     """A joystick, and its message; ``before`` are those that there are already."""
-    from canshaper.cli.interview.first import FirstJoystick
-    from canshaper.commissioning import suggest
-    from canshaper.config.load import limits
-    from canshaper.config.schema import Joystick
-
     message, page = _page(whole_message)
     whole = suggest.switches(message)
     left = [*whole, *suggest.switch_parts(message)]  # a switch has one meaning
@@ -185,25 +170,25 @@ def _joystick(
     off = switch("switch for anti-sway off", suggest.named(left, suggest.ANTI_SWAY_OFF))
     counter = suggest.counter(message)
     joystick = FirstJoystick(
-        suggest.axis_name(nodes.name_of(message.name) or message.name),
-        message.name,
-        int(min(max(FEWEST_CYCLES * cycle, least), most)),
-        enable,
-        reset,
-        off,
-        None if counter in (enable, reset, off) else counter,
-        None if message.cycle_time else cycle,
-        of,
-        nodes.supervised(message.name),
-        other,
-        page,
-        code,
+        name=suggest.axis_name(nodes.name_of(message.name) or message.name),
+        message=message.name,
+        timeout_ms=int(min(max(FEWEST_CYCLES * cycle, least), most)),
+        enable=enable,
+        reset=reset,
+        anti_sway_off=off,
+        alive_counter=None if counter in (enable, reset, off) else counter,
+        cycle_ms=None if message.cycle_time else cycle,
+        switch=of,
+        node=nodes.supervised(message.name),
+        enable_of=other,
+        multiplexor=page,
+        code=code,
     )
     return joystick, message
 
 
 def _switch_elsewhere(
-    message: "Message", messages: "list[Message]", before: "Sequence[FirstJoystick]"
+    message: Message, messages: list[Message], before: Sequence[FirstJoystick]
 ) -> tuple[str | None, str | None, str | None, int | None]:
     """Ask for the enable switch of a joystick that has none in its own message.
 
@@ -211,8 +196,6 @@ def _switch_elsewhere(
         message and signal of its enable switch, or None and None and the joystick that shares its;
         of a signal of more than two bits the value that enables.
     """
-    from canshaper.commissioning import suggest
-
     others = [one for one in messages if one.name != message.name]
     joysticks = [joystick.name for joystick in before]
     signals = {f"{m.name}.{s.name}": s for m in others for s in suggest.switches(m)}
@@ -234,10 +217,8 @@ def _switch_elsewhere(
     return of, signal, None, _code(modes[answer]) if answer in modes else None
 
 
-def _code(signal: "Signal") -> int:
+def _code(signal: Signal) -> int:
     """Ask for the value of a signal that enables."""
-    from canshaper.commissioning import suggest
-
     choices: Mapping[int, object] = signal.choices or {}
     text = f"{signal.name}: value that enables, of "
     text += ", ".join(f"{code} {name}" for code, name in choices.items())

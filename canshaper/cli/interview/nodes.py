@@ -1,24 +1,28 @@
 """Questions of ``canshaper init`` on nodes of CANopen, of which it has the EDS files."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cantools.database.can import Message
+
 from canshaper.cli.common import echo
 from canshaper.cli.interview.answers import NONE, ask, confirmed, several, whole
+from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
+from canshaper.config.load import limits
+from canshaper.config.schema import StatusWord
 
 if TYPE_CHECKING:
-    from cantools.database.can import Message
-
-    from canshaper.cli.interview.first import FirstCanopen, FirstCia408, FirstMachine
-    from canshaper.commissioning.nodes import MessageTiming
     from canshaper.commissioning.nodes.eds import Eds
     from canshaper.commissioning.nodes.node import Node, Pdo
-    from canshaper.commissioning.nodes.parameters import Parameter
+    from canshaper.commissioning.nodes.parameters import MessageTiming, Parameter
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
 _NAME_LETTERS = 20  # of a node; its messages' names have 32
 _STATUS_CYCLES = 3  # of a status word in its timeout
+
+Timing = tuple[int | None, int]
+"""How a deployment uses a message: sent every so many ms, lost after so many."""
 
 
 class Nodes:
@@ -99,14 +103,11 @@ class Nodes:
         """Event timer of a PDO; 0 where it has none."""
         return self._pdos[message][1].event_timer_ms or 0 if message in self._pdos else 0
 
-    def cia408(self, valve: str) -> "FirstCia408 | None":
+    def cia408(self, valve: str) -> FirstCia408 | None:
         """Control and status word, where a message commands a valve of CiA 408."""
         if (name := self.name_of(valve)) is None:
             return None
-        from canshaper.cli.interview.first import FirstCia408
         from canshaper.commissioning.nodes import messages
-        from canshaper.config.load import limits
-        from canshaper.config.schema import StatusWord
 
         if self.named[name].profile != messages.VALVE:
             return None
@@ -124,9 +125,8 @@ class Nodes:
         )
         return None
 
-    def canopen(self, used: Collection[str]) -> "FirstCanopen":
+    def canopen(self, used: Collection[str]) -> FirstCanopen:
         """Our node, and the others of messages that are used."""
-        from canshaper.cli.interview.first import FirstCanopen
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
 
         ids = [node.id for node in self.named.values()]
@@ -137,7 +137,7 @@ class Nodes:
         nodes = {n: (self.named[n].id, ms) for n in names if (ms := heartbeat_ms(self.named[n]))}
         return FirstCanopen(ours, master, nodes)
 
-    def parameters(self, uses: "dict[str, MessageTiming]") -> "list[Parameter]":
+    def parameters(self, uses: Mapping[str, Timing]) -> "list[Parameter]":
         """Return the parameters that have to be set in the nodes of messages with these timings."""
         if not self.named:
             return []
@@ -149,7 +149,7 @@ class Nodes:
             for p in parameters(name, node, self._of(name, uses))
         ]
 
-    def missing(self, uses: "dict[str, MessageTiming]") -> Iterator[str]:
+    def missing(self, uses: Mapping[str, Timing]) -> Iterator[str]:
         """Yield what the nodes of messages with these timings do not have."""
         if not self.named:
             return
@@ -158,27 +158,27 @@ class Nodes:
         for name, node in self._used(uses):
             yield from (f"{name} {text}" for text in missing(node, self._of(name, uses)))
 
-    def _used(self, uses: "dict[str, MessageTiming]") -> "list[tuple[str, Node]]":
+    def _used(self, uses: Mapping[str, Timing]) -> "list[tuple[str, Node]]":
         return [(name, node) for name, node in self.named.items() if self._of(name, uses)]
 
-    def _of(self, name: str, uses: "dict[str, MessageTiming]") -> "list[tuple[Pdo, MessageTiming]]":
+    def _of(self, name: str, uses: Mapping[str, Timing]) -> "list[tuple[Pdo, MessageTiming]]":
+        from canshaper.commissioning.nodes.parameters import MessageTiming
+
         return [
-            (pdo, uses[message])
+            (pdo, MessageTiming(*uses[message]))
             for message, (owner, pdo) in self._pdos.items()
             if owner == name and message in uses
         ]
 
 
-def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, MessageTiming]":
+def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Timing]:
     """How a machine uses messages: how often they come, and when they are lost."""
-    from canshaper.commissioning.nodes import MessageTiming
-
     cycles = {message.name: message.cycle_time for message in messages}
-    uses: dict[str, MessageTiming] = {}
+    uses: dict[str, Timing] = {}
 
     def add(message: str | None, timeout_ms: int, cycle_ms: int | None = None) -> None:
         if message is not None:
-            uses[message] = MessageTiming(cycle_ms or cycles.get(message), timeout_ms)
+            uses[message] = cycle_ms or cycles.get(message), timeout_ms
 
     for joystick in machine.joysticks:
         for message in (joystick.message, joystick.switch):

@@ -2,22 +2,35 @@
 
 import re
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+
+from cantools.database.can import Message, Signal
 
 from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, confirmed, number, one, whole
-from canshaper.cli.interview.scaling import code_meanings
-
-if TYPE_CHECKING:
-    from cantools.database.can import Message, Signal
-
-    from canshaper.cli.interview.first import (
-        FirstAxis,
-        FirstLoad,
-        FirstMotion,
-        FirstSensor,
-        FirstSlewing,
-        Stopwatch,
-    )
+from canshaper.cli.interview.first import (
+    PERIOD_RANGE,
+    RADIUS_M,
+    RADIUS_TIMEOUT_MS,
+    SLEWING_RAD_S,
+    TEN_SWINGS_S,
+    TIP_M_S,
+    FirstAxis,
+    FirstLoad,
+    FirstMotion,
+    FirstScaling,
+    FirstSensor,
+    FirstSlewing,
+    Stopwatch,
+    ten_swings_s,
+)
+from canshaper.commissioning import suggest
+from canshaper.config.inputs import SwaySensorSection
+from canshaper.config.limits import Limits, Slewing, Sway
+from canshaper.config.load import limits
+from canshaper.config.schema import Scaling
+from canshaper.machine.corrections import Correction, scaled
+from canshaper.machine.filters import filter_fault
+from canshaper.machine.named_codes import is_guess
+from canshaper.machine.sway_sensor import LEAST_FUSION
 
 # By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
 CALM = re.compile(r"lift|hoist|rotat|turn|grip|open|close", re.IGNORECASE)
@@ -28,12 +41,8 @@ SENSOR_CYCLES = 4  # of a sensor's message in its timeout
 _FASTEST_M_S = 40.0
 
 
-def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
+def swing_of(axis: str, period_s: float) -> Stopwatch | None:
     """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
-    from canshaper.cli.interview.first import TEN_SWINGS_S, TIP_M_S, Stopwatch
-    from canshaper.config.limits import Sway
-    from canshaper.config.load import limits
-
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
         return None
@@ -48,15 +57,9 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
 
 
 def sensor_of(
-    axis: str, swing_s: float, others: "list[Message]", bound: "list[FirstAxis]"
-) -> "FirstSensor | None":
+    axis: str, swing_s: float, others: list[Message], bound: list[FirstAxis]
+) -> FirstSensor | None:
     """Ask for the sway sensor of an axis, in ``others``; ``bound`` are the axes before it."""
-    from canshaper.cli.interview.first import FirstSensor
-    from canshaper.commissioning import suggest
-    from canshaper.config.inputs import SwaySensorSection
-    from canshaper.config.load import limits
-    from canshaper.machine.sway_sensor import LEAST_FUSION
-
     used = {(one.sensor.message, one.sensor.signal) for one in bound if one.sensor}
     possible = {
         f"{message.name}.{signal.name}": (message, signal)
@@ -86,12 +89,8 @@ def sensor_of(
     return FirstSensor(message.name, signal.name, kind, timeout_ms, fusion_s, codes=codes)
 
 
-def slewing_of(axis: str) -> "FirstSlewing | None":
+def slewing_of(axis: str) -> FirstSlewing | None:
     """How an axis turns the crane; None where it does not."""
-    from canshaper.cli.interview.first import RADIUS_M, SLEWING_RAD_S, FirstSlewing
-    from canshaper.config.limits import Slewing
-    from canshaper.config.load import limits
-
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
@@ -108,10 +107,6 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
     And with the shortest period that may then be set on the running machine.
     """
-    from canshaper.cli.interview.first import PERIOD_RANGE, Stopwatch, ten_swings_s
-    from canshaper.config.limits import Limits
-    from canshaper.machine.filters import filter_fault
-
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s
     for tenth in range(round(10.0 * low), round(10.0 * high)):
@@ -121,11 +116,8 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
     return low, high  # with none at all: the check of the whole file says why
 
 
-def motion_of(axes: "list[FirstAxis]", others: "list[Message]") -> "FirstMotion | None":
+def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | None:
     """Slew and near-far as one motion, where there are both; ``others`` are messages left over."""
-    from canshaper.cli.interview.first import RADIUS_TIMEOUT_MS, FirstMotion
-    from canshaper.commissioning import suggest
-
     slew = next((axis.name for axis in axes if axis.slewing), None)
     possible = [axis.name for axis in axes if axis.swing and not axis.slewing]
     if slew is None or not possible:
@@ -153,8 +145,8 @@ _CYCLES, _CYCLE_MS = 5, 200  # of its message in its timeout; where the DBC has 
 
 
 def load_of(
-    axes: "Sequence[FirstAxis]", messages: "Sequence[Message]", used: Collection[str]
-) -> "FirstLoad | None":
+    axes: Sequence[FirstAxis], messages: Sequence[Message], used: Collection[str]
+) -> FirstLoad | None:
     """Ask what says that a log is gripped, or whether one response is to hold for both.
 
     Args:
@@ -162,8 +154,6 @@ def load_of(
         messages: of it, without those of the valves.
         used: MESSAGE.SIGNAL of what has a meaning already.
     """
-    from canshaper.cli.interview.first import FirstLoad
-
     swinging = [axis for axis in axes if axis.swing]
     signals, likely = _possible(messages, used)
     if not swinging:
@@ -185,11 +175,9 @@ def load_of(
 
 
 def _possible(
-    messages: "Sequence[Message]", used: Collection[str]
-) -> "tuple[dict[str, tuple[Message, Signal]], list[str]]":
+    messages: Sequence[Message], used: Collection[str]
+) -> tuple[dict[str, tuple[Message, Signal]], list[str]]:
     """Signals that can say it, and the names of those that are called so."""
-    from canshaper.commissioning import suggest
-
     signals = {
         f"{message.name}.{signal.name}": (message, signal)
         for message, signal in suggest.loads(messages)
@@ -198,10 +186,8 @@ def _possible(
     return left, [name for name in left if suggest.LOAD.search(name.partition(".")[2])]
 
 
-def _values(signal: "Signal") -> tuple[float, float]:
+def _values(signal: Signal) -> tuple[float, float]:
     """Value of a signal with an empty grapple, and with a log."""
-    from canshaper.commissioning import suggest
-
     if signal.length <= suggest.SWITCH_BITS:
         log = ask(f"  {signal.name}: its value while a log is gripped", whole(0, 1), "1")
         return 1.0 - log, float(log)
@@ -218,10 +204,8 @@ def _values(signal: "Signal") -> tuple[float, float]:
     return empty, ask(f"  {signal.name}: its value with a usual log", other, f"{likely:g}")
 
 
-def _with_log(axes: "Sequence[FirstAxis]") -> dict[str, float]:
+def _with_log(axes: Sequence[FirstAxis]) -> dict[str, float]:
     """Time of ten swings with a log, by axis, s."""
-    from canshaper.cli.interview.first import ten_swings_s
-
     times_s = {}
     for axis in axes:
         assert axis.swing is not None
@@ -230,3 +214,16 @@ def _with_log(axes: "Sequence[FirstAxis]") -> dict[str, float]:
         text = f"  {axis.name}: time of ten full swings with a log, s"
         times_s[axis.name] = ask(text, allowed, f"{_SLOWER * empty_s:.3g}")
     return times_s
+
+
+def code_meanings(signal: Signal, scaling: FirstScaling | None = None) -> dict[str, str]:
+    """Which values of a signal that the DBC names are measurements, where it does not say it."""
+    if scaling:
+        given = Scaling(full=scaling.full, zero=scaling.zero, invert=scaling.invert)
+        signal = scaled(signal, Correction(given, bool(scaling.flags or scaling.negative)))
+    kinds, meanings = ["fault", "value"], {}
+    for raw, name in (signal.choices or {}).items():
+        if is_guess(signal, raw, str(name)):
+            text = f'  {signal.name}: {raw} is "{name}", of {", ".join(kinds)}'
+            meanings[str(name)] = ask(text, one(kinds), "fault")
+    return meanings

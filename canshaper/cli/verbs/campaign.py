@@ -1,6 +1,7 @@
 """``canshaper campaign``: many drives, drawn from what is not known of a machine."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -8,6 +9,7 @@ import typer
 
 from canshaper.cli.common import (
     EXIT_INTERRUPTED,
+    PLANT,
     PROCESSES,
     REPORT,
     SCHEDULER,
@@ -56,6 +58,7 @@ def campaign(
     native: Literal["native", "python"] | None = typer.Option(
         None, "--engine", help="What drives; by default C where a compiler is."
     ),
+    plant: Path | None = PLANT,
     changes: list[str] | None = SET,
     report: Path | None = REPORT,
 ) -> None:
@@ -65,7 +68,8 @@ def campaign(
     in the file's "uncertainty" section. Quantiles have bounds that hold with 95 % confidence.
     Exit code 1: a promise was broken, or a limit of the file's "accept" section is not shown to be
     kept. The folder gets one Parquet row a drive; Ctrl-C keeps what is done. A drive is looked at
-    by `canshaper demo FILE --seed SEED`.
+    by `canshaper demo FILE --seed SEED`. With --plant operators and faults are drawn, not the
+    crane, and it takes one process.
 
     Examples:
 
@@ -89,21 +93,31 @@ def campaign(
     from canshaper.cli.results import Results
     from canshaper.native.library import has_compiler
     from canshaper_sim.parameters import changed_parameters
+    from canshaper_sim.recorder import dwell_s
 
     deployment = loader(file)()
     changed_parameters(changes or [], deployment)  # wrong ones are named before anything begins
     seeds = shard_of(range(first, first + drives), shard)
     files = [deployment, *([loader(against)()] if against else [])]
     check_same_axes(files[0], files[-1])
+    if plant:
+        if scheduler or cluster or native == "native" or (processes or 1) > 1:
+            others = "--processes, --scheduler, --cluster or --engine native"
+            raise UsageError(f"--plant: expected one process of Python, without {others}")
+        native, processes = "python", 1
+        echo(f"engine: python, in one process: the crane is {plant}", err=True)
     results = Results("Campaign", deployment, report)
     ranges = deployment.config.uncertainty
     engine_name = native or ("native" if has_compiler() else "python")
-    sources = [Source.of(one, ranges, changes or [], engine_name) for one in files]
+    longest_s = max(map(dwell_s, files))
+    about = ranges, changes or [], engine_name, longest_s
+    sources = [replace(Source.of(one, *about), unit=plant) for one in files]
     stores = [
         Store(out / f"{'ab'[k]}-{one.path.stem}" if against else out, source.about)
         for k, (one, source) in enumerate(zip(files, sources, strict=True))
     ]
     interrupted = False
+    workers = engine(processes, scheduler, cluster)
     if merge:
         for store in stores:
             for folder in merge:
@@ -119,7 +133,7 @@ def campaign(
         for source in sources:  # compiled, and held against Python, before anything begins
             if isinstance(why := source.native(), ConfigError):
                 echo(f"driven by Python: {why}", err=True)
-        interrupted = _drive(engine(processes, scheduler, cluster), sources, seeds, stores)
+        interrupted = _drive(workers, sources, seeds, stores)
     accepted = _report(files, stores, results)
     results.write()
     if interrupted:

@@ -81,10 +81,8 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
     from canshaper.commissioning.stopping import stopping
     from canshaper.design.tuning.verdict import verdicts
 
-    config, loads = (
-        deployment.config,
-        {bus: deployment.load(bus) for bus in deployment.config.buses},
-    )
+    config = deployment.config
+    loads = {bus: deployment.load(bus) for bus in config.buses}
     return {
         "file": str(deployment.path),
         "good": True,

@@ -24,8 +24,8 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from canshaper.commissioning.procedure.bench import Bench
     from canshaper.commissioning.procedure.files import Files
-    from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-    from canshaper.commissioning.procedure.state import Step
+    from canshaper.commissioning.procedure.procedure import Procedure
+    from canshaper.commissioning.procedure.state import Outcome, Step
     from canshaper.machine.deployment import Deployment
     from canshaper.report.console import OnProgress
 
@@ -127,9 +127,8 @@ def _procedure(
 ) -> "Procedure":
     """The steps, and what is to be said before the first of them."""
     from canshaper.commissioning.procedure.procedure import Procedure
-    from canshaper.commissioning.procedure.steps import STEPS
 
-    procedure = Procedure(files, bench, load, STEPS, origin=path if bench.simulated else None)
+    procedure = Procedure(files, bench, load, origin=path if bench.simulated else None)
     if bench.simulated:
         echo(f"REHEARSAL on a simulated crane, with {files.deployment}, a copy of {path}")
     return procedure
@@ -137,8 +136,8 @@ def _procedure(
 
 def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
     """Print how far the procedure has come."""
+    from canshaper.commissioning.procedure.procedure import STEPS
     from canshaper.commissioning.procedure.state import State, read_state
-    from canshaper.commissioning.procedure.steps import STEPS
     from canshaper.report.console import SafeConsole, new_table
 
     state = read_state(files.state) or State()
@@ -170,16 +169,16 @@ def _one(procedure: "Procedure", step: "Step") -> None:
     number = procedure.steps.index(step) + 1
     while True:
         echo(f"\n[{number}/{len(procedure.steps)}] {step.name}: {step.title}")
-        proposal = procedure.run(step)
+        outcome = procedure.run(step)
         while procedure.news:
             echo(f"NOTE: {procedure.news.pop(0)}")
-        _show(procedure, proposal)
-        choices = (AGAIN, SKIP, STOP) if proposal.problems else (YES, AGAIN, SKIP, STOP)
-        what = "accept" if not proposal.problems else "not enough data"
-        default = STOP if proposal.problems else YES
+        _show(procedure, outcome)
+        choices = (AGAIN, SKIP, STOP) if outcome.problems else (YES, AGAIN, SKIP, STOP)
+        what = "accept" if not outcome.problems else "not enough data"
+        default = STOP if outcome.problems else YES
         answer = ask(f"{step.name}: {what} ({', '.join(choices)})", one(choices), default)
         if answer == YES:
-            procedure.accept(proposal)
+            procedure.accept(outcome)
         elif answer == SKIP:
             procedure.skip(step)
         elif answer == AGAIN:
@@ -190,22 +189,22 @@ def _one(procedure: "Procedure", step: "Step") -> None:
         return
 
 
-def _show(procedure: "Procedure", proposal: "Proposal") -> None:
+def _show(procedure: "Procedure", outcome: "Outcome") -> None:
     """Show the results of a step, and what it would write."""
     from canshaper.commissioning.procedure.files import shown
     from canshaper.report.console import SafeConsole
 
     console = SafeConsole(soft_wrap=True)
-    for part in proposal.parts:
+    for part in outcome.sheet.parts:
         console.print(shown(part))
-    for picture in proposal.pictures:
+    for picture in outcome.pictures:
         if picture.suffix == ".png":
             echo(f"Picture: {picture}")
-    for fault in proposal.problems:
+    for fault in outcome.problems:
         echo(f"NOT ENOUGH DATA: {fault}")
-    if proposal.diff:
-        echo(f"It would write into {procedure.files.deployment}:\n{proposal.diff}")
-    elif not proposal.problems:
+    if outcome.diff:
+        echo(f"It would write into {procedure.files.deployment}:\n{outcome.diff}")
+    elif not outcome.problems:
         echo(f"{procedure.files.deployment} stays as it is.")
 
 

@@ -47,6 +47,9 @@ def compare(
     work: bool = typer.Option(
         False, "--work", help="Seconds a move of a model operator too: minutes."
     ),
+    fleet: bool = typer.Option(
+        False, "--fleet", help="With the file's filters, and robust ones for its fleet: a minute."
+    ),
     seeds: int = typer.Option(6, "--seeds", min=1, help="Working cycles with each filter."),
     processes: int | None = typer.Option(
         None, "--processes", min=1, help="Processes; by default one a processor."
@@ -65,10 +68,11 @@ def compare(
     sway sensors damp has rows with them. Writes compare.png and compare.json. Takes one to two
     minutes. With --work the operator of canshaper work who catches the swing works with each, at
     30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
-    shows what is done until then.
+    shows what is done until then. With --fleet two more rows: the file's own filters, and those
+    that canshaper robust --fleet designs.
 
     Of a crane with a rope it is one table of the swing left by the length of the rope and the
-    work, next to ZVD for one length and ZV by length.
+    work, next to ZVD for one length and ZV by length; of a filter for two modes to ZV of both.
 
     Examples:
 
@@ -94,13 +98,15 @@ def compare(
     deployment = loader(file)()
     results = Results("Comparison of filters", deployment, report, picture, quiet=as_json)
     if on_rope(deployment):
-        if work:
-            raise UsageError("--work: its operator works with slew and near-far, not with a rope")
+        if work or fleet:
+            raise UsageError("--work, --fleet: expected slew and near-far, got a rope")
         _ropes(deployment, results, out, processes, as_json=as_json)
         return
     out.mkdir(parents=True, exist_ok=True)  # reported before minutes of driving
     tasks = manoeuvres()
     filters = candidates(deployment)
+    if fleet:
+        filters += _for_fleet(deployment, processes)
     with progress_bar(f"{len(filters)} filters, {len(tasks)} manoeuvres") as on_progress:
         outcomes = measure_all(
             deployment.path, filters, tasks, on_progress=on_progress, processes=processes
@@ -168,6 +174,27 @@ def _ropes(
         echo(json.dumps({"ropes": table}, indent=2))
     results.print(shown)
     results.write()
+
+
+def _for_fleet(deployment: "Deployment", processes: int | None) -> "list[Candidate]":
+    """Filters of the file, and robust ones for its fleet."""
+    from canshaper.campaign.fleet import FLEET, design_fleet
+    from canshaper.campaign.fleet_filters import ROBUST
+    from canshaper.config.filters import filter_of
+    from canshaper.design.comparison.manoeuvres import AXES, Candidate
+    from canshaper.design.parallel import Processes
+    from canshaper.report.console import progress_bar
+
+    with progress_bar("for the fleet") as on_progress:
+        workers = Processes(processes)
+        made, _ = design_fleet(deployment, ROBUST, None, workers, on_progress, front=False)
+    fleet = {one.axis: filter_of(**one.section) for one in made.filters if one.axis in AXES}
+    sway = {one.axis: one.sway for one in made.filters}
+    own = {axis: deployment.axes[axis].config.filter for axis in fleet}
+    return [
+        Candidate("the file's", own, ours=True),
+        Candidate(FLEET, fleet, ours=True, sway=sway),
+    ]
 
 
 def _work(

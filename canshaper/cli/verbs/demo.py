@@ -10,9 +10,11 @@ import typer
 
 from canshaper.cli.common import (
     CRANE,
+    DEFAULT,
     EXIT_INTERRUPTED,
     EXPORT,
     PICTURE,
+    PLANT,
     REPORT,
     SENSOR,
     SET,
@@ -38,7 +40,6 @@ GROUP = "look"
 
 # What `report.json` says of a drive without a bus.
 EXIT_NOT_DRIVEN = 1
-DEFAULT = "forwarder-robust.yaml"
 LOCKSTEP = "lock-step, no bus"
 
 
@@ -73,6 +74,7 @@ def demo(
         help="Draw it from this file's ranges, as `campaign FILE --against` does.",
     ),
     crane: str | None = CRANE,
+    plant: Path | None = PLANT,
     changes: list[str] | None = SET,
     export: Path | None = EXPORT,
     picture: Path | None = PICTURE,
@@ -85,8 +87,8 @@ def demo(
     one.
 
     Operator, daemon and plant run as three processes and exchange frames on vcan0 where the
-    kernel has it, otherwise on python-can's udp_multicast. Prints a table and writes demo.png
-    and report.json.
+    kernel has it, otherwise on python-can's udp_multicast, and in lock-step with --plant. Prints
+    a table and writes demo.png and report.json.
 
     Examples:
 
@@ -105,7 +107,10 @@ def demo(
       canshaper demo --seed 34 --export drive.mcap
 
       canshaper demo new.yaml --seed 34 --ranges old.yaml
+
+      canshaper demo --plant crane.fmu
     """
+    from canshaper.campaign.draw import on_unit
     from canshaper.cli.results import Results
     from canshaper.design.processes import choose_transport
     from canshaper.report.console import print_report
@@ -117,17 +122,19 @@ def demo(
 
     if (ranges is not None and seed is None) or (seed is not None and (crane or rest) is not None):
         raise UsageError("--seed: expected with --ranges, and without --crane or --rest")
-    deployment = loader(sensed(file, DEFAULT, sensor))()
+    deployment = loader(sensed(file, sensor))()
     if not switches_off(deployment):
         echo(f"WARNING: {file}: no joystick has anti_sway_off: both drives are shaped", err=True)
     nominal = changed_parameters(changes or [], deployment)
     results = Results("Drive without and with filters", deployment, report, picture)
-    lockstep = lockstep or seed is not None
+    lockstep = lockstep or seed is not None or plant is not None
     # A drive on a bus needs Linux' scheduler and sockets.
     way = None if lockstep or sys.platform != "linux" else choose_transport(transport, deployment)
     several = cranes(deployment)
     crane = crane or next(iter(several), None)
     options: DriveOptions = {"parameters": nominal, "crane": crane}
+    if plant:
+        options["unit"] = plant
     if seed is None:
         played = script_for(one_crane(deployment, crane) if crane else deployment, script)
         if rest is not None:
@@ -135,6 +142,7 @@ def demo(
             played = replace(played, duration_s=released_s + rest)
     else:
         drawn = _drawn(deployment, seed, ranges, nominal)
+        drawn = on_unit(drawn, plant, nominal) if plant else drawn
         played, options = drawn.script, drawn.options
     results.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     if crane:

@@ -95,9 +95,7 @@ def doctor(
 
     if path := results.picture(None, figure):
         results.picture_line(path)
-    results.write()
-    if not fit(findings):
-        raise typer.Exit(EXIT_NOT_FIT)
+    results.write(0 if fit(findings) else EXIT_NOT_FIT)
 
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":

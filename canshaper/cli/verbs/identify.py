@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,8 +25,6 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from canshaper.campaign.engine import Engine
-    from canshaper.cli.fleet import Row
     from canshaper.cli.results import Results
     from canshaper.commissioning.identification.report import Advice
     from canshaper.commissioning.identification.verdict import Finding
@@ -110,7 +108,7 @@ def identify(
     """
     # Its matrices are small: threads of the linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from canshaper.cli.fleet import check_only_folders, identified
+    from canshaper.cli.fleet import check_only_folders, identified, run_fleet, show_periods
     from canshaper.cli.results import Results
     from canshaper.commissioning.identification.canlog import messages_of
     from canshaper.commissioning.identification.data import (
@@ -133,9 +131,10 @@ def identify(
     options: dict[str, Any] = {"axis": axis, "channel": channel, "about_s": about_s}
     if logs and Path(logs[0]).is_dir():
         of_one = {"--write": write, "--json": as_json, "--picture": picture}
-        check_only_folders([*map(Path, logs)], of_one)
+        folders = [*map(Path, logs)]
+        check_only_folders(folders, of_one)
         work = partial(identified, file, signal or [], dbc or [], options)
-        _fleet([*map(Path, logs)], work, engine(processes, scheduler), out, results)
+        run_fleet(engine(processes, scheduler), work, folders, show_periods, out, results)
         return
     if together:
         if deployment is None or as_json or picture:
@@ -165,29 +164,7 @@ def identify(
     _print_result(findings, advice, deployment, written, results)
     if any(f.free or f.driven for f in findings):
         results.picture_line(path)
-    results.write()
-    if not all(f.usable for f in findings):
-        raise typer.Exit(EXIT_TOO_POOR)
-
-
-def _fleet(
-    folders: Sequence[Path],
-    work: "Callable[[Path], list[Row]]",
-    workers: "Engine",
-    out: Path,
-    results: "Results",
-) -> None:
-    """Identify every log of some folders by itself; one table of all."""
-    from canshaper.cli.fleet import finish, run_fleet, show_periods
-    from canshaper.report.console import progress_bar
-
-    with progress_bar("logs") as on_progress, os_errors(out):
-        done = run_fleet(workers, work, folders, on_progress)
-    show_periods(done, results)
-    code = finish(done, out, results)
-    results.write()
-    if code:
-        raise typer.Exit(code)
+    results.write(0 if all(f.usable for f in findings) else EXIT_TOO_POOR)
 
 
 def _draw(

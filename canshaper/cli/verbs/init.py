@@ -12,8 +12,6 @@ import typer
 
 from canshaper.cli.common import EXTRAS, echo, install_line, loader, os_errors, print_warnings
 from canshaper.cli.interview.answers import accepted, answered_by, confirmed
-from canshaper.cli.interview.machine import machine_of
-from canshaper.cli.interview.nodes import Nodes, uses_of
 from canshaper.errors import CanshaperError, ConfigError, UsageError
 from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper.shipped import data_directory
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
     from cantools.database.can import Message
 
     from canshaper.cli.interview.first import FirstAxis, FirstLoad, FirstMachine
+    from canshaper.cli.interview.nodes import Nodes
     from canshaper.commissioning.nodes.parameters import Parameter
     from canshaper.config.bus import Bus
 
@@ -80,6 +79,8 @@ def init(
     """
     from canshaper.cli.interview.first import FIRST_MAX_PCT
     from canshaper.cli.interview.first_file import first_deployment
+    from canshaper.cli.interview.machine import machine_of
+    from canshaper.cli.interview.nodes import Nodes, uses_of
 
     draft = file.with_name(f"{file.stem}.draft.yaml")
     own = file.with_name(f"{file.stem}-canopen.dbc")
@@ -144,14 +145,14 @@ def _bus(machine: "FirstMachine") -> "Bus":
     return Bus(interface=machine.interface, channel=machine.channel, bitrate=machine.bitrate)
 
 
-def _set_by_sdo(machine: "FirstMachine", nodes: Nodes, parameters: "Sequence[Parameter]") -> None:
+def _set_by_sdo(machine: "FirstMachine", nodes: "Nodes", parameters: "Sequence[Parameter]") -> None:
     from canshaper.commissioning.nodes.parameters import write
 
     for line in write(_bus(machine), nodes.named, parameters):
         echo(f"  {line}")
 
 
-def _write_dbc(path: Path, nodes: Nodes) -> None:
+def _write_dbc(path: Path, nodes: "Nodes") -> None:
     from canshaper.commissioning.nodes.messages import dbc
 
     path.write_text(dbc(nodes.messages), encoding="utf-8", newline="\n")

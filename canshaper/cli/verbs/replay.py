@@ -131,9 +131,7 @@ def replay(
         raise UsageError(text)
     results.deployment = replays[0].deployment
     different = _show(replays, out, results)
-    results.write()
-    if verify and different:
-        raise typer.Exit(EXIT_DIFFERENT)
+    results.write(EXIT_DIFFERENT if verify and different else 0)
 
 
 def _fleet(
@@ -145,8 +143,7 @@ def _fleet(
     results: "Results",
 ) -> None:
     """Replay every log of a folder; one table of all."""
-    from canshaper.cli.fleet import finish, replayed, run_fleet, show_replays
-    from canshaper.report.console import progress_bar
+    from canshaper.cli.fleet import replayed, run_fleet, show_replays
 
     if not configs:
         raise typer.BadParameter("--config is missing: which deployment?")
@@ -155,13 +152,7 @@ def _fleet(
     _check_buses(deployments, channels)
     results.deployment = deployments[0]
     work = partial(replayed, configs, channels)
-    with progress_bar(folder.name) as on_progress, os_errors(out):
-        logs = run_fleet(engine(*workers), work, [folder], on_progress)
-    show_replays(logs, results)
-    code = finish(logs, out, results)
-    results.write()
-    if code:
-        raise typer.Exit(code)
+    run_fleet(engine(*workers), work, [folder], show_replays, out, results)
 
 
 def _run(

@@ -47,7 +47,8 @@ def robust(
         None,
         "--second",
         metavar="PERIOD,DAMPING,RANGE",
-        help="A second mode too: s, damping ratio, +- % of its length.",
+        help="A second mode too: s, damping ratio, +- % of its length; or none. Default: that"
+        " of the filter in the file.",
     ),
     write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
     force: bool = typer.Option(False, "--force", help="Write what leaves half of the swing too."),
@@ -114,7 +115,7 @@ def robust(
         others = axis, lengths, loads, residual_pct, second, as_json
         if any(others):
             raise UsageError("--fleet: expected only --duration, --write, --picture, --report")
-        _for_fleet(deployment, duration_s, write, report, picture)
+        for_fleet(deployment, "robust", duration_s, write, report, picture)
         return
     if axis is None:
         raise UsageError("expected --axis AXIS, or --fleet, got neither")
@@ -148,41 +149,44 @@ def robust(
     lines += [f"filter: {flow(one.section)}" for one in designs]
     lines = [*changed, written_line(deployment.path)] if write else lines
     results.print("\n".join(lines), soft_wrap=True)
-    results.write()
-    if useless:
-        raise typer.Exit(EXIT_USELESS)
+    results.write(EXIT_USELESS if useless else 0)
 
 
-def _for_fleet(
+def for_fleet(
     deployment: "Deployment",
+    kind: str,
     duration_s: float | None,
     write: bool,
     report: Path | None,
     picture: Path | None,
 ) -> None:
-    """Design all swinging axes for a fleet, print and write them."""
+    """Design filters of a kind for a fleet, of all swinging axes, print and write them."""
     from canshaper.campaign.fleet import design_fleet
-    from canshaper.campaign.fleet_report import figure, table, verdict
+    from canshaper.campaign.fleet_report import figure, table, verdict, write_fleet
     from canshaper.cli.results import Results
     from canshaper.commissioning.filter_file import written_line
-    from canshaper.commissioning.robust_report import write_design
     from canshaper.design.parallel import Processes
     from canshaper.edit.edit import flow
     from canshaper.report.console import progress_bar
 
-    results = Results("Robust shapers for a fleet", deployment, report, picture)
+    results = Results("Filters for a fleet", deployment, report, picture)
     with progress_bar("candidates") as on_progress:
-        design = design_fleet(deployment, duration_s, Processes(), on_progress)
-    results.print(table(design))
-    results.print(verdict(design), soft_wrap=True)
-    if path := results.picture(None, lambda: figure(design)):
+        asked, rows = design_fleet(deployment, kind, duration_s, Processes(), on_progress)
+    results.print(table(asked, rows))
+    results.print(verdict(asked, rows), soft_wrap=True)
+    if path := results.picture(None, lambda: figure(rows)):
         results.picture_line(path)
     if write:
-        lines = [*write_design(deployment, *design.designs), written_line(deployment.path)]
+        verb = "tune" if kind == "gff" else kind
+        lines = [
+            *write_fleet(deployment, asked.filters, verb),
+            written_line(deployment.path),
+        ]
     else:
         lines = [
-            f"axes.{one.bound.name}:\n  sway: {flow(one.task.sway)}\n  filter: {flow(one.section)}"
-            for one in design.designs
+            f"axes.{one.axis}:\n  sway: {flow(one.sway)}\n  filter: {flow(one.section)}"
+            + (f"\n  limits: {flow({'tail_s': one.tail_s})}" if one.tail_s else "")
+            for one in asked.filters
         ]
     results.print("\n".join(lines), soft_wrap=True)
     results.write()

@@ -74,9 +74,8 @@ def sensor(
     # Its matrices are small: threads of the linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.results import Results
-    from canshaper.commissioning.sensor.finding import examine
+    from canshaper.commissioning.sensor.finding import examine, write_sensors
     from canshaper.commissioning.sensor.fit import read_sensors
-    from canshaper.commissioning.sensor.report import write_sensors
 
     if live and log:
         raise UsageError(f"expected a log or --live, got {log} and --live")
@@ -112,9 +111,7 @@ def sensor(
             return of_sensors(findings)
 
         results.picture_line(results.picture(out / "sensor.png", figure))
-    results.write()
-    if any(finding.problems for finding in findings):
-        raise typer.Exit(EXIT_TOO_POOR)
+    results.write(EXIT_TOO_POOR if any(finding.problems for finding in findings) else 0)
 
 
 def _axes(deployment: "Deployment", axis: str | None) -> list[str]:
@@ -167,7 +164,7 @@ def _print(
     results: "Results",
 ) -> None:
     from canshaper.commissioning.filter_file import written_line
-    from canshaper.commissioning.sensor.report import heading, table
+    from canshaper.commissioning.sensor.finding import heading, table
 
     for finding in findings:
         results.print(heading(finding))

@@ -15,6 +15,7 @@ import typer
 from canshaper.cli.common import (
     CHANNEL,
     CRANE,
+    DEFAULT,
     INTERFACE,
     SENSOR,
     SET,
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 GROUP = "look"
 
 EXIT_NO_ADDRESS = 1
-DEFAULT = "forwarder-robust.yaml"
 LINUX = sys.platform == "linux"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -121,7 +121,7 @@ def studio(
     # As a service manager ends it; uvicorn raises the signal again when it is done.
     signal.signal(signal.SIGTERM, interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
-        file = sensed(file, DEFAULT, sensor)
+        file = sensed(file, sensor)
         drawn = [] if seeds is None else seeds
         if is_drive(file) or drawn or folder:
             if shadow or adjust or control:
@@ -166,12 +166,11 @@ def _machine(
 ) -> "Stage":
     """A machine to listen to; with ``adjust``, a control socket or the file's, to change."""
     from canshaper.studio.stage import Stage
-    from canshaper.studio.words import Events
 
     deployment = loader(file, interface, channel)()
     if adjust:
         refuse_shipped(file, "--adjust")
-    stage = Stage(deployment, Events())
+    stage = Stage(deployment)
     stage.watch((adjust[0] or control_socket(deployment)) if adjust else None)
     return stage
 
@@ -187,7 +186,6 @@ def _cranes(
     """Simulated cranes to drive; of several the first one."""
     from canshaper.studio.crane import copied
     from canshaper.studio.stage import Stage
-    from canshaper.studio.words import Events
     from canshaper_sim.cranes import cranes
     from canshaper_sim.parameters import changed_parameters
 
@@ -195,7 +193,7 @@ def _cranes(
     transports = _transports(interface, channel) if LINUX else []
     _, deployment = copied(deployment_path(file), directory)
     changed_parameters(changes, deployment)  # wrong ones are named before anything begins
-    stage = Stage(deployment, Events())
+    stage = Stage(deployment)
     crane = crane or next(iter(cranes(deployment)), None)
     if LINUX and len(deployment.config.buses) == 1 and not crane:
         stage.drive(transports, directory, changes)

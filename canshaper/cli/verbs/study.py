@@ -18,7 +18,7 @@ from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
-    from canshaper.studio.study_files import Key, Table
+    from canshaper.studio.study import Key, Table
 
 GROUP = "design"
 
@@ -118,7 +118,7 @@ def study(
 
 def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
     """The key of the study, made where it has none."""
-    from canshaper.studio.study_files import KEY, Key
+    from canshaper.studio.study import KEY, Key
     from canshaper_sim.parameters import changed_parameters
 
     paths = {Path(name).name: deployment_path(name) for name in (file, other)}
@@ -148,8 +148,7 @@ def _settings(key: "Key", file: str, other: str, copies: Path) -> "dict[str, Dep
 
 def _table(folder: Path, person: str, key: "Key") -> "Table":
     """The table of a person, who has the next order where it is new."""
-    from canshaper.studio.study import ORDERS
-    from canshaper.studio.study_files import Table, rows_of
+    from canshaper.studio.study import ORDERS, Table, rows_of
 
     table = Table(folder / f"{person}.csv", {"study": key.mark, "person": person})
     before = sum(bool(rows_of(path, key.mark)) for path in folder.glob("*.csv"))
@@ -163,7 +162,7 @@ def _join(folder: Path, unseal: bool) -> None:
     """Join the persons of a study; of none, say how many it needs."""
     from canshaper.cli.results import Results
     from canshaper.studio import study_results as results
-    from canshaper.studio.study_files import KEY, LETTERS, mark_of, read_key
+    from canshaper.studio.study import KEY, LETTERS, mark_of, read_key
 
     shown, spread = Results("Study", None, None), results.SPREAD
     if (folder / KEY).exists():

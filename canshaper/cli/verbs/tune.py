@@ -14,7 +14,10 @@ GROUP = "design"
 
 def tune(
     file: str = FILE,
-    axis: str = typer.Option(..., "--axis", help="Axis to tune."),
+    axis: str | None = typer.Option(None, "--axis", help="Axis to tune."),
+    fleet: bool = typer.Option(
+        False, "--fleet", help="Tune every swinging axis, for the drives of a campaign."
+    ),
     method: str = typer.Option("optimal", "--method", help="optimal, or the paper's manual rule."),
     preference: float | None = typer.Option(
         None, "--preference", help="Instead of weights: 0 quickest to 1 calmest, with a table."
@@ -71,6 +74,9 @@ def tune(
     Options that are not given are those that the filter in the file was tuned with. Exit code 1
     where more than half of the swing is left, 2 where nothing fits, with what conflicts.
 
+    With --fleet all swinging axes are tuned as canshaper robust --fleet designs them, within the
+    run-on of --max-run-on (2.25 s), and stand next to its robust shapers of that length.
+
     Examples:
 
       canshaper tune config/forwarder.yaml --axis slew
@@ -84,8 +90,11 @@ def tune(
       canshaper tune config/forwarder.yaml --axis near_far --q 1 --r 2 --s 0 --p 0.03
 
       canshaper tune config/forwarder.yaml --axis slew --method manual
+
+      canshaper tune config/forwarder-gff.yaml --fleet --max-run-on 2.3
     """
     from canshaper.cli.results import Results
+    from canshaper.cli.verbs.robust import for_fleet
     from canshaper.commissioning.filter_file import refuse_scheduled, written_line
     from canshaper.commissioning.tuned import (
         as_dict,
@@ -97,16 +106,24 @@ def tune(
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)()
-    results = Results(f"Filter for {axis}", deployment, report, picture, quiet=as_json)
     if write:
         refuse_shipped(file)
-        refuse_scheduled(deployment, axis, "robust --loads --write designs one for each")
     given: dict[str, Any] = {"preference": preference, "q": _numbers(q), "r": r, "s": s, "p": p}
     given |= {"states": states, "horizon_s": horizon_s, "pole_distance": pole_distance}
     given |= {"within_command": within_command, "max_jump": max_jump, "max_rate_per_s": max_rate}
     given |= {"third_pole": third_pole, "max_run_on_s": max_run_on_s}
     given |= {"length_range_pct": length_range_pct}
     given = {name: value for name, value in given.items() if value is not None}
+    if fleet:
+        if axis or as_json or method != "optimal" or given.keys() - {"max_run_on_s"}:
+            raise UsageError("--fleet: expected only --max-run-on, --write, --picture, --report")
+        for_fleet(deployment, "gff", max_run_on_s, write, report, picture)
+        return
+    if axis is None:
+        raise UsageError("expected --axis AXIS, or --fleet, got neither")
+    results = Results(f"Filter for {axis}", deployment, report, picture, quiet=as_json)
+    if write:
+        refuse_scheduled(deployment, axis, "robust --loads --write designs one for each")
     try:
         with progress_bar(axis) as on_progress:
 
@@ -127,9 +144,7 @@ def tune(
     results.picture_line(drawn)
     if written and not as_json:
         echo("\n".join([*changed, written_line(written)]))
-    results.write()
-    if useless:
-        raise typer.Exit(EXIT_USELESS)
+    results.write(EXIT_USELESS if useless else 0)
 
 
 def _numbers(text: str | None) -> list[float] | None:

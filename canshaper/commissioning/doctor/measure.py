@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from canshaper.bus.packet import CAN_FRAME
-from canshaper.commissioning.doctor.load import load_kinds
-from canshaper.commissioning.doctor.processes import Children, output, ready
+from canshaper.commissioning.doctor.processes import Children, load_kinds, output, ready
 from canshaper.errors import MeasurementError
 from canshaper.machine.deployment import Deployment
 
@@ -78,7 +77,7 @@ def measure(
         )
         for process in (hand, loop):
             ready(process)
-        for process in [children.start("load", kind=kind) for kind in load_kinds() if load]:
+        for process in [children.start("processes", kind=kind) for kind in load_kinds() if load]:
             ready(process)
         for one in loops.values():
             one.send(

@@ -1,4 +1,4 @@
-"""Processes of a measurement: started, and ended whatever happens."""
+"""Processes of a measurement, ended whatever happens, and those that keep the PC busy."""
 
 import contextlib
 import json
@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+import time
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from types import TracebackType
@@ -137,3 +139,57 @@ def before_the_rest() -> None:
     with contextlib.suppress(OSError, AttributeError):  # only Linux has it
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(0, policy, os.sched_param(JOYSTICKS_PRIORITY))
+
+
+BLOCK_BYTES = 16 << 20
+# Written again and again at the same place: no disk fills up.
+WRITE_BYTES = 64 << 10
+WRITES = 64
+NAP_S = 50e-6
+
+
+def _busy() -> None:
+    sum(range(10_000))
+
+
+def _memory() -> None:
+    """Take memory, touch all of it, give it back."""
+    block = bytearray(b"\1") * BLOCK_BYTES
+    block.reverse()
+
+
+def _disk() -> None:
+    block = os.urandom(WRITE_BYTES)
+    with tempfile.TemporaryFile() as file:  # has no name: nothing stays when we are killed
+        while True:
+            file.seek(0)
+            for _ in range(WRITES):
+                file.write(block)
+                file.flush()
+                os.fsync(file.fileno())
+
+
+def _timers() -> None:
+    time.sleep(NAP_S)
+
+
+KINDS: dict[str, Callable[[], None]] = {
+    "busy": _busy,
+    "memory": _memory,
+    "disk": _disk,
+    "timers": _timers,
+}
+
+
+def load_kinds() -> list[str]:
+    """Processes of the load: a busy one for each processor, and one of each other kind."""
+    return ["busy"] * len(os.sched_getaffinity(0)) + ["memory", "disk", "timers"]
+
+
+def main(options: dict[str, Any]) -> None:
+    """Be one of them until killed."""
+    step = KINDS[options["kind"]]
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    say_ready()
+    while True:
+        step()

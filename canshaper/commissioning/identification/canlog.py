@@ -1,6 +1,7 @@
 """Signals of a CAN log, named by DBC, with the commands in the same log."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from ipaddress import ip_address
@@ -13,14 +14,21 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.frame import NULL, group_of
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import find_signal, special_codes
-from canshaper.commissioning.identification.commands import Commands, Samples
-from canshaper.commissioning.identification.series import Kind, Series, Unit, ordered, unit_of
+from canshaper.commissioning.identification.series import (
+    Commands,
+    Kind,
+    Samples,
+    Series,
+    Unit,
+    ordered,
+    unit_of,
+)
 from canshaper.commissioning.identification.table import is_table
 from canshaper.errors import ConfigError, CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.log import LogFile, read_log
+from canshaper.recording.log import LogFile
 from canshaper.shipped import data_directory
 
 
@@ -100,7 +108,6 @@ def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
 
 def read_can(
     path: Path,
-    label: str,
     names: Mapping[str, str],
     messages: Messages,
     *,
@@ -113,7 +120,6 @@ def read_can(
 
     Args:
         path: the log.
-        label: state of the grapple in it.
         names: "Message.Signal" of each axis.
         messages: of the DBC files.
         deployment: names commands, signal of the grapple and figures of merit, where known.
@@ -125,21 +131,22 @@ def read_can(
         IdentificationError: a signal is not in the log, or from two senders.
         LogError: the log cannot be read.
     """
-    sensors = [s for a in deployment.axes.values() if (s := a.sway_sensor)] if deployment else []
-    merits = {one.name: one.config.merit for one in sensors}
+    axes = deployment.axes.values() if deployment else ()
+    merits = {s.name: s.config.merit for one in axes if (s := one.sway_sensor)}
     readers = {
         axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis), merits.get(name))
         for axis, name in names.items()
     }
-    load: list[_Reader] = []
+    load = None
     state = deployment.load_state if deployment else None
     if state and (signal := find_signal(state.message, state.config.signal)):
-        load = [_Reader("load state", state.message, signal, Unit(Kind.OTHER, 1.0, ""))]
+        load = _Reader("load state", state.message, signal, Unit(Kind.OTHER, 1.0, ""))
     commands = Commands(deployment)
     log = LogFile(path, on_progress)
-    seen, notes = _read(log, path, channel, [*readers.values(), *load], commands)
-    loads = [value for one in load for value in one.samples.value]
-    load_value = float(np.median(loads)) if loads else None
+    seen, notes = _read(
+        log, path, channel, [*readers.values(), *([load] if load else [])], commands
+    )
+    load_value = float(np.median(load.samples.value)) if load and load.samples.value else None
     idle = commands.idle()
     result = {}
     for axis, reader in readers.items():
@@ -148,12 +155,12 @@ def read_can(
         source, texts = f"{path.name}: {reader.name}", [*notes, *left_out]
         own, others = commands.of(axis), commands.others(axis)
         result[axis] = Series(
-            source, label, reader.unit, time, value, own, idle, others, load_value, texts
+            source, reader.unit, time, value, own, idle, others, load_value, texts
         )
     return result
 
 
-Seen = dict[tuple[int, bool], int]  # frames of each identifier
+Seen = Counter[tuple[int, bool]]  # frames of each identifier
 
 
 def _read(
@@ -161,7 +168,7 @@ def _read(
 ) -> tuple[Seen, list[str]]:
     """Hand every frame to who reads it: which there were, and what to note."""
     readers_of: dict[tuple[int, bool], list[_Reader]] = {}
-    seen: Seen = {}
+    seen: Seen = Counter()
     notes: list[str] = []
     first_ns = None
     channels: set[str] = set()
@@ -174,7 +181,6 @@ def _read(
             time_s = (frame.time_ns - first_ns) / 1e9
             key = frame.can_id, frame.extended
             if key not in seen:
-                seen[key] = 0
                 readers_of[key] = [r for r in readers if r.wants(*key)]
             seen[key] += 1
             for reader in readers_of[key]:
@@ -240,7 +246,7 @@ def is_simulated(log: Path, messages: Messages) -> bool:
     try:
         return any(
             (frame.can_id, frame.extended) == own or _is_virtual(frame.channel)
-            for frame in islice(read_log(log), _FRAMES)
+            for frame in islice(LogFile(log), _FRAMES)
         )
     except CutOffError:
         return False

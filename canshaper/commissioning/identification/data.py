@@ -11,6 +11,7 @@ import numpy as np
 
 from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
 from canshaper.commissioning.identification.canlog import is_simulated, read_can
+from canshaper.commissioning.identification.decay import free_columns
 from canshaper.commissioning.identification.segments import find_free
 from canshaper.commissioning.identification.series import Array, Series, Value, ordered
 from canshaper.commissioning.identification.table import Table, is_table, read_table
@@ -27,7 +28,7 @@ ROUND = 0.3
 SWINGS = 6
 
 
-def series_of(table: Table, label: str, column: str | None, about_s: float | None = None) -> Series:
+def series_of(table: Table, column: str | None, about_s: float | None = None) -> Series:
     """The swing in a table: a column, or without one what the gyroscope turns about most.
 
     ``about_s``: the period as far as it is known, s.
@@ -36,7 +37,7 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
         IdentificationError: no such column, no gyroscope, or a clock that goes back.
     """
     if column is not None:
-        return _series(table, label, table.column(column))
+        return _series(table, table.column(column))
     gyroscope = table.gyroscope()
     if not gyroscope:
         raise IdentificationError(
@@ -51,8 +52,8 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
             " the sensor on?"
         )
     if len(names) == 1:
-        return _series(table, label, names[0])
-    direction, width = _direction([_series(table, label, n) for n in names], about_s)
+        return _series(table, names[0])
+    direction, width = _direction([_series(table, n) for n in names], about_s)
     # The sign is free; the largest part counts positive.
     direction *= math.copysign(1.0, direction[int(np.argmax(np.abs(direction)))])
     parts = " ".join(
@@ -61,7 +62,7 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
         if abs(v) >= 0.05
     )
     turned = direction @ np.stack([table.columns[n] for n in names])
-    one = _series(table, label, names[0], f"gyroscope ({parts})", turned)
+    one = _series(table, names[0], f"gyroscope ({parts})", turned)
     if width > ROUND:
         one.notes.append(
             f"{table.path}: it swings round, {100.0 * width:.0f} % as wide as long; swing it in"
@@ -70,14 +71,12 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
     return one
 
 
-def _series(
-    table: Table, label: str, column: str, name: str = "", values: Array | None = None
-) -> Series:
+def _series(table: Table, column: str, name: str = "", values: Array | None = None) -> Series:
     """A column, or other values in its unit, under a name of their own."""
     unit = table.unit(column)
     name, values = (column, table.columns[column]) if values is None else (name, values)
     time, value = ordered(f"{table.path}: {name}", table.time_s, values * unit.factor)
-    return Series(f"{table.path.name}: {name}", label, unit, time, value, notes=[*table.notes])
+    return Series(f"{table.path.name}: {name}", unit, time, value, notes=[*table.notes])
 
 
 def _direction(columns: Sequence[Series], about_s: float | None) -> tuple[Array, float]:
@@ -100,8 +99,7 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
         at = start_s + 0.5 * period * (k + np.linspace(0.0, 3.0, 90))
         if at[0] < columns[0].time_s[0] or at[-1] > columns[0].time_s[-1]:
             continue
-        waves = [np.cos(omega * at), np.sin(omega * at), np.ones_like(at), at - at.mean()]
-        basis = np.stack(waves, axis=1)
+        basis = free_columns(at, omega * at, np.ones_like(at))
         values = np.stack([np.interp(at, c.time_s, c.value) for c in columns], axis=1)
         fitted, *_ = np.linalg.lstsq(basis, values, rcond=None)
         directions, sizes, _ = np.linalg.svd(fitted[:2].T)
@@ -115,7 +113,7 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
 
 # Swing of each axis as `canshaper sim` sends it.
 _PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
-SIMULATED = {
+_SIMULATED = {
     "slew": "GrappleSway.SwayPerpendicular",
     **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
     "bridge": "LoadSway.SwayBridge",
@@ -202,10 +200,10 @@ def logged(
     deployment: Deployment | None,
     messages: Messages,
     *,
-    axis: str | None,
-    channel: str | None,
-    about_s: float | None,
     on_progress: OnProgress,
+    axis: str | None = None,
+    channel: str | None = None,
+    about_s: float | None = None,
 ) -> list[Finding]:
     """Return the findings of logs, by axis and label."""
     if not logs:
@@ -218,22 +216,33 @@ def logged(
         if is_table(path):
             table = read_table(path, report)
             axes = [*signals] or [axis_named(axis, deployment)]
-            shown = {a: series_of(table, label, signals.get(a), about_s) for a in axes}
+            shown = {a: series_of(table, signals.get(a), about_s) for a in axes}
         else:
-            names = signals or _simulated(deployment, messages, axis)
+            names = signals or simulated_signals(deployment, messages, axis)
+            if not names:
+                text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
+                raise UsageError(text)
             known: dict[str, Any] = {"deployment": deployment, "channel": channel}
-            shown = read_can(path, label, names, messages, **known, on_progress=report)
+            shown = read_can(path, names, messages, **known, on_progress=report)
         for name, one in shown.items():
             series.setdefault((name, label), []).append(one)
     findings = []
     for (name, label), parts in series.items():
         on_progress(0.5, f"{name} {label}")
-        finding = identify(name, label, parts, about_s)
+        finding = identify(name, label, parts, about_s or _slower_s(deployment, name))
         if finding.at is None:
             with suppress(ValueError):
                 finding.at = float(label)
         findings.append(finding)
     return findings
+
+
+def _slower_s(deployment: Deployment | None, axis: str) -> float | None:
+    """Period in the file where its filter covers a second mode, which may swing as much."""
+    bound = deployment.axes.get(axis) if deployment else None
+    design = bound.config.filter.design() if bound else None
+    sway = bound.config.sway if bound and design and design.second else None
+    return sway.mode().period_s if sway else None
 
 
 def pump_in(
@@ -244,7 +253,7 @@ def pump_in(
     axes = pair_of(deployment, [*speeds])
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
     for _, path in map(_labelled, logs):
-        shown = read_can(path, "", names, deployment.messages, deployment=deployment, **of)
+        shown = read_can(path, names, deployment.messages, deployment=deployment, **of)
         columns = [time_s := shown[axes[0]].time_s]
         for name, one in shown.items():
             if one.command is None or not len(one.time_s):
@@ -273,19 +282,15 @@ def _labelled(text: str) -> tuple[str, Path]:
     return label, Path(rest)
 
 
-def _simulated(
-    deployment: Deployment | None, messages: Messages, axis: str | None
+def simulated_signals(
+    deployment: Deployment | None, messages: Messages, axis: str | None = None
 ) -> dict[str, str]:
-    """Signals of the simulated crane, where no others are named."""
-    moves = deployment.coordinates if deployment else {one: one for one in SIMULATED}
-    there = {
+    """Signals of the simulated crane by axis, of those that the DBC files have."""
+    moves = deployment.coordinates if deployment else {one: one for one in _SIMULATED}
+    return {
         a: signal
         for a, m in moves.items()
         if axis in (None, a)
-        and (signal := SIMULATED.get(m))
+        and (signal := _SIMULATED.get(m))
         and not isinstance(messages.find(signal.partition(".")[0]), str)
     }
-    if not there:
-        text = "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
-        raise UsageError(text)
-    return there

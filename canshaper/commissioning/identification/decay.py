@@ -10,7 +10,7 @@ Golub and Pereyra 1973), so two unknowns remain.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,7 +19,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from canshaper.commissioning.identification.series import Array, Kind, Segment, Value
+from canshaper.commissioning.identification.series import Array, Segment, Value
 
 CONFIDENCE: Final = 0.95
 # What the noise does not show: a tool on two joints is not quite the pendulum of the model, and a
@@ -60,24 +60,14 @@ class DecayProblem:
             lost = -np.expm1(-sigma * time) / sigma if sigma else time
             envelope = np.maximum(envelope - float(x[2]) / self.amplitudes[i] * lost, 0.0)
         stretched = time
-        if angle := self._angle(i, omega, sigma):
+        angle = self.segments[i].kind.angle(self.amplitudes[i], math.hypot(omega, sigma))
+        if angle < LARGEST_RAD:
             if len(x) > 2:
                 slower = cumulative_trapezoid(envelope**2, time, initial=0.0)
             else:
                 slower = -np.expm1(-2.0 * sigma * time) / (2.0 * sigma) if sigma else time
             stretched = time - angle**2 / 16.0 * slower
-        phase = omega * stretched
-        drift = time - 0.5 * self.segments[i].time_s[-1]
-        columns = [envelope * np.cos(phase), envelope * np.sin(phase), np.ones_like(time), drift]
-        return np.stack(columns, axis=1), envelope
-
-    def _angle(self, i: int, omega: float, sigma: float) -> float:
-        """Amplitude at the start of a segment in rad, 0 where it is not known or cannot be."""
-        kind, amplitude = self.segments[i].kind, self.amplitudes[i]
-        if kind is Kind.OTHER:
-            return 0.0
-        angle = amplitude if kind is Kind.ANGLE else amplitude / math.hypot(omega, sigma)
-        return angle if angle < LARGEST_RAD else 0.0
+        return free_columns(time, omega * stretched, envelope), envelope
 
     def linear(self, i: int, x: Array) -> tuple[Array, Array, Array]:
         """Basis, best linear parameters and residual of a segment."""
@@ -85,7 +75,8 @@ class DecayProblem:
         best, *_ = np.linalg.lstsq(basis, self.segments[i].value, rcond=None)
         return basis, np.asarray(best), self.segments[i].value - basis @ best
 
-    def _residual(self, x: Array) -> Array:
+    def residual(self, x: Array) -> Array:
+        """Residuals of all segments, weighted."""
         parts = [self.linear(i, x)[2] * weight for i, weight in enumerate(self.weights)]
         return np.concatenate(parts)
 
@@ -99,7 +90,7 @@ class DecayProblem:
         ftol, most = (1e-4, 30) if roughly else (1e-8, 100)
         for _ in range(1 if roughly else 3):  # amplitudes and weights follow, and settle at once
             now = least_squares(
-                self._residual, now, x_scale=scale, bounds=(low, high), ftol=ftol, max_nfev=most
+                self.residual, now, x_scale=scale, bounds=(low, high), ftol=ftol, max_nfev=most
             ).x
             for i, segment in enumerate(self.segments):
                 _, best, residual = self.linear(i, now)
@@ -110,30 +101,44 @@ class DecayProblem:
                     self.weights[i] = 1.0 / max(noise, 1e-4 * size, 1e-12)
         return now
 
-    def covariance(self, x: Array) -> tuple[Array, float]:
-        """Covariance of the parameters, and the degrees of freedom it rests on.
 
-        What matters of the noise is its density at the frequency of the swing; that is taken from
-        the residual's spectrum around it, so noise that is not white gives no wrong interval.
-        """
-        n = len(x)
-        curvature, meat, freedom = np.zeros((n, n)), np.zeros((n, n)), 0.0
-        for i, segment in enumerate(self.segments):
-            basis, best, residual = self.linear(i, x)
-            columns = []
-            for step in np.eye(n) * (1e-5 * x[0]):
-                up, down = self.basis(i, x + step)[0], self.basis(i, x - step)[0]
-                columns.append((up - down) @ best / (2.0 * step.max()))
-            slope = np.stack(columns, axis=1)
-            q, _ = np.linalg.qr(basis)
-            slope -= q @ (q.T @ slope)
-            information = slope.T @ slope * self.weights[i] ** 2
-            power, count = density(segment.time_s, residual, float(x[0]))
-            curvature += information
-            meat += information * power * self.weights[i] ** 2
-            freedom += count
-        inverse = np.linalg.pinv(curvature)
-        return inverse @ meat @ inverse, max(freedom, 3.0)
+def free_columns(time: Array, phase: Array, envelope: Array) -> Array:
+    """Columns of the linear parameters of a free swing: cosine, sine, offset and drift."""
+    columns = [envelope * np.cos(phase), envelope * np.sin(phase), np.ones_like(time), time]
+    return np.stack(columns, axis=1)
+
+
+def covariance_of(
+    residual: Callable[[Array], Array],
+    x: Array,
+    steps: Array,
+    data: Sequence[Segment],
+    omega: float,
+) -> tuple[Array, float]:
+    """Covariance of the parameters of a fit, and the degrees of freedom it rests on.
+
+    What matters of the noise is its density at the frequency of the swing; that is taken from
+    the residual's spectrum around it, so noise that is not white gives no wrong interval.
+
+    Args:
+        residual: of all data, one after the other, by the parameters.
+        x: the parameters of the best fit.
+        steps: small changes of them.
+        data: in the order of the residual.
+        omega: frequency of the swing, rad/s.
+    """
+    changes = zip(np.diag(steps), steps, strict=True)
+    slope = np.stack(
+        [(residual(x + to) - residual(x - to)) / (2.0 * step) for to, step in changes], axis=1
+    )
+    left, meat, freedom, first = residual(x), np.zeros((len(x),) * 2), 0.0, 0
+    for one in data:
+        part = slice(first, first + len(one.time_s))
+        power, count = density(one.time_s, left[part], omega)
+        meat += power * slope[part].T @ slope[part]
+        first, freedom = part.stop, freedom + count
+    inverse = np.linalg.pinv(slope.T @ slope)
+    return inverse @ meat @ inverse, max(freedom, 3.0)
 
 
 def density(time: Array, residual: Array, omega: float) -> tuple[float, float]:
@@ -166,10 +171,7 @@ class SegmentFit:
     @property
     def angle_rad(self) -> float:
         """Amplitude at its start, 0 where it is not known."""
-        first, kind = float(self.envelope[0]), self.segment.kind
-        if kind is Kind.OTHER:
-            return 0.0
-        return first * (1.0 if kind is Kind.ANGLE else self.period_s / 2.0 / math.pi)
+        return self.segment.kind.angle(float(self.envelope[0]), 2.0 * math.pi / self.period_s)
 
 
 Damping = tuple[float, float]  # an amplitude in the unit of the data, and the damping ratio there
@@ -196,13 +198,13 @@ def fit_decay(segments: Sequence[Segment], period_s: float, damping_ratio: float
     amplitudes = [float(np.ptp(s.value[: max(8, len(s.value) // 4)])) / 2.0 for s in segments]
     problem = DecayProblem(segments, amplitudes)
     x = problem.solve([omega, damping_ratio * omega])
-    covariance, freedom = problem.covariance(x)
+    covariance, freedom = _covariance(problem, x)
     common, sure = swing_values(*map(float, x)), deviations(x, covariance)
     alone = []  # period and damping ratio of each segment by itself, and their deviations
     for segment, amplitude in zip(segments, problem.amplitudes, strict=True):
         one = DecayProblem([segment], [amplitude])
         best = one.solve(list(x)) if len(segments) > 1 else x
-        alone.append((swing_values(*map(float, best)), deviations(best, one.covariance(best)[0])))
+        alone.append((swing_values(*map(float, best)), deviations(best, _covariance(one, best)[0])))
     factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, freedom))
     model = MODEL_PERIOD * common[0], math.hypot(MODEL_RATIO * common[1], MODEL_RATIO_ABS)
     values = []
@@ -217,6 +219,11 @@ def fit_decay(segments: Sequence[Segment], period_s: float, damping_ratio: float
         fits.append(SegmentFit(segment, basis @ best, base, envelope, noise, alone[i][0][0]))
     swings = sum(float(s.time_s[-1]) for s in segments) / common[0]
     return DecayFit(values[0], values[1], fits, swings, _friction(problem, x))
+
+
+def _covariance(problem: DecayProblem, x: Array) -> tuple[Array, float]:
+    steps = np.full(len(x), 1e-5 * x[0])
+    return covariance_of(problem.residual, x, steps, problem.segments, float(x[0]))
 
 
 def swing_values(omega: float, sigma: float) -> tuple[float, float]:
@@ -251,7 +258,7 @@ def _friction(problem: DecayProblem, x: Array) -> tuple[Damping, Damping] | None
     if small > 0.7 * large:
         return None
     y = problem.solve([*x, 0.0])
-    covariance, freedom = problem.covariance(y)
+    covariance, freedom = _covariance(problem, y)
     omega, sigma, loss = (float(v) for v in y)
     sure = abs(loss) > float(student.ppf(0.999, freedom)) * math.sqrt(max(covariance[2, 2], 0.0))
     at_large, at_small = ((sigma + loss / a) / omega for a in (large, small))

@@ -1,39 +1,51 @@
 """The driven swing: full speed of the tip, and the swing itself where it never was free.
 
-What free swings explain is eliminated; the full speed is common to all stretches, and its sign,
-which is that of the sensor, goes.
+The tip follows its command after a delay, with a lag of first order, and drives the pendulum; a
+free swing, an offset and a drift of each stretch come on top and are eliminated. The full speed is
+common to all stretches, and its sign, which is that of the sensor, goes.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from functools import lru_cache, partial
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from canshaper.commissioning.identification.decay import (
     CONFIDENCE,
     DecayFit,
-    density,
+    covariance_of,
     deviations,
+    free_columns,
     swing_values,
 )
-from canshaper.commissioning.identification.driven_data import (
-    Driven,
-    covariance_of,
-    free_columns,
-    gain_of,
-    responses,
-    squares_of,
-    stretches,
+from canshaper.commissioning.identification.series import (
+    BIN_S,
+    STANDS,
+    Array,
+    Command,
+    Kind,
+    Segment,
+    Series,
+    Value,
+    binned,
 )
-from canshaper.commissioning.identification.series import Array, Kind, Series, Value
+from canshaper.shaping.sway import GRAVITY_M_S2
 
+# A stretch begins so many periods before its first command, to know the swing that is there
+# already, goes on so many after the last, and is at most about so many long.
+BEFORE, AFTER, LONGEST = 1.0, 2.0, 8.0
+# So much earlier than a stretch a command may still matter: a second of the filter's past, and the
+# longest delay of a valve.
+EARLIER_S = 2.0
+SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
 # Longest delay and lag of a valve that are looked for, s.
-LONGEST_DELAY_S: Final = 0.5
-LONGEST_LAG_S: Final = 0.6
+LONGEST_DELAY_S, LONGEST_LAG_S = 0.5, 0.6
 # Stretches of a long log, spread over it, that are tried first from every start; all of them then
 # from the best one.
 FIRST_STRETCHES: Final = 16
@@ -43,6 +55,13 @@ MODEL_PART = 0.12
 # The same of the period, and of the damping ratio itself, as large swings are slower and the other
 # direction swings too: as in canshaper.commissioning.identification.decay.
 MODEL_PERIOD, MODEL_RATIO_ABS = 0.013, 0.009
+
+
+@dataclass(frozen=True, slots=True)
+class Driven(Segment):
+    """One stretch: its data, and the commands that drove it, on the clock of the log."""
+
+    command: Command
 
 
 class Stretch(NamedTuple):
@@ -65,6 +84,121 @@ class DrivenFit:
     stretches: list[Stretch]
 
 
+def stretches(series: Series, period: float) -> list[Driven]:
+    """Stretches of a series with commands, each with some periods before and after them."""
+    command = series.command
+    if command is None or not len(command.time_s):
+        return []
+    moving = np.abs(command.speed) > STANDS
+    ends = np.append(command.time_s[1:], command.time_s[-1])
+    spans: list[list[float]] = []
+    for a, b in zip(command.time_s[moving], ends[moving], strict=True):
+        first, last = float(a) - BEFORE * period, float(b) + AFTER * period
+        if spans and last - spans[-1][0] <= LONGEST * period:
+            spans[-1][1] = last
+        elif not spans or first >= spans[-1][1] - (BEFORE + AFTER) * period:
+            spans.append([max(first, spans[-1][1]) if spans else first, last])
+    time, value = binned(series.time_s, series.value)
+    result = []
+    for first, last in spans:
+        inside = (time >= first) & (time <= last)
+        t, v = time[inside], value[inside]
+        if len(t) > 20 and t[-1] - t[0] > period and np.diff(t).max() < period / 3.0:
+            start = float(t[0])
+            low, high = np.searchsorted(
+                command.time_s, [start - EARLIER_S, start + float(t[-1])], side="right"
+            )
+            part = slice(max(0, low - 1), high)  # with what holds at the start
+            held = Command(command.time_s[part], command.speed[part])
+            result.append(Driven(series.source, start, t - start, v, series.unit.kind, held))
+    return result
+
+
+@lru_cache(maxsize=8)
+def swing_filter(
+    omega: float, sigma: float, lag: float, kind: Kind, step_s: float = BIN_S
+) -> tuple[Array, Array]:
+    """Swing by the speed that is commanded, sampled with a zero-order hold: b and a of z^-1.
+
+    By partial fractions of the step response, as a matrix exponential for every try of the solver
+    takes most of its time. The three poles differ: one is real, two are not.
+    """
+    square = omega**2 + sigma**2
+    poles = np.array([-1.0 / lag, complex(-sigma, omega), complex(-sigma, -omega)])
+    apart = np.array([np.prod(pole - np.delete(poles, i)) for i, pole in enumerate(poles)])
+    residues = square / (GRAVITY_M_S2 * lag * apart)
+    if kind is Kind.RATE:
+        residues = residues * poles
+    decays = np.exp(poles * step_s)
+    parts = [residue * np.poly(np.delete(decays, i)) for i, residue in enumerate(residues)]
+    b = np.convolve([1.0, -1.0], np.sum(parts, axis=0)).real
+    return b, np.asarray(np.poly(decays).real, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenProblem:
+    """Least squares over the model of a driven swing; what is linear in it is eliminated.
+
+    Attributes:
+        data: the stretches.
+        model: gives, by the parameters, for each stretch its swing at 1 m/s full speed, and the
+            columns of what else it may hold.
+        low, high, scale: bounds of the parameters, and what is a step of them.
+        starts: parameters that the solver starts from.
+    """
+
+    data: Sequence[Driven]
+    model: Callable[[Array], list[tuple[Array, Array]]]
+    low: list[float]
+    high: list[float]
+    scale: list[float]
+    starts: list[list[float]]
+
+    def solved(self, *starts: Sequence[float] | Array) -> Array:
+        """The best solution from some starts."""
+        solve = partial(least_squares, self.residual, bounds=(self.low, self.high), max_nfev=60)
+        fits = [solve(x, x_scale=self.scale) for x in starts]
+        return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)
+
+    def projected(self, x: Array) -> list[tuple[Array, Array]]:
+        """Return for each stretch: unit swing and data, both without what free swings explain."""
+        pairs = []
+        for one, (swing, free) in zip(self.data, self.model(x), strict=True):
+            q, _ = np.linalg.qr(free)
+            pairs.append((swing - q @ (q.T @ swing), one.value - q @ (q.T @ one.value)))
+        return pairs
+
+    def residual(self, x: Array, gain: float | None = None) -> Array:
+        """What is left of all data, by the best gain or another one."""
+        projected = self.projected(x)
+        gain = gain_of(projected) if gain is None else gain
+        return np.concatenate([y - gain * h for h, y in projected])
+
+    def squares(self, x: Array) -> tuple[float, float]:
+        """Sum of the squares of the data without free swings, and of what is left of them."""
+        left = self.residual(x)
+        return sum(float(y @ y) for _, y in self.projected(x)), float(left @ left)
+
+    def explained(self, x: Array) -> float:
+        """Part of what the commands could have made that they explain."""
+        total, left = self.squares(x)
+        return 1.0 - left / max(total, 1e-30)
+
+    def fitted(self, x: Array) -> list[tuple[Array, Array]]:
+        """Return for each stretch: the model, and the amounts of what else it holds."""
+        gain, fits = gain_of(self.projected(x)), list[tuple[Array, Array]]()
+        for one, (swing, free) in zip(self.data, self.model(x), strict=True):
+            amounts, *_ = np.linalg.lstsq(free, one.value - gain * swing, rcond=None)
+            fits.append((gain * swing + free @ amounts, np.asarray(amounts)))
+        return fits
+
+
+def gain_of(projected: Sequence[tuple[Array, Array]]) -> float:
+    """Full speed of least squares, with the sign of the sensor."""
+    square = sum(float(h @ h) for h, _ in projected)
+    return sum(float(h @ y) for h, y in projected) / max(square, 1e-30)
+
+
 def fit_driven(
     series: Sequence[Series], periods: Sequence[float], free: DecayFit | None
 ) -> DrivenFit | None:
@@ -79,124 +213,83 @@ def fit_driven(
     for period in periods:
         data = [part for one in series for part in stretches(one, period)]
         if data:
-            problem = _Problem(data, 2.0 * math.pi / period, free)
-            fits.append((problem, *problem.solved_first()))
+            every, omega = -(-len(data) // FIRST_STRETCHES), 2.0 * math.pi / period
+            first = _problem(data[::every], omega, free)
+            x = first.solved(*first.starts)
+            fits.append((first.explained(x), _problem(data, omega, free), x))
     if not fits:
         return None
-    problem, x, _ = max(fits, key=lambda fit: fit[2])
+    _, problem, x = max(fits, key=lambda fit: fit[0])
     if len(problem.data) > FIRST_STRETCHES:
-        x = problem.solved(x).x
-    return problem.result(x)
+        x = problem.solved(x)
+    return _result(problem, x, free)
 
 
-class _Problem:
-    """Least squares over delay and lag of the valve and, without a free swing, frequency and decay.
+def _problem(data: Sequence[Driven], omega: float, free: DecayFit | None) -> DrivenProblem:
+    """Over delay and lag of the valve and, without a free swing, frequency and decay."""
+    low, high = [0.0, 0.0], [LONGEST_DELAY_S, LONGEST_LAG_S]
+    # A delay and a lag of the valve do nearly the same; from two starts the better one.
+    starts = [[0.1, 0.1], [0.3, 0.02]]
+    if free is None:
+        low += [0.75 * omega, 0.0]
+        high += [1.35 * omega, 0.6 * omega]
+        starts = [[*start, omega, 0.05 * omega] for start in starts]
+    return DrivenProblem(data, partial(_model, data, free), low, high, high, starts)
 
-    ``omega``: the frequency, about.
-    """
 
-    def __init__(self, data: Sequence[Driven], omega: float, free: DecayFit | None) -> None:
-        self.data = data
-        self._omega, self._free = omega, free
-        self._low, self._high = [0.0, 0.0], [LONGEST_DELAY_S, LONGEST_LAG_S]
-        # A delay and a lag of the valve do nearly the same; from two starts the better one.
-        self._starts = [[0.1, 0.1], [0.3, 0.02]]
-        if free:
-            known, ratio = 2.0 * math.pi / free.period_s.value, max(free.damping_ratio.value, 0.0)
-            self._known = known, known * ratio / math.sqrt(1.0 - ratio * ratio)
-            self._known_bases = self._bases(*self._known)
-        else:
-            self._low += [0.75 * omega, 0.0]
-            self._high += [1.35 * omega, 0.6 * omega]
-            self._starts = [[*start, omega, 0.05 * omega] for start in self._starts]
+def _pole(free: DecayFit | None, x: Array) -> tuple[float, float]:
+    """Frequency and decay."""
+    if free is None:
+        return float(x[2]), float(x[3])
+    omega, ratio = 2.0 * math.pi / free.period_s.value, max(free.damping_ratio.value, 0.0)
+    return omega, omega * ratio / math.sqrt(1.0 - ratio * ratio)
 
-    def _pole(self, x: Array) -> tuple[float, float]:
-        """Frequency and decay."""
-        return self._known if self._free else (float(x[2]), float(x[3]))
 
-    def _bases(self, omega: float, sigma: float) -> list[tuple[Array, Array]]:
-        """Return for each stretch: orthonormal basis of free swings, and data without them."""
-        bases = []
-        for one in self.data:
-            q, _ = np.linalg.qr(free_columns(one, omega, sigma))
-            bases.append((q, one.value - q @ (q.T @ one.value)))
-        return bases
+def _model(data: Sequence[Driven], free: DecayFit | None, x: Array) -> list[tuple[Array, Array]]:
+    omega, sigma = _pole(free, x)
+    delay, lag = float(x[0]), max(float(x[1]), SHORTEST_LAG_S)
+    parts = []
+    for one in data:
+        grid = np.arange(-1.0, float(one.time_s[-1]) + 2.0 * BIN_S, BIN_S)
+        speed = one.command.at(one.start_s + grid - delay)
+        # From rest at the first command's level; a swing before it is a free one.
+        swing = lfilter(*swing_filter(omega, sigma, lag, one.kind), speed - speed[0])
+        time = one.time_s
+        columns = free_columns(time, omega * time, np.exp(-sigma * time))
+        parts.append((np.interp(time, grid, swing), columns))
+    return parts
 
-    def _projected(self, x: Array) -> list[tuple[Array, Array]]:
-        """Return for each stretch: unit swing and data, both without what free swings explain."""
-        pole = self._pole(x)
-        swings = responses(self.data, *pole, float(x[0]), float(x[1]))
-        bases = self._known_bases if self._free else self._bases(*pole)
-        return [
-            (swing - q @ (q.T @ swing), rest)
-            for (swing, _), (q, rest) in zip(swings, bases, strict=True)
-        ]
 
-    def _residual(self, x: Array) -> Array:
-        projected = self._projected(x)
-        gain = gain_of(projected)
-        return np.concatenate([y - gain * h for h, y in projected])
+def _result(problem: DrivenProblem, x: Array, free: DecayFit | None) -> DrivenFit:
+    data, gain, (omega, sigma) = problem.data, gain_of(problem.projected(x)), _pole(free, x)
+    factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, max(3, 4 * len(data))))
+    speed = period = ratio = None
+    if all(one.kind is not Kind.OTHER for one in data):
+        half = factor * _gain_deviation(problem, x, gain, omega)
+        speed = Value(abs(gain), math.hypot(half, MODEL_PART * gain))
+    if free is None:
+        steps = 1e-4 * np.maximum(np.abs(x), 0.05)
+        covariance, _ = covariance_of(problem.residual, x, steps, data, omega)
+        values = swing_values(omega, sigma)
+        parts = MODEL_PERIOD * values[0], MODEL_RATIO_ABS
+        period, ratio = (
+            Value(v, math.hypot(factor * d, part))
+            for v, d, part in zip(values, deviations(x[2:], covariance[2:, 2:]), parts, strict=True)
+        )
+    fitted = [
+        Stretch(one, model, one.command.at(one.start_s + one.time_s - float(x[0])))
+        for one, (model, _) in zip(data, problem.fitted(x), strict=True)
+    ]
+    explained = problem.explained(x)
+    return DrivenFit(speed, period, ratio, explained, float(x[0] + x[1]), fitted)
 
-    def solved(self, start: Sequence[float] | Array) -> Any:
-        """Return the solution of SciPy from a start."""
-        bounds, scale = (self._low, self._high), self._high
-        return least_squares(self._residual, start, bounds=bounds, x_scale=scale, max_nfev=60)
 
-    def solved_first(self) -> tuple[Array, float]:
-        """Return the best solution on a part of the stretches, and what it explains of these."""
-        every = -(-len(self.data) // FIRST_STRETCHES)
-        first = _Problem(self.data[::every], self._omega, self._free) if every > 1 else self
-        best = min(map(first.solved, self._starts), key=lambda fit: float(fit.cost)).x
-        return best, first._explained(best)
-
-    def _explained(self, x: Array) -> float:
-        """Part of what the commands could have made that they explain."""
-        total, left = squares_of(self._projected(x))
-        return 1.0 - left / max(total, 1e-30)
-
-    def result(self, x: Array) -> DrivenFit:
-        """Return the fit at a solution."""
-        projected, pole = self._projected(x), self._pole(x)
-        gain = gain_of(projected)
-        factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, max(3, 4 * len(self.data))))
-        speed = period = ratio = None
-        if all(one.kind is not Kind.OTHER for one in self.data):
-            half = factor * self._gain_deviation(projected, gain, pole[0])
-            speed = Value(abs(gain), math.hypot(half, MODEL_PART * gain))
-        if not self._free:
-            values = swing_values(*pole)
-            parts = MODEL_PERIOD * values[0], MODEL_RATIO_ABS
-            period, ratio = (
-                Value(v, math.hypot(factor * d, part))
-                for v, d, part in zip(values, self._swing_deviations(x), parts, strict=True)
-            )
-        fitted = []
-        swings = responses(self.data, *pole, float(x[0]), float(x[1]))
-        for one, (swing, command) in zip(self.data, swings, strict=True):
-            free = free_columns(one, *pole)
-            rest, *_ = np.linalg.lstsq(free, one.value - gain * swing, rcond=None)
-            fitted.append(Stretch(one, gain * swing + free @ rest, command))
-        return DrivenFit(speed, period, ratio, self._explained(x), float(x[0] + x[1]), fitted)
-
-    def _gain_deviation(
-        self, projected: Sequence[tuple[Array, Array]], gain: float, omega: float
-    ) -> float:
-        """Return the deviation of the gain: by the noise or by the stretches, the larger one."""
-        noise = spread = square = 0.0
-        for one, (h, y) in zip(self.data, projected, strict=True):
-            residual, own = y - gain * h, float(h @ h)
-            noise += density(one.time_s, residual, omega)[0] * own
-            spread += float(h @ residual) ** 2
-            square += own
-        count = len(projected)
-        spread = math.sqrt(spread * count / (count - 1)) if count > 1 else 0.0
-        return max(math.sqrt(noise), spread) / square
-
-    def _swing_deviations(self, x: Array) -> tuple[float, float]:
-        """Return the deviations of period and damping ratio, by the noise around the swing."""
-        columns = []
-        for step in np.diag(1e-4 * np.maximum(np.abs(x), 0.05)):
-            columns.append((self._residual(x + step) - self._residual(x - step)) / 2.0 / step.max())
-        slope = np.stack(columns, axis=1)
-        covariance = covariance_of(slope, self._residual(x), self.data, float(x[2]))
-        return deviations(x[2:4], covariance[2:4, 2:4])
+def _gain_deviation(problem: DrivenProblem, x: Array, gain: float, omega: float) -> float:
+    """Return the deviation of the gain: by the noise or by the stretches, the larger one."""
+    one, data = np.array([gain]), problem.data
+    noise, _ = covariance_of(lambda g: problem.residual(x, g[0]), one, np.ones(1), data, omega)
+    pairs = problem.projected(x)
+    spread = sum(float(h @ (y - gain * h)) ** 2 for h, y in pairs) / max(len(pairs) - 1, 1)
+    square = sum(float(h @ h) for h, _ in pairs)
+    by_stretches = math.sqrt(len(pairs) * spread) / square if len(pairs) > 1 else 0.0
+    return max(math.sqrt(noise[0, 0]), by_stretches)

@@ -23,7 +23,6 @@ from canshaper.report import style
 ROW_PX, TITLE_PX, FOOT_PX = 640, 38, 150
 TITLE_CHARACTERS = 88
 MOST_ROWS = 6
-_LABEL: dict[str, Any] = {"fontsize": style.TEXT_PT, "color": style.TEXT_COLOUR}
 _FIT: dict[str, Any] = {"color": style.SHAPED_COLOUR, "linewidth": 1.8}
 _NAME: dict[str, Any] = {"color": style.SHAPED_COLOUR, "fontsize": style.TEXT_PT, "weight": "bold"}
 _DATA: dict[str, Any] = {"color": "#8A8A8A", "markersize": 3.0}
@@ -45,7 +44,7 @@ def figure(findings: Sequence[Finding], titles: Sequence[str]) -> Figure:
     wrapped = [line for title in titles for line in textwrap.wrap(title, TITLE_CHARACTERS)]
     top = TITLE_PX * len(wrapped) + 110
     height = top + ROW_PX * len(rows) + FOOT_PX
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     bold: dict[str, Any] = {"fontsize": style.TITLE_PT, "weight": "bold"}
     for i, line in enumerate(wrapped):
         fig.text(0.012, 1.0 - (40 + TITLE_PX * i) / height, line, color=style.TEXT_COLOUR, **bold)
@@ -95,8 +94,7 @@ def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
     high = min(max(float(factor * value[seen].max()), middle + reach), middle + 3.0 * reach)
     panel.set_ylim(low - 0.08 * (high - low), high + 0.2 * (high - low))
     panel.set_xlim(max(start, float(time[0])), min(end, float(time[-1])))
-    panel.set_ylabel(_UNITS[segment.kind], **_LABEL)
-    panel.set_xlabel(f"{source}, time in s", **_LABEL)
+    style.label(panel, f"{source}, time in s", _UNITS[segment.kind])
 
 
 def _draw_decay(panel: Axes, fit: DecayFit) -> None:
@@ -116,8 +114,7 @@ def _draw_decay(panel: Axes, fit: DecayFit) -> None:
     ticks = [t for t in (1, 2, 5, 10, 20, 50, 100) if t > panel.get_ylim()[0]]
     panel.set_yticks(ticks, [f"{t}" for t in ticks])
     panel.set_yticks([], minor=True)
-    panel.set_ylabel("amplitude, % of the first", **_LABEL)
-    panel.set_xlabel("swings", **_LABEL)
+    style.label(panel, "swings", "amplitude, % of the first")
 
 
 def _half_swings(one: SegmentFit, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -140,5 +137,5 @@ def _draw_driven(panel: Axes, fit: DrivenFit) -> None:
         panel.fill_between(at, driven, color=style.JOYSTICK_COLOUR, linewidth=0, step="post")
         panel.plot(at, factor * data.value, ".", **_DATA)
         panel.plot(at, factor * fitted, **_FIT)
-        panel.set_ylabel(_UNITS[data.kind], **_LABEL)
-    panel.set_xlabel(f"{fit.stretches[0].data.source}, time in s; grey: driven", **_LABEL)
+    first = fit.stretches[0].data
+    style.label(panel, f"{first.source}, time in s; grey: driven", _UNITS[first.kind])

@@ -221,7 +221,8 @@ def write_sway(
     """Write what is known of each axis, and where from; the axes that were written.
 
     Raises:
-        UsageError: an axis has no section for it, or would travel on for too long with it.
+        UsageError: an axis has no section for it, follows its rope, or would travel on for too
+            long with it.
         ConfigError: the file cannot be changed.
     """
     changes: list[Change] = []
@@ -232,6 +233,9 @@ def write_sway(
         if config.sway is None:
             text = f"expected a section sway to write to, got none; put in {shown}"
             raise UsageError(f"axis {one.axis}: {text}")
+        if config.sway.length:
+            text = "expected an axis with a period, got one that follows its rope (sway.length)"
+            raise UsageError(f"axis {one.axis}: {text}: the measured length says how it swings")
         faster = config.model_copy(update={"sway": Sway.model_validate(one.sway)})
         if fault := stop_fault(deployment, one.axis, faster):
             text = f"with {shown}, limits.stop_distance_m: {fault}; change the limits first"

@@ -1,20 +1,30 @@
-"""A measured signal over time, with its unit, and what is known of the commands with it."""
+"""A measured signal over time, with its unit, and the commands of the axes in the same log."""
 
 import math
 import re
+from array import array
+from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from canshaper.codec.frame import Frame
+from canshaper.codec.layout import Layout
 from canshaper.errors import IdentificationError
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.valves import BoundAxis
+from canshaper.recording.channels import InputFinder, joystick_commands, valve_part
 
 Array = NDArray[np.float64]
 Span = tuple[float, float]  # start and end, s
 
 # Bins that a fast signal is averaged into; the shortest period that is looked for has 15 of them.
 BIN_S = 0.02
+# Commands, part of full speed, below which an axis stands.
+STANDS = 0.01
 # Step back that is still taken for reordering by the logger, s.
 _REORDERED_S = 0.1
 
@@ -22,12 +32,9 @@ _REORDERED_S = 0.1
 class Kind(Enum):
     """Quantity of a signal in the swing."""
 
-    ANGLE = "angle"
-    """Angle, rad."""
-    RATE = "rate"
-    """Its rate, in rad/s."""
-    OTHER = "other"
-    """Something that swings along, such as a pressure, in its own unit."""
+    ANGLE = "angle"  # rad
+    RATE = "rate"  # of the angle, rad/s
+    OTHER = "other"  # something that swings along, such as a pressure, in its own unit
 
     @property
     def shown(self) -> tuple[float, str]:
@@ -35,6 +42,10 @@ class Kind(Enum):
         if self is Kind.OTHER:
             return 1.0, ""
         return math.degrees(1.0), "degrees" if self is Kind.ANGLE else "degrees/s"
+
+    def angle(self, amplitude: float, omega: float) -> float:
+        """Amplitude of the swing in rad, by the frequency in rad/s; 0 where it is not known."""
+        return {Kind.ANGLE: amplitude, Kind.RATE: amplitude / omega}.get(self, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +107,16 @@ class Command:
     time_s: Array
     speed: Array
 
+    def at(self, time_s: Array) -> Array:
+        """Parts of full speed at these times; 0 before the first command."""
+        return np.append(0.0, self.speed)[np.searchsorted(self.time_s, time_s, side="right")]
+
 
 @dataclass(frozen=True, slots=True)
 class Series:
     """A signal of one axis, in rad, rad/s or its own unit; times from the start of the log, s."""
 
     source: str  # file and signal, for people
-    label: str  # state of the grapple it was logged in, such as "empty"; may be ""
     unit: Unit
     time_s: Array  # rising
     value: Array
@@ -111,6 +125,14 @@ class Series:
     others: list[Span] = field(default_factory=list)  # other axes were commanded
     at: float | None = None  # value of the deployment's grapple signal, where the log has it
     notes: list[str] = field(default_factory=list)  # what was left out while reading
+
+    @property
+    def driven_s(self) -> float:
+        """Seconds in which the axis was commanded to move."""
+        if self.command is None or not len(self.command.time_s):
+            return 0.0
+        held = np.diff(self.command.time_s, append=self.command.time_s[-1])
+        return float(held[np.abs(self.command.speed) > STANDS].sum())
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,3 +207,85 @@ def common(one: list[Span], other: list[Span]) -> list[Span]:
         else:
             j += 1
     return common
+
+
+# Silence of a command's message after which nothing is known of the command, s.
+_SILENT_S = 2.0
+
+
+@dataclass
+class Samples:
+    """Times in s from the first frame of the log, and values."""
+
+    time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    value: "array[float]" = field(default_factory=lambda: array("d"))
+
+    def add(self, time_s: float, value: float) -> None:
+        """Put one in."""
+        self.time_s.append(time_s)
+        self.value.append(value)
+
+    def arrays(self) -> tuple[Array, Array]:
+        """Times and values."""
+        return np.array(self.time_s), np.array(self.value)
+
+
+class Commands:
+    """Commands of the axes of a deployment, from valve frames, else from joysticks."""
+
+    def __init__(self, deployment: Deployment | None) -> None:
+        self._axes = dict(deployment.axes) if deployment else {}
+        self._valves: dict[str, Samples] = defaultdict(Samples)
+        self._joysticks: dict[str, Samples] = defaultdict(Samples)
+        self._by_valve: dict[tuple[int, bool], list[tuple[BoundAxis, Layout]]] = defaultdict(list)
+        for axis in self._axes.values():
+            self._by_valve[axis.valve.message.key[1:]].append((axis, Layout(axis.valve_message)))
+        self._limits = {n: a.config.limits.output_limits() for n, a in self._axes.items()}
+        joysticks = list(deployment.joysticks.values()) if deployment else []
+        self._joystick_buses = {joystick.key[0] for joystick in joysticks}
+        self._finder = InputFinder(deployment.config.buses if deployment else {}, joysticks)
+
+    def receive(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
+        """Take a frame that was received."""
+        for axis, layout in self._by_valve.get(key, ()):
+            if (part := valve_part(axis, layout, data)) is not None:
+                self._valves[axis.name].add(time_s, self._limits[axis.name].velocity(part))
+        for bus in self._joystick_buses:  # no one has said which channel of the log it is
+            if joystick := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
+                for name, value in joystick_commands(joystick, self._axes, data)[1].items():
+                    moved = abs(value) > self._axes[name].config.command.neutral_pct / 100.0
+                    self._joysticks[name].add(time_s, value if moved else 0.0)
+
+    def of(self, axis: str) -> Command | None:
+        """Commands of an axis; None where the log has none."""
+        return self._first(axis, self._valves, self._joysticks)
+
+    @staticmethod
+    def _first(axis: str, *kinds: Mapping[str, Samples]) -> Command | None:
+        """Return the command of the first kind that the log has."""
+        return next((Command(*kind[axis].arrays()) for kind in kinds if axis in kind), None)
+
+    def others(self, axis: str) -> list[Span]:
+        """Stretches in which other axes are commanded.
+
+        By their joysticks where these are in the log: what a two-axis motion adds makes no swing.
+        """
+        others = [self._first(n, self._joysticks, self._valves) for n in self._axes if n != axis]
+        return [span for c in others if c for span in _known(c, np.abs(c.speed) >= STANDS)]
+
+    def idle(self) -> list[Span] | None:
+        """Stretches in which every axis stands; None where no command is in the log."""
+        known = [c for c in map(self.of, self._axes) if c]
+        if not known:
+            return None
+        idle = [(max(float(c.time_s[0]) for c in known), min(float(c.time_s[-1]) for c in known))]
+        for command in known:
+            idle = common(idle, _known(command, np.abs(command.speed) < STANDS))
+        return idle
+
+
+def _known(command: Command, is_so: NDArray[np.bool_]) -> list[Span]:
+    """Stretches in which something is so of a command, and the next one comes soon."""
+    time = command.time_s
+    known = is_so[:-1] & (np.diff(time) < _SILENT_S)
+    return [(float(time[a]), float(time[b])) for a, b in runs(known)]

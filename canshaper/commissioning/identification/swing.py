@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from canshaper.commissioning.identification.decay import DecayFit, DecayProblem
+from canshaper.commissioning.identification.decay import DecayFit, DecayProblem, free_columns
 from canshaper.commissioning.identification.series import Array, Segment, Series, runs
 
 # Least samples a period.
@@ -151,10 +151,8 @@ def mixed(fit: DecayFit) -> str | None:
     sigma = fit.damping_ratio.value * omega
 
     def linear(x: Array) -> tuple[Array, Array]:
-        columns = [np.ones_like(time), time]
-        for w, s in ((x[0], x[1]), (x[2], x[3])):
-            columns += [np.exp(-s * time) * np.cos(w * time), np.exp(-s * time) * np.sin(w * time)]
-        basis = np.stack(columns, axis=1)
+        pair = [free_columns(time, w * time, np.exp(-s * time)) for w, s in x.reshape(2, 2)]
+        basis = np.hstack([pair[0], pair[1][:, :2]])
         best, *_ = np.linalg.lstsq(basis, segment.value, rcond=None)
         return np.asarray(best), np.asarray(segment.value - basis @ best)
 
@@ -166,7 +164,7 @@ def mixed(fit: DecayFit) -> str | None:
     ]
     x = min(fits, key=lambda f: float(f.cost)).x
     best, residual = linear(x)
-    first, second = sorted((math.hypot(*best[2:4]), math.hypot(*best[4:6])), reverse=True)
+    first, second = sorted((math.hypot(*best[:2]), math.hypot(*best[4:])), reverse=True)
     better = float(np.sum(residual**2)) < 0.6 * float(np.sum((segment.value - longest.fitted) ** 2))
     if not better or second < 0.1 * first or abs(x[0] - x[2]) < 0.02 * omega:
         return None

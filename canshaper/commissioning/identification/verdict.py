@@ -13,7 +13,6 @@ from canshaper.commissioning.identification.decay import (
     fit_decay,
 )
 from canshaper.commissioning.identification.driven import DrivenFit, fit_driven
-from canshaper.commissioning.identification.driven_data import driven_s
 from canshaper.commissioning.identification.segments import SETTLING_S, FreeSwings, find_free
 from canshaper.commissioning.identification.series import Series, Value
 from canshaper.commissioning.identification.swing import SAMPLES, clipped, mixed
@@ -132,7 +131,7 @@ def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> 
 
 def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
     """Driven swings: full speed, and what free swings did not show."""
-    if not any(driven_s(s) for s in series):
+    if not any(s.driven_s for s in series):
         return
     trusted = finding.free if finding.free and not _faults(finding) else None
     starts = (about_s,) if about_s else STARTS_S

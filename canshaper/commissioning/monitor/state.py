@@ -9,7 +9,8 @@ from rich.text import Text
 
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.channels import InputFinder, Key
+from canshaper.machine.routing import Key
+from canshaper.recording.channels import InputFinder
 from canshaper.recording.history import AxisStatus, History, HistoryEvent
 from canshaper.recording.listen import ReceivedFrame
 
@@ -98,16 +99,14 @@ class Monitor:
         self.samples: dict[str, deque[Sample]] = {
             name: deque(maxlen=MOST_SAMPLES) for name in deployment.axes
         }
-        self._axis_of: dict[Key, str] = {}
         self.digest: int | None = None
         for bound in deployment.inputs():
             self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
-        for name, axis in deployment.axes.items():
+        for axis in deployment.axes.values():
             message = axis.valve_message
             key = axis.valve.message.key
             self.messages.setdefault(key, MessageRate(message.name, message.cycle_time))
             if axis.status:
-                self._axis_of[axis.status.message.key] = name
                 self._status(axis.status.message.key, axis.status.message.fields.message)
         if deployment.status:
             self._status(deployment.status.message.key, deployment.status.message.fields.message)
@@ -129,9 +128,9 @@ class Monitor:
         rate = self.messages.get(bound.key if bound else key)
         if rate is not None:
             rate.received(frame.time_ns)
-        self.history.receive(frame)
-        if (name := self._axis_of.get(key)) and (status := self.history.axes.get(name)):
-            shaped, sway = (status.values[one] for one in ("ShapedCommand", "PredictedSway"))
+        if name := self.history.receive(frame):
+            of_axis = self.history.axes[name].values
+            shaped, sway = (of_axis[one] for one in ("ShapedCommand", "PredictedSway"))
             self.samples[name].append(Sample(frame.time_ns, shaped, sway))
         identity = self.deployment.identity_status
         if identity and key == identity.message.key and (values := identity.decode(frame.data)):

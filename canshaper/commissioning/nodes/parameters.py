@@ -12,7 +12,6 @@ from canopen.sdo.exceptions import SdoError
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can, receive
 from canshaper.codec.frame import EMERGENCY
-from canshaper.commissioning.nodes import MessageTiming
 from canshaper.commissioning.nodes.messages import ANALOGUE_INPUTS
 from canshaper.commissioning.nodes.node import (
     COB_ID,
@@ -34,6 +33,14 @@ _ANALOGUE_ON = (0x6423, 0)
 _SAVE = int.from_bytes(b"save", "little")
 _BY_EVENT = (254, 255)  # transmission types: on no SYNC
 _PROFILE = 255
+
+
+@dataclass(frozen=True)
+class MessageTiming:
+    """How a deployment uses a message: sent every so many ms, lost after so many."""
+
+    cycle_ms: int | None
+    timeout_ms: int
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,12 @@
 """The procedure: runs steps, keeps their state, writes what a person has accepted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from difflib import unified_diff
 from pathlib import Path
 
 from canshaper.commissioning.procedure.bench import Bench
-from canshaper.commissioning.procedure.files import Files, Part
+from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.state import (
     FILE,
     Context,
@@ -21,39 +20,36 @@ from canshaper.commissioning.procedure.state import (
     stamped,
     write_state,
 )
+from canshaper.commissioning.procedure.steps.buses import BUSES
+from canshaper.commissioning.procedure.steps.check import CHECK
+from canshaper.commissioning.procedure.steps.drive import DRIVE
+from canshaper.commissioning.procedure.steps.dry import DRY
+from canshaper.commissioning.procedure.steps.filter import FILTER
+from canshaper.commissioning.procedure.steps.joysticks import JOYSTICKS
+from canshaper.commissioning.procedure.steps.motion import FIRST_MOTION
+from canshaper.commissioning.procedure.steps.report import REPORT
+from canshaper.commissioning.procedure.steps.sensor import SENSOR
+from canshaper.commissioning.procedure.steps.swing import SWING
+from canshaper.commissioning.procedure.steps.valve import VALVE
 from canshaper.edit.edit import replace_text
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.report.style import draw
 
-
-@dataclass
-class Proposal:
-    """Result of a run of a step, and what it would write; nothing is written yet.
-
-    Attributes:
-        step: name of the step.
-        parts: lines and tables.
-        numbers: what was measured.
-        problems: what is missing, with what to do; then nothing can be accepted.
-        pictures: files of its picture.
-        files: its logs.
-        note: what is said of the step once it is done.
-        diff: what would be written into the deployment file; empty for nothing.
-        before: SHA-256 of the deployment file that it was computed from.
-        text: that file with what it would write.
-    """
-
-    step: str
-    before: str
-    parts: list[Part] = field(default_factory=list)
-    numbers: dict[str, object] = field(default_factory=dict)
-    problems: list[str] = field(default_factory=list)
-    pictures: list[Path] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)
-    note: str = ""
-    diff: str = ""
-    text: bytes = b""
+STEPS: tuple[Step, ...] = (
+    BUSES,
+    JOYSTICKS,
+    SWING,
+    VALVE,
+    FILTER,
+    SENSOR,
+    CHECK,
+    DRY,
+    FIRST_MOTION,
+    DRIVE,
+    REPORT,
+)
+"""The steps of a day of commissioning, in order."""
 
 
 class Procedure:
@@ -63,7 +59,6 @@ class Procedure:
         files: of the deployment.
         bench: where it is measured.
         load: reads the deployment of a path, with the bus options of the command.
-        steps: in order.
         origin: the file that a rehearsal's is a copy of.
 
     Attributes:
@@ -81,14 +76,14 @@ class Procedure:
         files: Files,
         bench: Bench,
         load: Callable[[Path], Deployment],
-        steps: Sequence[Step],
         origin: Path | None = None,
     ) -> None:
         self.files, self._bench, self._load = files, bench, load
         self.news: list[str] = []
         deployment = load(files.deployment)
-        self.steps = [step for step in steps if step.applies(deployment)]
-        self.state = read_state(files.state) or _new_state(bench, origin)
+        self.steps = [step for step in STEPS if step.applies(deployment)]
+        new = State(bench.simulated, bench.changes, hash_of(origin) if origin else "")
+        self.state = read_state(files.state) or new
         self._check_bench()
         if origin not in (None, files.deployment) and hash_of(origin) != self.state.origin:
             remedy = f"to rehearse it as it is now, move {files.deployment} and {files.state} away"
@@ -130,8 +125,10 @@ class Procedure:
 
     # -- one step ------------------------------------------------------------------------------
 
-    def run(self, step: Step) -> Proposal:
-        """Run a step: its results, and what it would write. What it lacks is no error.
+    def run(self, step: Step) -> Outcome:
+        """Run a step: its results, and what it would write; nothing is written yet.
+
+        What it lacks is no error.
 
         Raises:
             ConfigError: the deployment file is no good one.
@@ -139,48 +136,46 @@ class Procedure:
             OSError: a file cannot be written.
         """
         self._notice_changes()
-        proposal = Proposal(step.name, hash_of(self.files.deployment))
+        outcome, before = Outcome(), hash_of(self.files.deployment)
         deployment = self._load(self.files.deployment)
         context = Context(deployment, self._bench, self.files.folder, self.state)
         try:
             outcome = step.run(context)
-            proposal.parts, proposal.numbers = outcome.sheet.parts, outcome.numbers
-            proposal.problems, proposal.files = outcome.problems, outcome.files
-            proposal.note = outcome.note
             for part, figure in outcome.figures.items():
                 name = f"{step.name}-{part}" if part else step.name
-                proposal.pictures += draw(figure, self.files.folder / name, deployment)
+                outcome.pictures += draw(figure, self.files.folder / name, deployment)
             if outcome.edit and not outcome.problems:
-                self._propose(proposal, outcome)
+                self._propose(outcome)
         except BusError:
             raise
         except CanshaperError as error:
-            proposal.problems.append(
+            outcome.problems.append(
                 str(error).replace(str(self.files.proposal), str(deployment.path))
             )
-        self._keep(proposal, Status.OPEN, why="; ".join(proposal.problems) or "not accepted yet")
-        return proposal
+        outcome.step, outcome.before = step.name, before
+        self._keep(outcome, Status.OPEN, why="; ".join(outcome.problems) or "not accepted yet")
+        return outcome
 
-    def accept(self, proposal: Proposal) -> None:
+    def accept(self, outcome: Outcome) -> None:
         """Write what a step proposes; it is done, and what used its results is open again.
 
         Raises:
             UsageError: it lacks something, or the file was changed meanwhile: the step stays open.
             OSError: a file cannot be written.
         """
-        if proposal.problems:
-            raise UsageError(f"{proposal.step}: {'; '.join(proposal.problems)}")
+        if outcome.problems:
+            raise UsageError(f"{outcome.step}: {'; '.join(outcome.problems)}")
         path = self.files.deployment
-        if hash_of(path) != proposal.before:
+        if hash_of(path) != outcome.before:
             self._notice_changes()
             text = "was changed by someone else meanwhile; nothing was written, do the step again"
             raise UsageError(f"{path}: {text}")
-        if proposal.diff:
-            replace_text(path, proposal.text.decode())
+        if outcome.diff:
+            replace_text(path, outcome.text.decode())
             self.state.left = hash_of(path)
-        self._keep(proposal, Status.DONE, why=proposal.note)
-        if proposal.diff:
-            name = proposal.step
+        self._keep(outcome, Status.DONE, why=outcome.note)
+        if outcome.diff:
+            name = outcome.step
             self._reopen({name, FILE}, f"{name} has changed the file")
         self._save()
 
@@ -192,7 +187,7 @@ class Procedure:
 
     # -- parts ---------------------------------------------------------------------------------
 
-    def _propose(self, proposal: Proposal, outcome: Outcome) -> None:
+    def _propose(self, outcome: Outcome) -> None:
         """Let the step write into a copy of the file, and see what that changes."""
         assert outcome.edit
         path, copy = self.files.deployment, self.files.proposal
@@ -200,32 +195,32 @@ class Procedure:
         copy.write_bytes(before)
         copy.chmod(path.stat().st_mode)
         try:
-            notes = outcome.edit(self._load(copy))
-            proposal.parts += [{"text": note} for note in notes]
-            proposal.text = copy.read_bytes()
+            notes = outcome.edit(self._load(copy)) or ()
+            outcome.sheet.parts += [{"text": note} for note in notes]
+            outcome.text = copy.read_bytes()
         finally:
             with suppress(OSError):
                 copy.unlink()
         names = f"{path.name} (now)", f"{path.name} (then)"
         lines = unified_diff(
-            before.decode().splitlines(), proposal.text.decode().splitlines(), *names, lineterm=""
+            before.decode().splitlines(), outcome.text.decode().splitlines(), *names, lineterm=""
         )
-        proposal.diff = "\n".join(lines)
+        outcome.diff = "\n".join(lines)
 
-    def _keep(self, proposal: Proposal, status: Status, why: str = "") -> None:
+    def _keep(self, outcome: Outcome, status: Status, why: str = "") -> None:
         done = status is Status.DONE
         record = Record(
             status,
             why=why,
-            parts=proposal.parts,
-            numbers=proposal.numbers,
-            problems=proposal.problems,
-            pictures=[path.name for path in proposal.pictures],
-            files=[path.name for path in proposal.files],
-            diff=proposal.diff if done else "",
+            parts=outcome.sheet.parts,
+            numbers=outcome.numbers,
+            problems=outcome.problems,
+            pictures=[path.name for path in outcome.pictures],
+            files=[path.name for path in outcome.files],
+            diff=outcome.diff if done else "",
             deployment=hash_of(self.files.deployment),
         )
-        self.state.steps[proposal.step] = stamped(record)
+        self.state.steps[outcome.step] = stamped(record)
         self._save()
 
     def _save(self) -> None:
@@ -249,9 +244,3 @@ class Procedure:
             self.news.append(f"{why} since the last step; it is checked again, nothing is lost")
         self.state.left = now
         write_state(self.files.state, self.state)
-
-
-def _new_state(bench: Bench, origin: Path | None) -> State:
-    return State(
-        simulated=bench.simulated, changes=bench.changes, origin=hash_of(origin) if origin else ""
-    )

@@ -174,7 +174,16 @@ class Outcome:
         files: logs it has written.
         note: what is said of the step once it is done; empty for nothing.
         edit: writes what it proposes into the file of a deployment, and says what a person has to
-            know of that; None for nothing.
+            know of that, if anything; None for nothing.
+
+    The procedure adds:
+
+    Attributes:
+        step: name of the step.
+        pictures: files of its pictures.
+        before: SHA-256 of the deployment file that it was computed from.
+        diff: what would be written into that file; empty for nothing.
+        text: that file with what it would write.
     """
 
     sheet: Sheet = field(default_factory=Sheet)
@@ -183,11 +192,12 @@ class Outcome:
     figures: "dict[str, Callable[[], Figure]]" = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
     note: str = ""
-    edit: Callable[[Deployment], Sequence[str]] | None = None
-
-
-def _always(_deployment: Deployment) -> bool:
-    return True
+    edit: Callable[[Deployment], Sequence[str] | None] | None = None
+    step: str = ""
+    pictures: list[Path] = field(default_factory=list)
+    before: str = ""
+    diff: str = ""
+    text: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -210,4 +220,4 @@ class Step:
     run: Callable[[Context], Outcome]
     writes: str = ""
     needs: tuple[str, ...] = ()
-    applies: Callable[[Deployment], bool] = _always
+    applies: Callable[[Deployment], object] = lambda _deployment: True

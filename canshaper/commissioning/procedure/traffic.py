@@ -14,14 +14,20 @@ from canshaper.codec.layout import Layout
 from canshaper.commissioning import suggest
 from canshaper.commissioning.doctor.listen import inputs_of
 from canshaper.commissioning.identification.canlog import read_can
-from canshaper.commissioning.identification.commands import Samples, joystick_commands, valve_part
-from canshaper.commissioning.identification.series import Array, Kind, Series
+from canshaper.commissioning.identification.series import (
+    Array,
+    Command,
+    Kind,
+    Samples,
+    Series,
+)
 from canshaper.errors import IdentificationError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
+from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
-from canshaper.recording.channels import InputFinder, Key
+from canshaper.recording.channels import InputFinder, joystick_commands, valve_part
 from canshaper.recording.history import History
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.recording.log import LogFile
@@ -48,6 +54,11 @@ class AxisTraffic:
     enabled: Samples = field(default_factory=Samples)
     valve: Samples = field(default_factory=Samples)
     states: list[tuple[float, str, str]] = field(default_factory=list)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Least and most of its joystick."""
+        return min(self.joystick.value, default=0.0), max(self.joystick.value, default=0.0)
 
 
 @dataclass
@@ -103,10 +114,10 @@ class _Reader:
         for axis in self._valves.get(key, ()):
             if (part := valve_part(axis, Layout(axis.valve_message), frame.data)) is not None:
                 traffic.axes[axis.name].valve.add(time_s, part)
-        self._history.receive(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
+        name = self._history.receive(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
         traffic.missed_deadlines = self._history.counters.get("MissedDeadlines")
-        for name, status in self._history.axes.items():
-            states = traffic.axes[name].states
+        if name:
+            states, status = traffic.axes[name].states, self._history.axes[name]
             if not states or states[-1][1:] != (status.state, status.reason):
                 states.append((time_s, status.state, status.reason))
         if candidate := self._candidates.get(key[1:]):
@@ -201,20 +212,20 @@ def machine_recording(log: Path, deployment: Deployment, signals: Mapping[str, s
     """
     sensors = {name: s for name in signals if (s := deployment.axes[name].sway_sensor)}
     sources = {n: one.config.source for n, one in sensors.items() if one.name == signals[n]}
-    swings = read_can(log, "", signals, deployment.messages, deployment=deployment, sources=sources)
+    swings = read_can(log, signals, deployment.messages, deployment=deployment, sources=sources)
     traffic = read_traffic(log, deployment)
     time_s = next(iter(swings.values())).time_s
     planes: dict[str, list[float]] = {}
     axes = {}
     for name, axis in traffic.axes.items():
         sent = swings[name].command if name in swings else None
-        sent_s, speed = (sent.time_s, sent.speed) if sent else axis.valve.arrays()
-        velocity = _held(time_s, sent_s, speed)
+        velocity = (sent or Command(*axis.valve.arrays())).at(time_s).tolist()
+        joystick = Command(*axis.joystick.arrays()).at(time_s)
         sway = None
         if name in swings:
             _check_complete(name, swings[name], traffic.duration_s)
             sway = planes[signals[name]] = _angle_deg(deployment, name, swings[name], time_s)
-        axes[name] = AxisTrace(_held(time_s, *axis.joystick.arrays()), velocity, velocity, sway)
+        axes[name] = AxisTrace(joystick.tolist(), velocity, velocity, sway)
     begin_s = float(time_s[0])
     total = [math.hypot(*angles) for angles in zip(*planes.values(), strict=True)]
     crane = CraneTrace([], [], total)
@@ -234,14 +245,6 @@ def _check_complete(name: str, series: Series, duration_s: float) -> None:
         text = f"{series.source}: no value for {gap_s:.1f} s from {edges[number]:.1f} s on"
         remedy = "is the sensor on, and the swing within its range? Do it again"
         raise IdentificationError(f"{name}: {text}: {remedy}")
-
-
-def _held(at_s: Array, time_s: Array, value: Array) -> list[float]:
-    """Values at these times, each held until the next; zero before the first."""
-    if not len(time_s):
-        return [0.0] * len(at_s)
-    number = np.searchsorted(time_s, at_s, side="right") - 1
-    return [float(value[k]) if k >= 0 else 0.0 for k in number]
 
 
 def _angle_deg(deployment: Deployment, name: str, series: Series, at_s: Array) -> list[float]:

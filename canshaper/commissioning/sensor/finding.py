@@ -1,17 +1,23 @@
-"""Finding on a sway sensor: what a log shows, whether it may be used, and keys for the file."""
+"""Finding on a sway sensor: what a log shows, whether it may be used; shown, and written."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
+from rich.table import Table
 
-from canshaper.commissioning.identification.driven_data import Driven, driven_s, stretches
+from canshaper.commissioning.identification.canlog import is_simulated
+from canshaper.commissioning.identification.driven import Driven, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
 from canshaper.commissioning.identification.swing import clipped
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
+from canshaper.edit.edit import Change, FileValue, change, note, written_by
+from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, MOST_DELAY
 from canshaper.machine.valves import BoundAxis
+from canshaper.report.console import axis_title, new_table
 
 # Seconds in which the axis has to be driven, at least.
 LEAST_DRIVEN_S = 2.0
@@ -133,7 +139,7 @@ def _useless(axis: str, series: Series, period_s: float) -> str | None:
         )
     if float(np.ptp(value)) == 0.0:
         return f"{source}: it stands at {value[0]:g}: is it the right signal, and the sensor on?"
-    if (seconds := sum(map(driven_s, _alone(series, period_s)))) < LEAST_DRIVEN_S:
+    if (seconds := sum(one.driven_s for one in _alone(series, period_s))) < LEAST_DRIVEN_S:
         return (
             f"expected {axis} driven alone for {LEAST_DRIVEN_S:g} s or more, got {seconds:.1f} s;"
             f" what moves the tool without a command shows no sign: {DRIVE_IT}"
@@ -172,8 +178,7 @@ def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
 def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
     """Why what was found cannot be used."""
     fit, source = finding.fit, finding.series.source
-    assert fit
-    assert axis.config.sway
+    assert fit and axis.config.sway
     explained = fit.explained(math.radians(finding.noise))
     if explained < LEAST_EXPLAINED:
         return [
@@ -208,8 +213,7 @@ def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
 
 def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
     """Return further notes for the person."""
-    assert finding.fit
-    assert axis.config.sway
+    assert finding.fit and axis.config.sway
     notes, period_s = [], axis.config.sway.mode().period_s
     longer = (finding.period_s.value / period_s) ** 2 - 1.0
     if abs(longer) > SAME_LENGTH:
@@ -221,12 +225,12 @@ def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
     return notes
 
 
-def changes(axis: BoundAxis, finding: Finding) -> dict[str, bool | float]:
+def changes(axis: BoundAxis, finding: Finding) -> dict[str, FileValue]:
     """Return the values for the section of the sensor, by key."""
     assert axis.sway_sensor
     config = axis.sway_sensor.config
     delay_ms = round(1000.0 * finding.delay_s.value)
-    values: dict[str, bool | float] = {
+    values: dict[str, FileValue] = {
         "invert": finding.invert,
         "delay_ms": max(0, delay_ms),
         "noise_deg": float(f"{max(0.01, finding.noise):.2g}"),
@@ -236,3 +240,60 @@ def changes(axis: BoundAxis, finding: Finding) -> dict[str, bool | float]:
     if abs(finding.offset.value) > NEAR_OFFSET * config.offset_max_deg:
         values["offset_max_deg"] = math.ceil(MORE_OFFSET * abs(finding.offset.value))
     return values
+
+
+def heading(finding: Finding) -> str:
+    """Return a heading: what was examined, and whether the data is enough."""
+    text = f"{axis_title(finding.axis)}, {finding.series.source}"
+    if finding.fit is None:
+        return f"{text}: nothing found"
+    driven = len(finding.data)
+    explained = 100.0 * max(0.0, finding.fit.explained(math.radians(finding.noise)))
+    text += f": {driven} driven stretch{'es' * (driven != 1)}, {explained:.0f} % explained"
+    return f"{text} (not enough data)" if finding.problems else text
+
+
+def table(axis: BoundAxis, finding: Finding) -> Table:
+    """Return a table of the finding next to the values of the file."""
+    assert axis.sway_sensor and axis.config.sway
+    config, sway = axis.sway_sensor.config, axis.config.sway
+    unit, rows = finding.unit.replace("degrees", "deg"), new_table("", "file", "found")
+    inverted = {False: "as the model", True: "inverted"}
+    rows.add_row("sign", inverted[config.invert], inverted[finding.invert])
+    rows.add_row("delay, ms", f"{config.delay_ms:g}", _shown(finding.delay_s, 1000.0, 0))
+    rows.add_row(f"offset, {unit}", f"up to {config.offset_max_deg:g}", _shown(finding.offset))
+    rows.add_row(f"noise, {unit}", f"{config.noise:g}", f"{finding.noise:.2g}")
+    rows.add_row("period, s", f"{sway.mode().period_s:.2f}", _shown(finding.period_s))
+    rows.add_row("full speed, m/s", f"{sway.full_speed_m_s:g}", _shown(finding.size_m_s))
+    return rows
+
+
+def _shown(value: Value, factor: float = 1.0, digits: int = 2) -> str:
+    half = max(factor * value.half, 10.0**-digits)
+    return f"{factor * value.value:.{digits}f} ± {half:.{digits}f}"
+
+
+def write_sensors(
+    deployment: Deployment, findings: Sequence[Finding], log: Path | None, *, live: bool
+) -> list[str]:
+    """Write the results for each sensor, and where from; the lines that have changed.
+
+    Args:
+        deployment: the machine.
+        findings: of its sensors; those with problems are left out.
+        log: the log that they are from, where a person recorded it.
+        live: whether the buses were listened to.
+
+    Raises:
+        ConfigError: the file cannot be changed.
+    """
+    simulated = not live or any(bus.is_virtual for bus in deployment.config.buses.values())
+    if log:
+        simulated = is_simulated(log, deployment.messages)
+    origin = written_by("sensor", simulated=simulated, log=log.name if log else None)
+    written: list[Change] = []
+    for finding in findings:
+        if not finding.problems:
+            values = changes(deployment.axes[finding.axis], finding) | {"origin": origin}
+            written.append((("axes", finding.axis, "sway_sensor"), values, note("sensor")))
+    return change(deployment.path, written) if written else []

@@ -5,24 +5,22 @@ The tip follows its command with the lag that the deployment names, and drives t
 own. Each stretch of driving has a free swing and an offset of its own too.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from canshaper.commissioning.identification.canlog import read_can
-from canshaper.commissioning.identification.driven_data import (
+from canshaper.commissioning.identification.decay import covariance_of, free_columns
+from canshaper.commissioning.identification.driven import (
     SHORTEST_LAG_S,
     Driven,
-    covariance_of,
-    free_columns,
+    DrivenProblem,
     gain_of,
-    squares_of,
     swing_filter,
 )
 from canshaper.commissioning.identification.series import Array, Series
@@ -79,111 +77,61 @@ def fit_sensor(data: Sequence[Driven], mode: SwayMode, lag_s: float) -> SensorFi
         mode: swing by the deployment.
         lag_s: time constant of the valve.
     """
-    problem = _Problem(data, mode, max(lag_s, SHORTEST_LAG_S))
-    fits = [problem.solved(start) for start in STARTS_S]
-    return problem.result(min(fits, key=lambda fit: float(fit.cost)).x)
+    pole = mode.pole
+    low = [LEAST_DELAY_S, SLOWEST * pole.imag, 0.0]
+    high = [MOST_DELAY_S, FASTEST * pole.imag, 0.6 * pole.imag]
+    scale = [0.1, 0.1 * pole.imag, 0.05 * pole.imag]
+    starts = [[start, pole.imag, -pole.real] for start in STARTS_S]
+    model = partial(_model, data, [*map(_held, data)], max(lag_s, SHORTEST_LAG_S))
+    problem = DrivenProblem(data, model, low, high, scale, starts)
+    return _result(problem, problem.solved(*starts))
 
 
-class _Problem:
-    """Least squares over (delay, frequency, decay); the rest is linear and eliminated."""
-
-    def __init__(self, data: Sequence[Driven], mode: SwayMode, lag_s: float) -> None:
-        self._data, self._lag_s = data, lag_s
-        pole = mode.pole
-        self._start = [pole.imag, -pole.real]
-        self._bounds = (
-            [LEAST_DELAY_S, SLOWEST * pole.imag, 0.0],
-            [MOST_DELAY_S, FASTEST * pole.imag, 0.6 * pole.imag],
-        )
-        self._commands = [_held(one) for one in data]
-
-    def solved(self, delay_s: float) -> Any:
-        """Return the solution of SciPy from a delay."""
-        start = np.array([delay_s, *self._start])
-        scale = [0.1, 0.1 * self._start[0], 0.05 * self._start[0]]
-        bounds = self._bounds
-        return least_squares(self._residual, start, bounds=bounds, x_scale=scale, max_nfev=60)
-
-    def _parts(self, x: Array) -> list[tuple[Array, Array]]:
-        """Return for each stretch: swing by commands at 1 m/s, and free swing with an offset."""
-        delay_s, omega, sigma = map(float, x)
-        filters = {
-            kind: swing_filter(omega, sigma, self._lag_s, kind, GRID_S)
-            for kind in {one.kind for one in self._data}
-        }
-        parts = []
-        for one, (grid, speed) in zip(self._data, self._commands, strict=True):
-            swing = lfilter(*filters[one.kind], speed - speed[0])
-            driven = np.interp(one.time_s - delay_s, grid, swing)
-            parts.append((driven, free_columns(one, omega, sigma)[:, :3]))  # without a drift
-        return parts
-
-    def _projected(self, x: Array) -> list[tuple[Array, Array]]:
-        """Return for each stretch: driven swing and data, both without what free swings explain."""
-        pairs = []
-        for one, (driven, free) in zip(self._data, self._parts(x), strict=True):
-            q, _ = np.linalg.qr(free)
-            pairs.append((driven - q @ (q.T @ driven), one.value - q @ (q.T @ one.value)))
-        return pairs
-
-    def _residual(self, x: Array) -> Array:
-        projected = self._projected(x)
-        gain = gain_of(projected)
-        return np.concatenate([y - gain * h for h, y in projected])
-
-    def result(self, x: Array) -> SensorFit:
-        """Return the fit at a solution."""
-        projected = self._projected(x)
-        gain = gain_of(projected)
-        total, left = squares_of(projected)
-        fitted, offsets = [], []
-        for one, (driven, free) in zip(self._data, self._parts(x), strict=True):
-            rest, *_ = np.linalg.lstsq(free, one.value - gain * driven, rcond=None)
-            fitted.append(gain * driven + free @ rest)
-            offsets.append(float(rest[2]))
-        delay_s, omega, sigma = map(float, x)
-        return SensorFit(
-            gain,
-            delay_s,
-            omega,
-            sigma,
-            np.array(offsets),
-            fitted,
-            total,
-            left,
-            sum(len(one.time_s) for one in self._data),
-            self._deviations(x, projected, gain),
-        )
-
-    def _deviations(
-        self, x: Array, projected: Sequence[tuple[Array, Array]], gain: float
-    ) -> tuple[float, float, float, float]:
-        """Return the deviations, by the noise at the frequency of the swing."""
-        columns = []
-        for j in range(len(x)):
-            step = np.zeros(len(x))
-            step[j] = 1e-3 * (1.0 if j else 3.0)
-            up, down = self._at(x + step, gain), self._at(x - step, gain)
-            columns.append((up - down) / (2.0 * step[j]))
-        columns.append(-np.concatenate([h for h, _ in projected]) * gain)
-        slope = np.stack(columns, axis=1)
-        covariance = covariance_of(slope, self._residual(x), self._data, float(x[1]))
-        variances = np.diag(covariance)
-        delay, omega, sigma, size = (math.sqrt(max(0.0, float(v))) for v in variances)
-        return delay, omega, sigma, size
-
-    def _at(self, x: Array, gain: float) -> Array:
-        """Residual with a gain that stays."""
-        return np.concatenate([y - gain * h for h, y in self._projected(x)])
+def _model(
+    data: Sequence[Driven], commands: Sequence[tuple[Array, Array]], lag_s: float, x: Array
+) -> list[tuple[Array, Array]]:
+    """Return for each stretch: swing by commands at 1 m/s, and free swing with an offset."""
+    delay_s, omega, sigma = map(float, x)
+    parts = []
+    for one, (grid, speed) in zip(data, commands, strict=True):
+        swing = lfilter(*swing_filter(omega, sigma, lag_s, one.kind, GRID_S), speed - speed[0])
+        time = one.time_s
+        free = free_columns(time, omega * time, np.exp(-sigma * time))[:, :3]  # without a drift
+        parts.append((np.interp(time - delay_s, grid, swing), free))
+    return parts
 
 
 def _held(one: Driven) -> tuple[Array, Array]:
     """Commanded speed on a grid that begins with a command: times from the stretch's, speeds."""
-    command = one.command
-    first = float(command.time_s[0]) - one.start_s
-    grid = np.arange(first, float(one.time_s[-1]) - LEAST_DELAY_S + GRID_S, GRID_S)
-    at = np.searchsorted(command.time_s - one.start_s, grid + 1e-6, side="right") - 1
-    return grid, command.speed[np.maximum(at, 0)]
+    first, last = float(one.command.time_s[0]) - one.start_s, float(one.time_s[-1])
+    grid = np.arange(first, last - LEAST_DELAY_S + GRID_S, GRID_S)
+    return grid, one.command.at(one.start_s + grid + 1e-6)
+
+
+def _result(problem: DrivenProblem, x: Array) -> SensorFit:
+    data, gain, fits = problem.data, gain_of(problem.projected(x)), problem.fitted(x)
+    delay_s, omega, sigma = map(float, x)
+    covariance, _ = covariance_of(
+        lambda y: problem.residual(y[:3], gain * float(y[3])),
+        np.append(x, 1.0),
+        np.array([3e-3, 1e-3, 1e-3, 1e-3]),
+        data,
+        omega,
+    )
+    square, left = problem.squares(x)
+    delay, faster, decay, size = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
+    return SensorFit(
+        gain=gain,
+        delay_s=delay_s,
+        omega=omega,
+        sigma=sigma,
+        offsets=np.array([amounts[2] for _, amounts in fits]),
+        fitted=[model for model, _ in fits],
+        square=square,
+        left=left,
+        count=sum(len(one.time_s) for one in data),
+        deviations=(delay, faster, decay, size),
+    )
 
 
 def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dict[str, Series]:
@@ -196,7 +144,6 @@ def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dic
     sensors = {name: s for name in axes if (s := deployment.axes[name].sway_sensor)}
     return read_can(
         path,
-        "",
         {name: one.name for name, one in sensors.items()},
         deployment.messages,
         deployment=deployment,

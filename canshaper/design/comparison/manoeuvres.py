@@ -4,11 +4,13 @@ Manoeuvres are strokes of one axis and of both, loading, random joysticks.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning.robust import least_residual
+from canshaper.errors import DesignError
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
@@ -33,6 +35,7 @@ class Candidate:
         motion: with the two-axis motion, where the deployment has one.
         sensor: with its sway sensors.
         by_load: the file's own, with the sets of its gain schedules.
+        sway: keys of the swing that they are for, by axis, where it is not that of the file.
     """
 
     name: str
@@ -41,6 +44,7 @@ class Candidate:
     motion: bool = True
     sensor: bool = False
     by_load: bool = False
+    sway: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def candidates(deployment: Deployment) -> list[Candidate]:
@@ -49,6 +53,9 @@ def candidates(deployment: Deployment) -> list[Candidate]:
     Raises:
         DesignError: one of these axes is not there, or has no sway data.
     """
+    if not {*AXES} <= deployment.axes.keys():
+        text = f"expected axes {' and '.join(AXES)}, or a crane with a rope"
+        raise DesignError(f"{deployment.path}: {text}, got {', '.join(deployment.axes)}")
     modes = {axis: swinging_axis(deployment, axis)[1].mode() for axis in AXES}
     ticks_s = {axis: tick_s(deployment, axis) for axis in AXES}
     settings = [
@@ -132,9 +139,16 @@ def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
     for axis, its_filter in candidate.filters.items():
         config = axes[axis].config
         limits = config.limits.model_copy(update={"tail_s": TAIL_S, "stop_distance_m": None})
-        changes = {"filter": its_filter, "limits": limits, "gain_schedule": config.gain_schedule}
+        changes: dict[str, Any] = {
+            "filter": its_filter,
+            "limits": limits,
+            "gain_schedule": config.gain_schedule,
+        }
         if not candidate.by_load:
             changes["gain_schedule"] = []
+        if own := candidate.sway.get(axis):
+            assert config.sway
+            changes["sway"] = config.sway.model_copy(update=own)
         config = config.model_copy(update=changes)
         sensor = axes[axis].sway_sensor if candidate.sensor else None
         axes[axis] = replace(axes[axis], config=config, sway_sensor=sensor)

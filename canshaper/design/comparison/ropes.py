@@ -105,20 +105,26 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
         names = f"{', '.join(axes[:-1])} and {axes[-1]}"
         raise DesignError(f"expected {names} in crane, without {missing[0]}")
     measured = is_measured(deployment)
-    rope_m, by_length = (_FOR_M[kind], " by length") if measured else (_nominal_m(deployment), "")
+    rope_m, by_length = (_FOR_M[kind], " by length") if measured else (None, "")
     zvd, zv, gff = dict[str, Filter](), dict[str, Filter](), dict[str, Filter]()
+    two_mode = dict[str, Filter]()
     for axis in (by_coordinate[one] for one in axes):
         sway = swinging_axis(deployment, axis)[1]
         mode, period_s = sway.mode(), tick_s(deployment, axis)
         taps = [round(tap, 8) for tap in zv_taps(mode, period_s)]
         zvd[axis] = filter_of("zvd")
         zv[axis] = filter_of("robust", tick_ms=round(1000.0 * period_s), taps=taps)
+        design = deployment.axes[axis].config.filter.design()
+        if design and (second := design.second):
+            swing = {"period_s": second.period_s, "damping_ratio": second.damping_ratio}
+            two_mode[axis] = filter_of("two_mode", **swing)
         omega = mode.omega_rad_s
         gff[axis] = filter_of("gff", a1=2.000001 / omega, a2=1.0 / omega**2)
     return [
         RopeFilter("off", {}, bypass=True),
-        RopeFilter(f"ZVD for {rope_m:g} m", zvd, rope_m=rope_m),
+        RopeFilter(f"ZVD for {rope_m:g} m" if rope_m else "ZVD", zvd, rope_m=rope_m),
         RopeFilter(f"ZV{by_length}", zv),
+        *([RopeFilter("ZV of both modes", two_mode)] if two_mode else ()),
         RopeFilter(f"G_FF{by_length}", gff),
         RopeFilter("the file's", {}),
     ]

@@ -114,7 +114,7 @@ FMI3_Export status fmi3DoStep(void *instance, double now_s, double step_s, bool 
     }
     if (why == NULL) { u->value[0] = end_s; }
     *event = *ends = *early = false;
-    *last_s = end_s;
+    *last_s = u->value[0];
     return (why == NULL) ? OK : wrong(u, why);
 }
 

@@ -1,41 +1,35 @@
-// A bridge crane in three dimensions, smaller than it is: bridge on its runway, trolley, rope and load.
+// A bridge crane in three dimensions, smaller than it is: bridge on its runway, trolley, rope and load, or a hook and
+// a load on a sling. A multicopter keeps its place: the ground passes below it.
 import * as THREE from "/static/vendor/three.js";
 import { Crane, span } from "/static/crane.js";
 import { ropePoints } from "/static/geometry.js";
+import { PARTS } from "/static/parts.js";
 
 const TOP_M = 6.4; // of the picture: of the runway
 const FREE_M = 2; // below the longest rope
 const MIDDLE_M = 2; // of the bridge, from where forwarders stand
 
 export class BridgeCrane extends Crane {
-  build({ hall }) {
-    this.size = TOP_M / (hall.rope + FREE_M);
+  build({ hall, drawn }) {
+    this.flies = drawn === "multicopter";
+    this.slung = hall.sling;
+    this.size = TOP_M / (hall.rope + hall.sling + FREE_M);
+    for (const name of ["bridge", "trolley", "hook", "grapple"]) this.slew.add((this[name] = new THREE.Group()));
     const [runway, half] = [hall.runway * this.size, (hall.span * this.size) / 2];
-    const box = (x, y, z, material, group) => {
-      const mesh = new THREE.Mesh(new THREE.BoxGeometry(x, y, z), material);
-      group.add(mesh);
-      return mesh;
-    };
-    for (const side of [-half, half]) {
-      box(0.14, runway, 0.14, this.dark, this.base).position.set(MIDDLE_M + side, 0, TOP_M - 0.25);
-    }
-    this.bridge = new THREE.Group();
-    this.slew.add(this.bridge);
-    for (const side of [-0.22, 0.22]) box(2 * half, 0.12, 0.26, this.steel, this.bridge).position.set(MIDDLE_M, side, TOP_M);
-    for (const side of [-half, half]) box(0.3, 0.9, 0.2, this.dark, this.bridge).position.set(MIDDLE_M + side, 0, TOP_M - 0.1);
-    this.trolley = box(0.5, 0.62, 0.22, this.steel, this.slew);
+    this.put(PARTS[drawn ?? "bridge"]({ runway, half, top: TOP_M, middle: MIDDLE_M }));
+    this.put(PARTS.load());
     this.link = this.beam(0.035, 0.035, this.dark);
-    this.grapple = new THREE.Group();
-    box(0.12, 0.12, 0.16, this.dark, this.grapple).position.z = -0.08;
-    box(0.5, 0.5, 0.4, this.tool, this.grapple).position.z = -0.36;
-    this.slew.add(this.grapple);
+    if (!this.slung) return;
+    this.put(PARTS.hook());
+    this.sling = this.beam(0.035, 0.035, this.dark);
   }
 
-  /** Trolley and load in the picture: the runway to the right, the bridge away from the eye. */
-  at({ trolley, sway }) {
-    const { tip, load } = ropePoints(trolley, sway);
-    return [tip, load].map(([runway, bridge, up]) => new THREE.Vector3(
-      MIDDLE_M + bridge * this.size, -runway * this.size, TOP_M + up * this.size));
+  /** Trolley, hook and load in the picture: the runway to the right, the bridge away from the eye. */
+  at({ trolley, sway, sling }) {
+    const { tip, hook, load } = ropePoints(trolley, sway, this.slung, sling);
+    const [x, y] = this.flies ? trolley : [0, 0];
+    return [tip, hook, load].map(([runway, bridge, up]) => new THREE.Vector3(
+      MIDDLE_M + (bridge - y) * this.size, (x - runway) * this.size, TOP_M + up * this.size));
   }
 
   pose(_hello, crane) {
@@ -43,14 +37,22 @@ export class BridgeCrane extends Crane {
     this.aim.visible = false;
     if (!crane.trolley) return;
     this.known(crane);
-    const [tip, load] = this.at(crane);
+    const [tip, hook, load] = this.at(crane);
+    if (this.flies) this.flown = crane.trolley.map((way) => way * this.size);
     this.bridge.position.y = tip.y;
-    this.trolley.position.copy(tip).z += 0.2;
-    this.hang(tip, load, load.clone().multiplyScalar(2).sub(tip));
+    this.trolley.position.copy(tip);
+    this.hang(tip, hook, hook.clone().multiplyScalar(2).sub(tip));
+    this.hook.visible = this.grapple.visible;
+    if (this.slung) {
+      this.sling.visible = this.grapple.visible;
+      this.hook.position.copy(hook);
+      span(this.sling, hook, load);
+      this.grapple.position.copy(load);
+    }
     this.shade.position.set(load.x, load.y, 0.01);
   }
 
   trace(_hello, crane) {
-    if (crane.trolley && crane.sway) this.mark(this.at(crane)[1]);
+    if (crane.trolley && crane.sway) this.mark(this.at(crane)[2]);
   }
 }

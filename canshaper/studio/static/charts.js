@@ -242,8 +242,9 @@ export class Charts {
   show(axis) {
     this.axis = axis;
     this.drawn = 0;
-    const way = this.hello.sway_of[axis];
-    document.getElementById("sway-of").textContent = text(way ? `chart.${this.hello.hall ? "hall." : ""}${way}` : "chart.nosway");
+    const { sway_of: { [axis]: way }, hall, drawn } = this.hello;
+    const of = hall && drawn ? "chart.flown" : `chart.${hall ? "hall." : ""}${way}`;
+    document.getElementById("sway-of").textContent = text(way ? of : "chart.nosway");
   }
 
   resize() {

@@ -2,6 +2,7 @@
 import * as THREE from "/static/vendor/three.js";
 import { boomPoints, hungPoints, tallest } from "/static/geometry.js";
 import { text } from "/static/language.js";
+import { PARTS } from "/static/parts.js";
 
 const RAD = Math.PI / 180;
 const TRAIL = 90;
@@ -56,8 +57,9 @@ export class Crane {
 
   /** Its parts: of a forwarder, or of a crane with a rope; as thick in the picture, whatever its size. */
   build(hello) {
-    const { boom } = hello;
-    if (!boom.jib_m) this.carrier(!boom.straight);
+    const { boom, drawn } = hello;
+    if (!boom.jib_m) this.put(PARTS[drawn ?? "forwarder"]());
+    if (!boom.straight && !drawn) this.put(PARTS.logs());
     const thick = boom.straight ? 1 / this.scale : 1;
     const pillar = new THREE.Mesh(new THREE.CylinderGeometry(0.2 * thick, 0.3 * thick, boom.pillar_m - 0.75, 16), this.steel);
     pillar.rotation.x = Math.PI / 2;
@@ -77,21 +79,14 @@ export class Crane {
     this.slew.add(this.grapple);
   }
 
-  /** The forwarder it stands on, and a few logs. */
-  carrier(logs) {
-    const add = (geometry, material, x, y, z) => {
-      const mesh = new THREE.Mesh(geometry, material);
-      mesh.position.set(x, y, z);
-      this.base.add(mesh);
-      return mesh;
-    };
-    add(new THREE.BoxGeometry(4.6, 0.9, 0.3), this.dark, -0.9, 0, 0.62);
-    for (const x of [-2.5, 0.7]) {
-      for (const y of [-0.72, 0.72]) add(new THREE.CylinderGeometry(0.52, 0.52, 0.42, 20), this.dark, x, y, 0.52);
-    }
-    for (const [i, [x, y]] of (logs ? [[5.6, -1.2], [5.9, -0.85], [5.75, -1.02]] : []).entries()) {
-      const log = add(new THREE.CylinderGeometry(0.17, 0.19, 3.2, 10), this.wood, x, y, i === 2 ? 0.47 : 0.18);
-      log.rotation.z = Math.PI / 2 - 0.06;
+  /** Add boxes and cylinders of the table. */
+  put(parts) {
+    for (const [group, material, [a, b, c], place, turn] of parts) {
+      const round = typeof a === "string";
+      const mesh = new THREE.Mesh(round ? new THREE.CylinderGeometry(b, b, c, 20) : new THREE.BoxGeometry(a, b, c), this[material]);
+      mesh.rotation.set(a === "z" ? Math.PI / 2 : 0, 0, turn ?? 0);
+      mesh.position.set(...place);
+      this[group].add(mesh);
     }
   }
 

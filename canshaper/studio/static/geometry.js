@@ -68,11 +68,19 @@ export function grapplePoints(grapple, sway) {
   };
 }
 
-/** Trolley and load from the middle of runway and bridge, as [along the runway, along the bridge, upwards], m. */
-export function ropePoints([runway, bridge, rope], sway) {
-  const [along, across] = [0, 1].map((k) => Math.tan((sway?.[k] ?? 0) * RAD));
-  const down = rope / Math.hypot(1, along, across);
-  return { tip: [runway, bridge, 0], load: [runway + down * along, bridge + down * across, -down] };
+/**
+ * Trolley, hook and load from the middle of runway and bridge, as [along the runway, along the bridge, upwards], m.
+ * @param slung length of a sling below the hook, 0 for none; @param sling how it hangs, degrees.
+ */
+export function ropePoints([runway, bridge, rope], sway, slung, sling) {
+  const below = ([x, y, z], length, angles) => {
+    const [along, across] = [0, 1].map((k) => Math.tan((angles?.[k] ?? 0) * RAD));
+    const down = length / Math.hypot(1, along, across);
+    return [x + down * along, y + down * across, z - down];
+  };
+  const tip = [runway, bridge, 0];
+  const hook = below(tip, rope, sway);
+  return { tip, hook, load: below(hook, slung, sling ?? sway) };
 }
 
 function clamp(value) {

@@ -13,9 +13,9 @@ const DRAW_MS = 50;
 
 /** Tip and grapple from above, [x, y]; the boom that has not slewed lies along x. */
 export function fromAbove(hello, crane) {
-  const { pose, joints, trolley, sway, aim } = crane;
+  const { pose, joints, trolley, sway, sling, aim } = crane;
   if (trolley) {
-    const { tip, load } = ropePoints(trolley, sway);
+    const { tip, load } = ropePoints(trolley, sway, hello.hall.sling, sling);
     return { tip: tip.slice(0, 2), grapple: sway ? load.slice(0, 2) : null, aim: null };
   }
   const [s, c] = [Math.sin(pose[0] * RAD), Math.cos(pose[0] * RAD)];

@@ -6,6 +6,7 @@ import { craneName, nameOf, text } from "/static/language.js";
 
 const APART_M = 6.4;
 const NEARER = 0.88;
+const CELL_M = 2; // of the grid on the ground
 const LEAP_S = 1; // a longer step is another part of a drive
 const BEHIND_S = 0.07; // pictures are drawn a little late, so that there are two to draw between
 const FIELD_DEG = 42;
@@ -74,7 +75,7 @@ export class Scene {
     this.scene.fog = new THREE.Fog(css("--sky"), 24, 60);
     this.ground.material.color = css("--ground");
     if (this.grid) this.scene.remove(this.grid);
-    this.grid = new THREE.GridHelper(60, 30, css("--grid"), css("--grid"));
+    this.grid = new THREE.GridHelper(60, 60 / CELL_M, css("--grid"), css("--grid"));
     this.scene.add(this.grid);
     for (const crane of Object.values(this.cranes)) crane.paint();
   }
@@ -131,6 +132,8 @@ export class Scene {
         if (b.cranes[name]) crane.pose(this.hello, mixed(a.cranes[name] ?? b.cranes[name], b.cranes[name], part));
       }
     }
+    const [x, y] = this.cranes[this.hello.cranes[0]].flown ?? [0, 0];
+    this.grid.position.set(-y % CELL_M, 0, -x % CELL_M);
     this.keepInside();
     this.controls.update();
     this.renderer.render(this.scene, this.camera);
@@ -196,6 +199,6 @@ function mixed(a, b, part) {
   const mix = (x, y) => (x && y ? x.map((v, i) => v + (y[i] - v) * part) : y);
   const pose = mix(a.pose, b.pose);
   if (a.pose && b.pose) pose[0] = a.pose[0] + (((b.pose[0] - a.pose[0] + 540) % 360) - 180) * part;
-  const [joints, trolley, sway] = ["joints", "trolley", "sway"].map((key) => mix(a[key], b[key]));
-  return { ...b, pose, joints, trolley, sway };
+  const [joints, trolley, sway, sling] = ["joints", "trolley", "sway", "sling"].map((key) => mix(a[key], b[key]));
+  return { ...b, pose, joints, trolley, sway, sling };
 }

@@ -22,7 +22,7 @@ export class SideView {
     this.behind = BEHIND_M + counterJib(boom);
     this.reach = boom.main_boom_m + boom.outer_boom_m + TELESCOPE_M + FREE_M;
     this.height = tallest(boom) + FREE_M + grapple.l1;
-    if (hall) [this.behind, this.reach, this.height] = [0, hall.runway, hall.rope + 2 * FREE_M];
+    if (hall) [this.behind, this.reach, this.height] = [0, hall.runway, hall.rope + hall.sling + 2 * FREE_M];
     this.paint();
   }
 
@@ -53,11 +53,12 @@ export class SideView {
 
   /** Pivots and grapple as [radius, height]; of a bridge crane along its runway, above the ground. */
   points(crane) {
-    const { hall } = this.hello;
+    const { hall, drawn } = this.hello;
     if (hall) {
-      const { tip, load } = ropePoints(crane.trolley, crane.sway);
-      const [hook, grapple] = [tip, load].map(([along, , up]) => [along + hall.runway / 2, hall.rope + FREE_M + up]);
-      return { tip: hook, joint: grapple, grapple };
+      const points = ropePoints(crane.trolley, crane.sway, hall.sling, crane.sling);
+      const left = (drawn ? crane.trolley[0] : 0) - hall.runway / 2; // a multicopter keeps its place
+      const at = ([along, , up]) => [along - left, hall.rope + hall.sling + FREE_M + up];
+      return { tip: at(points.tip), joint: at(points.hook), grapple: at(points.load) };
     }
     const points = boomPoints(this.hello.boom, crane.pose, crane.joints);
     const hung = hungPoints(this.hello, crane);
@@ -96,7 +97,7 @@ export class SideView {
     pen.fillText(nameOf("crane", name), left + 12, 22 + (this.overlay ? 20 * number : 0));
     pen.font = "13px system-ui, sans-serif";
     pen.fillStyle = colors.text;
-    const { hall, boom } = this.hello;
+    const { hall, boom, drawn } = this.hello;
     if (!(hall ? crane?.trolley : crane?.pose)) {
       pen.fillText(text("nopose.crane"), left + 12, 62);
       return;
@@ -109,7 +110,8 @@ export class SideView {
     }
     const points = this.points(crane);
     if (hall) {
-      this.line([[0, points.tip[1]], [hall.runway, points.tip[1]]].map(at), colors.quiet, BOOM_PX - 2);
+      const ends = drawn ? points.tip[0] - 1 : 0;
+      this.line([[ends, points.tip[1]], [hall.runway - ends, points.tip[1]]].map(at), colors.quiet, BOOM_PX - 2);
     } else {
       this.line([[0, 0], [0, boom.pillar_m], points.start].map(at), color, BOOM_PX + 2);
       this.line([points.start, points.elbow, points.base, points.end].map(at), color, BOOM_PX);

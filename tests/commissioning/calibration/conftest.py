@@ -4,11 +4,9 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.rigs.files import machine_file
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    text = (ROOT / "config/forwarder-robust.yaml").read_text(encoding="utf-8")
-    (copy := tmp_path / "machine.yaml").write_text(text.replace("../dbc", str(ROOT / "dbc")))
-    return copy
+    return machine_file(tmp_path, "forwarder-robust")

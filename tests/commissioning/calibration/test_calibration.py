@@ -1,6 +1,7 @@
 """A valve whose dead band, gain and asymmetry are known is measured, in lock-step."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -22,13 +23,13 @@ from canshaper.shaping.limits import ValveCurve
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script, Stroke
 from canshaper_sim.parameters import changed_parameters
+from tests.rigs.files import ROOT, machine_file, text_of
 
-ROOT = Path(__file__).parents[3]
 FILE = ROOT / "config" / "forwarder.yaml"
-OVERHEAD = ROOT / "config" / "bridge-crane.yaml"
 RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
 SPEED = ("TipVelocity", "SlewRate")
 TICK_NS = 20_000_000
+SPEED_0 = Frame("crane", 0x402, False, bytes(6))
 
 
 @pytest.fixture
@@ -36,13 +37,9 @@ def deployment() -> Deployment:
     return load_deployment(FILE)
 
 
-def nothing(_drive: CalibrationDrive) -> None:
-    pass
-
-
 def measured(deployment: Deployment, *changes: str, ramp: Ramp = RAMP) -> Calibration:
     drive = CalibrationDrive(deployment, "slew", SPEED, ramp)
-    run_simulated(drive, deployment, changed_parameters(list(changes)), nothing)
+    run_simulated(drive, deployment, changed_parameters(list(changes)), lambda _drive: None)
     assert drive.ended == "done"
     return drive.result()
 
@@ -88,18 +85,8 @@ def test_a_quick_or_low_ramp_finds_the_same_valve(
         assert direction.delay == pytest.approx(2 * rate_per_s * 0.1, abs=0.01)
 
 
-def test_a_ramp_too_quick_for_the_feedback_is_reported() -> None:
-    def samples(commands: list[float]) -> list[Sample]:
-        return [Sample(command, max(0.0, command - 0.1)) for command in commands]
-
-    steps = [0.04 * n for n in range(11)]
-    with pytest.raises(CalibrationError, match="too few samples of the feedback on the ramp"):
-        fit(samples(steps), samples([0.4] * 20), samples(steps[::-1]), 0.0)
-
-
 def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
-    file = tmp_path / "machine.yaml"
-    file.write_text(FILE.read_text().replace("../dbc", str(ROOT / "dbc")))
+    file = machine_file(tmp_path, FILE)
     options = ["calibrate", str(file), "--axis", "slew", "--top", "25", "--rate", "5", "--write"]
     reported = CliRunner().invoke(app, [*options, "--set", "slew.negative_more_deadband=0.05"])
     assert reported.exit_code == 0, reported.output
@@ -120,40 +107,40 @@ def hands(deployment: Deployment, **stroke: float) -> JoystickNode:
 
 
 def run(
-    drive: CalibrationDrive, joysticks: JoystickNode, seconds: float, *, spoil: str = ""
+    drive: CalibrationDrive, hands: JoystickNode, ticks: range, *, spoil: str = "", blind: int = 999
 ) -> list[Frame]:
-    """The daemon's side alone: feedback stands at zero."""
-    speed = Frame("crane", 0x402, False, bytes(6))
+    """The daemon's side alone: feedback stands at zero, and is silent from a tick on."""
     sent: list[Frame] = []
-    for tick in range(round(seconds / 0.02)):
+    for tick in ticks:
         now_ns = tick * TICK_NS
-        for frame in joysticks.frames(tick * 20):
+        for frame in hands.frames(tick * 20):
             if spoil == "silent" and tick > 150:
                 continue
             if spoil == "enable" and tick > 150:
                 data = frame.data[:4] + bytes((frame.data[4] & ~0x3,)) + frame.data[5:]
                 frame = frame._replace(data=data)  # noqa: PLW2901
             drive.receive(frame, now_ns)
-        if spoil != "unseen" or tick <= 200:
-            drive.receive(speed, now_ns)
+        if tick < blind:
+            drive.receive(SPEED_0, now_ns)
         sent += drive.tick(now_ns)
+    assert not any(f.data[0] for f in sent if f.can_id in (0x201, 0x202)), "another valve moved"
     return [f for f in sent if f.can_id == 0x200]
 
 
 @pytest.mark.parametrize(
     ("spoil", "moved", "why"),
     [
-        ("silent", {}, "stopped: STOP_DONE"),
-        ("enable", {}, "stopped: ENABLE_LOST"),
-        ("unseen", {}, "stopped: the feedback fell silent, or reports an error"),
-        ("", {"hand": 0.3}, "stopped: STOP_DONE"),
+        ({"spoil": "silent"}, {}, "stopped: STOP_DONE"),
+        ({"spoil": "enable"}, {}, "stopped: ENABLE_LOST"),
+        ({"blind": 201}, {}, "stopped: the feedback fell silent, or reports an error"),
+        ({}, {"hand": 0.3}, "stopped: STOP_DONE"),
     ],
 )
 def test_what_stops_the_daemon_ends_it_in_neutral(
-    deployment: Deployment, spoil: str, moved: dict[str, float], why: str
+    deployment: Deployment, spoil: dict[str, Any], moved: dict[str, float], why: str
 ) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    sent = run(drive, hands(deployment, **moved), 6.0, spoil=spoil)
+    sent = run(drive, hands(deployment, **moved), range(300), **spoil)
     assert any(frame.data[0] for frame in sent)
     assert drive.ended == why
     assert [frame.data[0] for frame in sent[-30:]] == [0] * 30
@@ -163,48 +150,23 @@ def test_what_stops_the_daemon_ends_it_in_neutral(
 
 def test_a_joystick_that_is_moved_before_the_start_is_waited_for(deployment: Deployment) -> None:
     """Also one that was in neutral before: READY ends without a trip, and comes back."""
-    waiting = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    seen = set()
-    joysticks = hands(deployment, hand=0.3)
-    for tick in range(300):  # no feedback: it never begins
-        for frame in joysticks.frames(tick * 20):
-            waiting.receive(frame, tick * TICK_NS)
-        assert not any(f.data[0] for f in waiting.tick(tick * TICK_NS) if f.can_id == 0x200)
-        seen.add(waiting.waiting_for)
-    assert seen >= {"JOYSTICK_NOT_NEUTRAL", "feedback"}
-    assert (waiting.waiting_for, waiting.ended) == ("feedback", "")
-
-
-def test_it_does_not_begin_without_feedback(deployment: Deployment) -> None:
-    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    joysticks = hands(deployment)
-    for tick in range(100):
-        for frame in joysticks.frames(tick * 20):
-            drive.receive(frame, tick * TICK_NS)
-        assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200)
-    assert drive.waiting_for == "feedback"
+    drive, joysticks = (
+        CalibrationDrive(deployment, "slew", SPEED, RAMP),
+        hands(deployment, hand=0.3),
+    )
+    sent = run(drive, joysticks, range(190), blind=0)
+    assert drive.waiting_for == "JOYSTICK_NOT_NEUTRAL"
+    sent += run(drive, joysticks, range(190, 300), blind=0)
+    assert (drive.waiting_for, drive.ended) == ("feedback", "")
+    assert not any(frame.data[0] for frame in sent)
 
 
 def test_it_does_not_begin_with_feedback_of_long_ago(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    drive.receive(Frame("crane", 0x402, False, bytes(6)), 0)
-    joysticks = hands(deployment)
-    for tick in range(50, 150):
-        for frame in joysticks.frames(tick * 20):
-            drive.receive(frame, tick * TICK_NS)
-        assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200)
+    drive.receive(SPEED_0, 0)
+    sent = run(drive, hands(deployment), range(50, 150), blind=0)
+    assert not any(frame.data[0] for frame in sent)
     assert (drive.waiting_for, drive.ended) == ("feedback", "")
-
-
-def test_no_other_valve_moves(deployment: Deployment) -> None:
-    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    joysticks = hands(deployment)
-    for tick in range(300):
-        for frame in joysticks.frames(tick * 20):
-            drive.receive(frame, tick * TICK_NS)
-        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
-        for frame in drive.tick(tick * TICK_NS):
-            assert frame.can_id not in (0x201, 0x202) or frame.data[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -231,26 +193,29 @@ def test_wrong_options_are_reported(arguments: list[str], says: str) -> None:
 @pytest.mark.slow
 def test_a_signal_that_is_none_of_the_axis_is_reported(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "VerticalSpeed"), RAMP)
-    run_simulated(drive, deployment, None, nothing)
+    run_simulated(drive, deployment, None, lambda _drive: None)
     with pytest.raises(CalibrationError, match="positive commands: the axis did not move"):
         drive.result()
 
 
-def test_no_signal_at_all_is_refused(deployment: Deployment) -> None:
-    with pytest.raises(ConfigError, match="expected a signal of TipVelocity, got 'Nothing'"):
-        CalibrationDrive(deployment, "slew", ("TipVelocity", "Nothing"), RAMP)
+AT_ITS_END = [Sample(c / 1000, min(max(0.0, c / 1000 - 0.05), 0.1)) for c in range(400)]
+NOISE = [Sample(c / 1000, 0.01 * ((c * 7919) % 13 - 6) / 6) for c in range(400)]
+TOO_QUICK = [Sample(0.04 * n, max(0.0, 0.04 * n - 0.1)) for n in range(11)]
 
 
-def test_an_axis_that_stands_at_its_end_is_reported() -> None:
-    up = [Sample(c / 1000, min(max(0.0, c / 1000 - 0.05), 0.1)) for c in range(400)]
-    with pytest.raises(CalibrationError, match="does not rise with the command"):
-        fit(up, up[-20:], list(reversed(up)), 0.0)
-
-
-def test_noise_does_not_open_the_valve() -> None:
-    up = [Sample(c / 1000, 0.01 * ((c * 7919) % 13 - 6) / 6) for c in range(400)]
-    with pytest.raises(CalibrationError, match="did not move up to 40%"):
-        fit(up, up[-20:], list(reversed(up)), 0.006)
+@pytest.mark.parametrize(
+    ("up", "rest", "noise", "says"),
+    [
+        (AT_ITS_END, AT_ITS_END[-20:], 0.0, "does not rise with the command"),
+        (NOISE, NOISE[-20:], 0.006, "did not move up to 40%"),
+        (TOO_QUICK, TOO_QUICK[-1:] * 20, 0.0, "too few samples of the feedback on the ramp"),
+    ],
+)
+def test_a_ramp_that_shows_no_curve_is_refused(
+    up: list[Sample], rest: list[Sample], noise: float, says: str
+) -> None:
+    with pytest.raises(CalibrationError, match=says):
+        fit(up, rest, up[::-1], noise)
 
 
 def test_the_ramp_is_as_quick_up_as_down_and_ends_at_zero() -> None:
@@ -269,23 +234,19 @@ def test_a_frame_not_sent_and_a_loop_that_stood_still_end_it(
 ) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
     joysticks = hands(deployment)
-    (*_, moving) = run(drive, joysticks, 4.0)
+    (*_, moving) = run(drive, joysticks, range(200))
     assert moving.data[0]
     if what == "send":
         drive.send_failed(moving)
     else:
         drive.stalled()
-    for tick in range(200, 203):
-        for frame in joysticks.frames(tick * 20):
-            drive.receive(frame, tick * TICK_NS)
-        assert [f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200] == [0]
+    assert [f.data[0] for f in run(drive, joysticks, range(200, 203))] == [0] * 3
     assert drive.ended == f"stopped: {reason}"
 
 
 def with_limits(tmp_path: Path, limits: str) -> Path:
     """The machine with these limits of slew; ``canshaper set`` may change its speed."""
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    text = text.replace("limits: { deadband_pct: 5,", f"limits: {{ {limits},", 1)
+    text = text_of(FILE).replace("limits: { deadband_pct: 5,", f"limits: {{ {limits},", 1)
     text += "control: { adjustable: { axes.slew.limits.max_pct: [20, 100] } }\n"
     (file := tmp_path / "machine.yaml").write_text(text, encoding="utf-8")
     return file
@@ -295,9 +256,11 @@ def test_the_speed_of_the_file_bounds_the_ramp(tmp_path: Path) -> None:
     file = with_limits(tmp_path, "max_pct: 30, deadband_pct: 5")
     line = file.read_text(encoding="utf-8").split("max_pct: 30")[0].count("\n") + 1
     shown = CliRunner().invoke(app, ["calibrate", str(file), "--axis", "slew", "--top", "80"])
-    expected = "axes.slew.limits.max_pct: expected a ramp (--top) up to 30 % of full speed"
+    expected = (
+        f"{file}:{line}: axes.slew.limits.max_pct: expected a ramp (--top) up to 30 % of full"
+    )
     assert shown.exit_code == 2
-    assert f"{file}:{line}: {expected}, got 80 %" in shown.output.replace("\n", "")
+    assert f"{expected} speed, got 80 %" in shown.output.replace("\n", "")
     usual = CliRunner().invoke(app, ["calibrate", str(file), "--axis", "slew"])
     assert (usual.exit_code, "above 30 % of the command" in usual.output) == (0, True), usual.output
 
@@ -317,7 +280,7 @@ def test_the_guard_stops_a_command_that_is_beyond_the_ramp(
     put = ValveCodec.put
     monkeypatch.setattr(ValveCodec, "put", lambda valve, raw, steps: put(valve, raw, 2 * steps))
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    sent = run(drive, hands(deployment), 6.0)
+    sent = run(drive, hands(deployment), range(300))
     assert drive.ended == "stopped: OUTPUT_REFUSED"
     assert max(frame.data[0] for frame in sent) < 0.1 * 125
 
@@ -332,4 +295,5 @@ def test_a_drive_without_a_deadband_has_a_curve_all_the_same() -> None:
 
 @pytest.mark.parametrize(("axis", "signal"), [("bridge", "BridgeSpeed"), ("hoist", "HoistSpeed")])
 def test_the_speed_of_an_axis_is_that_of_what_it_moves(axis: str, signal: str) -> None:
-    assert speed_signal(load_deployment(OVERHEAD), axis, None) == ("CraneVelocity", signal)
+    bridge = load_deployment(ROOT / "config/bridge-crane.yaml")
+    assert speed_signal(bridge, axis, None) == ("CraneVelocity", signal)

@@ -15,8 +15,8 @@ from canshaper.config.section import Origin
 from canshaper.edit.edit import written_by
 from canshaper.errors import CalibrationError
 from canshaper.machine.binding import load_deployment
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[3]
 AXES = ("slew", "near_far")
 ONE = {"slew": 1.0, "near_far": 1.0}
 SPEEDS = {"slew": ("TipVelocity", "SlewRate"), "near_far": ("TipVelocity", "RadialSpeed")}

@@ -21,13 +21,13 @@ from canshaper_sim.parameters import changed_parameters
 from tests.cli.invocation import invoke
 from tests.commissioning.calibration.test_together import (
     AXES,
-    ROOT,
     SPEEDS,
     TICK_S,
     drive,
     driven,
     starving,
 )
+from tests.rigs.files import ROOT
 
 RAMP = Ramp(rate_per_s=1.0, top=0.2, rest_s=0.5)
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from canshaper.commissioning.doctor.measure import Run
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[3]
 SHIPPED = ROOT / "config" / "forwarder.yaml"
 TICK_NS = 20_000_000
 

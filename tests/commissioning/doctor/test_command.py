@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.doctor.load import load_kinds
+from canshaper.commissioning.doctor.processes import load_kinds
 from tests.commissioning.doctor.conftest import SHIPPED
 
 # Only to end a test that hangs.

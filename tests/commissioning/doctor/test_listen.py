@@ -19,7 +19,8 @@ from canshaper.commissioning.doctor.listen import arrival_findings
 from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.binding import load_deployment
-from tests.commissioning.doctor.conftest import ROOT, SHIPPED
+from tests.commissioning.doctor.conftest import SHIPPED
+from tests.rigs.files import ROOT
 from tests.rigs.j1939 import bjm
 
 MS = 1_000_000

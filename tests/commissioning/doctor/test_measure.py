@@ -18,7 +18,8 @@ from canshaper.controller.controller import Controller
 from canshaper.errors import MeasurementError
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.joysticks import JoystickNode
-from tests.commissioning.doctor.conftest import ROOT, SHIPPED
+from tests.commissioning.doctor.conftest import SHIPPED
+from tests.rigs.files import ROOT
 
 MS = 1_000_000
 WAVING = Waving("waving", (), math.inf)

@@ -63,7 +63,7 @@ def cases(tool: Grapple, driving: str, level: float, noise_deg: float, seed: int
     with tempfile.TemporaryDirectory() as folder:
         states = driven(SECONDS, pushes, grapple=tool)
         log = candump(Path(folder) / "drive.log", states, seed=seed, noise_deg=noise_deg)
-        read = read_can(log, "", SIGNALS, deployment.messages, deployment=deployment)
+        read = read_can(log, SIGNALS, deployment.messages, deployment=deployment)
     modes = {"slew": tool.mode5, "near_far": tool.mode6}
     return [Case(driving, modes[axis], identify(axis, "", [read[axis]])) for axis in axes]
 

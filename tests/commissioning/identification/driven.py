@@ -20,4 +20,4 @@ def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
     unit = Unit(kind, 1.0, "rad/s" if rate else "rad")
     value = swing + np.array([noise() for _ in time])
     idle = [(float(time[a]), float(time[b - 1])) for a, b in runs(commands == 0.0)]
-    return Series("log", "", unit, time, value, Command(time - 0.02, speed), idle)
+    return Series("log", unit, time, value, Command(time - 0.02, speed), idle)

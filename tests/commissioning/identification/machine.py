@@ -15,8 +15,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Grapple, Sway, SwayMode
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 FILE = ROOT / "config" / "forwarder.yaml"
 TICK_S = 0.02
 

@@ -15,12 +15,12 @@ from tests.commissioning.identification.driven import drive
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
-    ROOT,
     Coloured,
     Push,
     driven,
     period_of,
 )
+from tests.rigs.files import ROOT
 
 DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")
 SLEW, NEAR_FAR = 0, 1
@@ -28,7 +28,7 @@ SLEW, NEAR_FAR = 0, 1
 
 def noisy(time: Array, angle: Array, seed: int, noise_deg: float, memory: float = 0.8) -> Series:
     noise = Coloured(seed, math.radians(noise_deg), memory)
-    return Series(f"log {seed}", "", DEGREES, time, angle + np.array([noise() for _ in time]))
+    return Series(f"log {seed}", DEGREES, time, angle + np.array([noise() for _ in time]))
 
 
 def swung(
@@ -95,7 +95,7 @@ def test_a_large_swing_is_slower_and_reported_as_a_small_one() -> None:
     check(identify("slew", "", [noisy(time, angle, 1, 0.2)]), expected, period=0.003, ratio=0.05)
     # In a unit that tells no angle there is nothing to correct by, and it comes out too long.
     bars = noisy(time, angle, 1, 0.2)
-    plain = identify("slew", "", [Series("p", "", Unit(Kind.OTHER, 1.0, "bar"), time, bars.value)])
+    plain = identify("slew", "", [Series("p", Unit(Kind.OTHER, 1.0, "bar"), time, bars.value)])
     assert plain.period_s
     assert plain.period_s.value > 1.004 * expected[0]
 

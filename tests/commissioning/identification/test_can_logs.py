@@ -13,7 +13,8 @@ from canshaper.errors import ConfigError, IdentificationError, LogError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
-from tests.commissioning.identification.machine import FILE, ROOT, Push, candump, driven
+from tests.commissioning.identification.machine import FILE, Push, candump, driven
+from tests.rigs.files import ROOT, machine_file
 
 PUSHES = [Push("slew", 2.0, 1.0, 0.5), Push("near_far", 6.0, 1.0, -0.4)]
 DRIVE = driven(12.0, PUSHES)
@@ -36,12 +37,12 @@ def write(log: Path, lines: list[str]) -> None:
 
 def test_signals_and_commands(log: Path, deployment: Deployment) -> None:
     done: list[float] = []
-    known: dict[str, Any] = {"deployment": deployment, "on_progress": done.append}
-    recorded = read_can(log, "empty", SWAY, deployment.messages, **known)
+    messages = deployment.messages
+    recorded = read_can(log, SWAY, messages, deployment=deployment, on_progress=done.append)
     assert done[-1] == 1.0
     slew, near = recorded["slew"], recorded["near_far"]
     assert slew.source == "a.log: GrappleSway.SwayPerpendicular"
-    assert (slew.label, slew.unit.kind) == ("empty", Kind.ANGLE)
+    assert slew.unit.kind is Kind.ANGLE
     expected = np.array([state.theta5_rad for state, _ in DRIVE])
     assert slew.value == pytest.approx(expected, abs=math.radians(0.006))
     assert np.diff(slew.time_s) == pytest.approx(0.02, abs=1e-5)
@@ -60,7 +61,7 @@ def test_signals_and_commands(log: Path, deployment: Deployment) -> None:
 
 def test_without_commands_nothing_is_known_of_them(tmp_path: Path, deployment: Deployment) -> None:
     log = candump(tmp_path / "a.log", DRIVE, valves=False)
-    slew = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
+    slew = read_can(log, SWAY, deployment.messages, deployment=deployment)["slew"]
     assert slew.command is None
     assert slew.idle is None
 
@@ -75,7 +76,7 @@ def test_commands_that_fall_silent_are_not_taken_for_standing(
         if " 200#" not in line or not 1.7e9 + 8.0 < float(line[1:18]) < 1.7e9 + 11.0
     ]
     write(log, kept)
-    slew = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
+    slew = read_can(log, SWAY, deployment.messages, deployment=deployment)["slew"]
     assert slew.idle is not None
     assert [b for _, b in slew.idle] == pytest.approx([2.0, 6.0, 8.0, 12.0], abs=0.05)
 
@@ -91,7 +92,7 @@ def test_joysticks_report_the_commands_where_no_valve_does(
         data = joystick.to_bytes(2, "little", signed=True) + bytes(6)
         lines.append(f"({1.7e9 + 0.02 * tick + 0.001:.6f}) can0 110#{data.hex().upper()}")
     write(log, sorted(lines))
-    slew = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
+    slew = read_can(log, SWAY, deployment.messages, deployment=deployment)["slew"]
     assert slew.command
     assert slew.command.speed.max() == pytest.approx(0.5)
     assert slew.idle is not None
@@ -102,7 +103,7 @@ def test_a_log_without_the_signal(log: Path, deployment: Deployment) -> None:
     kept = [line for line in log.read_text().splitlines() if " 400#" not in line]
     write(log, kept)
     with pytest.raises(IdentificationError) as error:
-        read_can(log, "", SWAY, deployment.messages)
+        read_can(log, SWAY, deployment.messages)
     assert "expected frames of GrappleSway (id 0x400), got 1800 of " in str(error.value)
     assert "LiftCommand, NearFarCommand, SlewCommand" in str(error.value)
 
@@ -110,7 +111,7 @@ def test_a_log_without_the_signal(log: Path, deployment: Deployment) -> None:
 def test_a_log_that_is_cut_off_is_used_up_to_there(log: Path, deployment: Deployment) -> None:
     text = log.read_text()
     log.write_text(text[: len(text) // 2 - 7])
-    signal = read_can(log, "", SWAY, deployment.messages)["slew"]
+    signal = read_can(log, SWAY, deployment.messages)["slew"]
     assert 295 <= len(signal.value) <= 300
     assert any("cut off" in note and str(log) in note for note in signal.notes), signal.notes
 
@@ -126,7 +127,7 @@ def test_no_values_are_left_out_and_reported(tmp_path: Path) -> None:
     for k, data in ((7, "FF7F0000"), (11, "FE7F0000"), (15, "00"), (19, "28230000")):
         lines[k] = lines[k].partition("#")[0] + "#" + data
     write(log, lines)
-    signal = read_can(log, "", {"slew": SWAY["slew"]}, messages)["slew"]
+    signal = read_can(log, {"slew": SWAY["slew"]}, messages)["slew"]
     assert len(signal.value) == 600 - 4
     assert np.abs(signal.value).max() < 1.0
     short, none = signal.notes
@@ -147,11 +148,11 @@ def test_two_senders_need_a_choice(tmp_path: Path, deployment: Deployment) -> No
     log = tmp_path / "c.log"
     write(log, [line for pair in zip(one, two, strict=True) for line in pair])
     with pytest.raises(IdentificationError, match=r"0x400 on can0, 0x400 on can1; .*--channel"):
-        read_can(log, "", SWAY, deployment.messages)
-    chosen = read_can(log, "", SWAY, deployment.messages, channel="can1")["slew"]
+        read_can(log, SWAY, deployment.messages)
+    chosen = read_can(log, SWAY, deployment.messages, channel="can1")["slew"]
     assert len(chosen.value) == 600
     with pytest.raises(LogError, match=r"expected the bus 'can7', got frames of 'can0', 'can1'"):
-        read_can(log, "", SWAY, deployment.messages, channel="can7")
+        read_can(log, SWAY, deployment.messages, channel="can7")
 
 
 @pytest.mark.parametrize(
@@ -188,25 +189,23 @@ def test_j1939_takes_any_priority_and_reports_two_addresses(tmp_path: Path) -> N
     rows = [f"({1.7e9 + 0.01 * k:.6f}) can0 0CFF1D21#{k:02X}00FFFFFFFFFFFF" for k in range(90)]
     log = tmp_path / "a.log"
     write(log, rows)
-    signal = read_can(log, "", {"slew": "Incline.Pitch"}, messages_of(dbc))["slew"]
+    signal = read_can(log, {"slew": "Incline.Pitch"}, messages_of(dbc))["slew"]
     assert signal.value[:3] == pytest.approx([0.0, math.radians(0.01), math.radians(0.02)])
     write(log, [*rows, rows[-1].replace("0CFF1D21", "0CFF1D22")])
     with pytest.raises(IdentificationError, match=r"0xcff1d21 on can0, 0xcff1d22 on can0"):
-        read_can(log, "", {"slew": "Incline.Pitch"}, messages_of(dbc))
+        read_can(log, {"slew": "Incline.Pitch"}, messages_of(dbc))
 
 
 def test_the_signal_of_the_grapple_is_read_next_to(tmp_path: Path) -> None:
-    text = FILE.read_text().replace("../dbc/forwarder.dbc", str(ROOT / "dbc" / "forwarder.dbc"))
-    file = tmp_path / "machine.yaml"
     # Any cyclic message will do for the weight.
     grapple = "load_state: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
-    file.write_text(text + grapple)
+    file = machine_file(tmp_path, FILE, more=grapple)
     deployment = load_deployment(file)
     log = candump(tmp_path / "a.log", DRIVE)
     lines = log.read_text().splitlines()
     lines += [f"({1.7e9 + 13 + 0.1 * k:.6f}) can0 401#0000F40B0000" for k in range(10)]
     write(log, lines)
-    signal = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
+    signal = read_can(log, SWAY, deployment.messages, deployment=deployment)["slew"]
     assert signal.at == pytest.approx(3.06)
 
 
@@ -229,9 +228,9 @@ def test_a_measurement_of_poor_merit_is_left_out(tmp_path: Path) -> None:
     names = {"near_far": "SSI2.PitchAngle"}
     sources = {"near_far": 0x19}
     bound: dict[str, Any] = {"deployment": deployment, "sources": sources}
-    series = read_can(log, "", names, deployment.messages, **bound)["near_far"]
+    series = read_can(log, names, deployment.messages, **bound)["near_far"]
     assert len(series.value) == 38
     assert not [t for t in series.time_s if 0.13 < t < 0.17]
     assert "2 values were not available, errors or out of range and left out" in series.notes[0]
-    plain = read_can(log, "", names, deployment.messages, sources=sources)["near_far"]
+    plain = read_can(log, names, deployment.messages, sources=sources)["near_far"]
     assert len(plain.value) == 40

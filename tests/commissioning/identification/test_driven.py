@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import cont2discrete, lfilter
 
 from canshaper.commissioning.identification import driven
-from canshaper.commissioning.identification.driven_data import swing_filter
+from canshaper.commissioning.identification.driven import swing_filter
 from canshaper.commissioning.identification.series import BIN_S, Kind
 from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.grapple import Grapple

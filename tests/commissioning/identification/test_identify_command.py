@@ -16,13 +16,13 @@ from canshaper_sim.grapple import Sway
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
-    ROOT,
     candump,
     driven,
     main,
     period_of,
     phone,
 )
+from tests.rigs.files import ROOT, machine_file
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +177,16 @@ def test_a_stopwatch(tmp_path: Path, file: Path) -> None:
     sway = load_deployment(file).axes["near_far"].config.sway
     assert sway and (sway.period_s, sway.damping_ratio) == (2.3539, 0.0221)
     assert not (tmp_path / "out").exists()  # nothing to draw
+
+
+def test_an_axis_that_follows_its_rope_keeps_the_rope(tmp_path: Path) -> None:
+    file = machine_file(tmp_path, "bridge-crane")
+    timed = "--swings", "10", "--seconds", "60", "--first", "20", "--last", "5"
+    before = file.read_bytes()
+    result = run(tmp_path, *timed, "--file", file, "--axis", "trolley", "--write")
+    assert result.exit_code == 2
+    assert "axis trolley: expected an axis with a period, got one that follows" in said(result)
+    assert file.read_bytes() == before
 
 
 def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: Path) -> None:

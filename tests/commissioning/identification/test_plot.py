@@ -34,7 +34,7 @@ def test_it_shows_the_largest_swing() -> None:
         at = time - begin_s
         swing = np.exp(-0.05 * at) * np.sin(2.0 * math.pi * at / 2.4)
         angle += np.where((time > begin_s) & (time < end_s), math.radians(deg) * swing, 0.0)
-    series = Series("log: S", "", Unit(Kind.ANGLE, 1.0, "rad"), time, angle)
+    series = Series("log: S", Unit(Kind.ANGLE, 1.0, "rad"), time, angle)
     finding = identify("slew", "", [series])
     assert finding.free and len(finding.free.segments) == 2
     swing_panel = figure([finding], []).axes[0]

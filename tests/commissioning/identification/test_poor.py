@@ -1,11 +1,12 @@
 """Data that is not enough is reported, with what to do; nothing is made of it."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from canshaper.commissioning.identification.data import stopwatch
+from canshaper.commissioning.identification.data import logged, stopwatch
 from canshaper.commissioning.identification.series import (
     Array,
     Kind,
@@ -16,7 +17,9 @@ from canshaper.commissioning.identification.series import (
 )
 from canshaper.commissioning.identification.verdict import identify
 from canshaper.errors import IdentificationError
+from canshaper.machine.binding import load_deployment
 from tests.commissioning.identification.machine import Coloured
+from tests.rigs.files import CONFIG
 
 DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")
 BAR = Unit(Kind.OTHER, 1.0, "bar")
@@ -37,7 +40,7 @@ def noise(count: int, degrees: float, seed: int = 1) -> Array:
 
 
 def series(time: Array, value: Array, unit: Unit = DEGREES, **known: object) -> Series:
-    return Series("a.log: Sway.Angle", "", unit, time, value, **known)  # type: ignore[arg-type]
+    return Series("a.log: Sway.Angle", unit, time, value, **known)  # type: ignore[arg-type]
 
 
 def times(seconds: float, step_s: float = 0.02) -> Array:
@@ -165,6 +168,22 @@ def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
     alone = identify("slew", "", [series(T25, value)])
     assert alone.period_s
     assert alone.period_s.value == pytest.approx(0.7, rel=0.01)
+
+
+@pytest.mark.slow
+def test_of_a_filter_for_two_modes_the_slower_one_is_looked_for(tmp_path: Path) -> None:
+    deployment = load_deployment(CONFIG / "bridge-crane-hook.yaml")
+    time = np.arange(0.0, 60.0, 0.05)
+    value = decay(time, 4.0, 5.885, 0.01) + decay(time, 6.0, 2.369, 0.01) + noise(len(time), 0.05)
+    table = tmp_path / "angle.csv"
+    rows = (f"{at:.2f},{math.degrees(one):.4f}" for at, one in zip(time, value, strict=True))
+    table.write_text("\n".join(("Time (s),Angle (deg)", *rows)) + "\n")
+    known = {"axis": None, "channel": None, "about_s": None, "on_progress": lambda *_, **__: None}
+    for file, period_s in ((deployment, 5.885), (None, 2.369)):
+        of = {"bridge": "Angle (deg)"}, file, deployment.messages
+        (finding,) = logged([str(table)], *of, **known)  # type: ignore[arg-type]
+        assert finding.period_s
+        assert finding.period_s.value == pytest.approx(period_s, rel=0.05)
 
 
 def test_a_useless_log_does_not_spoil_a_good_one() -> None:

@@ -52,7 +52,7 @@ def test_what_apps_write(tmp_path: Path, name: str) -> None:
     if "comma" in name:
         file.write_text(file.read_text().replace(".", ","))
     assert is_table(file)
-    series = series_of(read_table(file), "", None)
+    series = series_of(read_table(file), None)
     assert series.unit.kind is Kind.RATE
     assert series.time_s[-1] == pytest.approx(30.0, abs=0.05)
     # All of the swing is in the direction that was found: rate amplitude by angle and frequency.
@@ -68,7 +68,7 @@ def test_what_apps_write(tmp_path: Path, name: str) -> None:
 def test_a_named_column_is_used_as_it_is(tmp_path: Path) -> None:
     table = read_table(phone(tmp_path / "a.csv", SWUNG))
     for name in ("Gyroscope y (rad/s)", "gyroscope Y"):
-        series = series_of(table, "", name)
+        series = series_of(table, name)
         assert np.array_equal(series.value, table.columns["Gyroscope y (rad/s)"])
 
 
@@ -76,13 +76,13 @@ def test_degrees_a_second(tmp_path: Path) -> None:
     text = phone(tmp_path / "a.csv", SWUNG).read_text().replace("rad/s", "deg/s")
     (tmp_path / "a.csv").write_text(text)
     table = read_table(tmp_path / "a.csv")
-    series = series_of(table, "", "Gyroscope x")
+    series = series_of(table, "Gyroscope x")
     assert series.value[5] == pytest.approx(math.radians(table.columns["Gyroscope x (deg/s)"][5]))
 
 
 def test_a_round_swing_is_reported(tmp_path: Path) -> None:
     reported = driven(30.0, sway=Sway(0.15, 0.0, 0.0, 0.3))
-    series = series_of(read_table(phone(tmp_path / "a.csv", reported)), "", None)
+    series = series_of(read_table(phone(tmp_path / "a.csv", reported)), None)
     assert any("swing it in one direction only" in note for note in series.notes)
 
 
@@ -121,7 +121,7 @@ EDITS: dict[str, tuple[Edits, int, str]] = {
 def test_what_is_no_number_is_left_out_and_reported(tmp_path: Path, name: str) -> None:
     edits, left, note = EDITS[name]
     file = edited(tmp_path, edits)
-    series = series_of(read_table(file), "", None)
+    series = series_of(read_table(file), None)
     assert series.notes == ([f"{file}{note}"] if note else [])
     assert len(series.time_s) == left
     assert identify("slew", "", [series]).usable
@@ -136,20 +136,20 @@ def test_a_line_without_a_time_is_left_out_and_reported(
     table = read_table(file)
     assert table.notes == [f"{file}:{at}: 1 lines are without a time and left out"]
     assert table.time_s[0] == 0.0
-    assert identify("slew", "", [series_of(table, "", None)]).usable
+    assert identify("slew", "", [series_of(table, None)]).usable
 
 
 def test_a_gyroscope_without_a_number(tmp_path: Path) -> None:
     file = edited(tmp_path, dict.fromkeys(ROWS, lambda row: row.partition(",")[0] + ",,,"))
     text = r"a\.csv: expected a number in each line of Gyroscope x"
     with pytest.raises(IdentificationError, match=text):
-        series_of(read_table(file), "", None)
+        series_of(read_table(file), None)
 
 
 def test_a_clock_that_goes_back(tmp_path: Path) -> None:
     file = edited(tmp_path, {1500: lambda row: f"{row}\n0.0,0,0,0"})
     with pytest.raises(IdentificationError, match=r"a\.csv: .*the time goes back by 30 s"):
-        series_of(read_table(file), "", None)
+        series_of(read_table(file), None)
 
 
 WRONG = {
@@ -200,7 +200,7 @@ def test_a_column_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(
         IdentificationError, match=r"expected a column, got 'Gyro w'; there are Gyroscope x"
     ):
-        series_of(table, "", "Gyro w")
+        series_of(table, "Gyro w")
 
 
 @pytest.mark.parametrize(
@@ -215,21 +215,14 @@ def test_an_acceleration_is_refused(tmp_path: Path, header: str) -> None:
     file = tmp_path / "a.csv"
     file.write_text(header + "\n" + "\n".join(f"{0.01 * k},{k % 3}" for k in range(50)))
     with pytest.raises(IdentificationError, match="does not show the swing"):
-        series_of(read_table(file), "", header.partition(",")[2])
+        series_of(read_table(file), header.partition(",")[2])
 
 
 def test_no_gyroscope_and_no_name(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text("Time (s),p (bar)\n" + "\n".join(f"{0.01 * k},{k % 3}" for k in range(50)))
     with pytest.raises(IdentificationError, match="name the column"):
-        series_of(read_table(file), "", None)
-
-
-def test_a_can_log_is_no_table(tmp_path: Path) -> None:
-    file = tmp_path / "a.csv"
-    file.write_text("timestamp,arbitration_id,extended,remote,error,dlc,data\n")
-    assert not is_table(file)
-    assert not is_table(tmp_path / "a.log")
+        series_of(read_table(file), None)
 
 
 def test_progress(tmp_path: Path) -> None:
@@ -257,3 +250,4 @@ def test_a_log_of_frames_is_no_table(tmp_path: Path, header: str) -> None:
     assert not is_table(file)
     file.write_text("Time (s),x\n")
     assert is_table(file)
+    assert not is_table(tmp_path / "a.log")

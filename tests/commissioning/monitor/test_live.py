@@ -22,8 +22,8 @@ from typer.testing import CliRunner
 
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
+from tests.rigs.files import text_of
 
-ROOT = Path(__file__).parents[3]
 GROUP = f"239.75.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 BUS = ("--interface", "udp_multicast", "--channel", GROUP)
 COMMAND = (sys.executable, "-m", "canshaper")
@@ -152,8 +152,7 @@ def test_a_second_signal_ends_what_waits_for_an_adapter(
     """A server of socketcand that never answers holds the process that opens it."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         options = {"host": "127.0.0.1", "port": server.getsockname()[1]}
-        content = yaml.safe_load((ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8"))
-        content["dbc"] = [str(ROOT / "dbc" / "forwarder.dbc")]
+        content = yaml.safe_load(text_of("forwarder"))
         bus = {"interface": "socketcand", "channel": "can0", "options": options}
         content["buses"] = {"crane": bus}
         file = tmp_path / "machine.yaml"

@@ -14,6 +14,7 @@ from canshaper.commissioning.monitor.view import HELP, Keys, screen, status_line
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping.states import Reason, State
+from tests.rigs.files import machine_file
 from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
 from tests.rigs.sent import status_frame
@@ -59,12 +60,9 @@ def status_frames(
 
 def j1939(source: str, folder: Path) -> Deployment:
     """The machine of J1939, its left joystick with another line."""
-    file = loader("j1939-forwarder.yaml")().path
-    lines = file.read_text(encoding="utf-8").replace("../dbc/", f"{file.parents[1]}/dbc/")
-    (folder / "machine.yaml").write_text(
-        lines.replace("    message: BJM1\n", f"    message: BJM1\n{source}"), encoding="utf-8"
-    )
-    return loader(str(folder / "machine.yaml"))()
+    joystick = "    message: BJM1\n"
+    file = machine_file(folder, "j1939-forwarder", (joystick, f"{joystick}{source}"))
+    return loader(str(file))()
 
 
 @pytest.mark.parametrize("source", ["", "    source: 0x33\n"])

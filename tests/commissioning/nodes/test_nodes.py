@@ -8,10 +8,15 @@ import canopen
 import cantools
 import pytest
 
-from canshaper.commissioning.nodes import MessageTiming, messages
+from canshaper.commissioning.nodes import messages
 from canshaper.commissioning.nodes.eds import Eds
 from canshaper.commissioning.nodes.node import Node
-from canshaper.commissioning.nodes.parameters import heartbeat_ms, missing, parameters
+from canshaper.commissioning.nodes.parameters import (
+    MessageTiming,
+    heartbeat_ms,
+    missing,
+    parameters,
+)
 from canshaper.errors import ConfigError
 from tests.commissioning.nodes.eds_files import (
     INCLINOMETER,

@@ -7,8 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-
-ROOT = Path(__file__).parents[3]
+from tests.rigs.files import ROOT
 
 
 @pytest.fixture(scope="session")

@@ -13,10 +13,9 @@ from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.procedure import Procedure
 from canshaper.commissioning.procedure.state import Status, read_state
-from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
-from tests.commissioning.procedure.conftest import ROOT
+from tests.rigs.files import text_of
 
 COPY = Path("machine.rehearsal.yaml")
 STATE = Path("machine.rehearsal.commission.json")
@@ -37,7 +36,7 @@ def steps() -> Any:
 def procedure(changes: list[str] | None = None) -> Procedure:
     bench = Simulated(Prompts(), changes or [])
     COPY.write_bytes(Path("machine.yaml").read_bytes())
-    return Procedure(Files(COPY), bench, load_deployment, STEPS, origin=Path("machine.yaml"))
+    return Procedure(Files(COPY), bench, load_deployment, origin=Path("machine.yaml"))
 
 
 @pytest.mark.slow
@@ -106,7 +105,7 @@ def test_a_joystick_of_another_axis_is_put_right(machine: Path) -> None:
     assert real.axes["slew"].config.command.signal == "NearFar"
     bench = _WrongHand(Prompts(), [])
     COPY.write_bytes(machine.read_bytes())
-    one = Procedure(Files(COPY), bench, load_deployment, STEPS, origin=machine)
+    one = Procedure(Files(COPY), bench, load_deployment, origin=machine)
     one.accept(one.run(one.step("joysticks")))
     after = load_deployment(COPY)
     assert after.axes["slew"].config.command.signal == "Slew"
@@ -156,7 +155,7 @@ class _Edited(Simulated):
 def test_a_file_that_was_changed_in_the_middle_of_a_step_is_noticed(machine: Path) -> None:
     one = procedure()
     one.accept(one.run(one.step("check")))
-    two = Procedure(Files(COPY), _Edited(Prompts(), []), load_deployment, STEPS, origin=machine)
+    two = Procedure(Files(COPY), _Edited(Prompts(), []), load_deployment, origin=machine)
     with pytest.raises(UsageError, match="changed by someone else meanwhile"):
         two.accept(two.run(two.step("buses")))
     assert two.news == [
@@ -199,7 +198,7 @@ def test_an_interrupted_step_leaves_the_others_as_they_were(machine: Path) -> No
     one.accept(one.run(one.step("buses")))
     kept = STATE.read_bytes()
     bench = Simulated(_Interrupted(), [])
-    two = Procedure(Files(COPY), bench, load_deployment, STEPS, origin=machine)
+    two = Procedure(Files(COPY), bench, load_deployment, origin=machine)
     with pytest.raises(KeyboardInterrupt):
         two.run(two.step("joysticks"))
     assert STATE.read_bytes() == kept
@@ -265,7 +264,7 @@ def test_what_the_simulated_crane_cannot_stand_for_is_refused_at_once(
     new = machine.read_text().replace("\n  slew:", "\n  boom:").replace("slew: slew", "slew: boom")
     new = new.replace("axes.slew.", "axes.boom.")
     if several:
-        new = (ROOT / "config" / "two-cranes.yaml").read_text().replace("../dbc", f"{ROOT}/dbc")
+        new = text_of("two-cranes")
     machine.write_text(new)
     assert text in commission("--yes", code=2)
     assert not COPY.exists()

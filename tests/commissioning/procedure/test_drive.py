@@ -10,12 +10,11 @@ import pytest
 from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.files import Files
-from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-from canshaper.commissioning.procedure.state import Record, Status
-from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.commissioning.procedure.procedure import Procedure
+from canshaper.commissioning.procedure.state import Outcome, Record, Status
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
-from tests.commissioning.procedure.conftest import ROOT
+from tests.rigs.files import machine_file
 
 SIGNALS = {"slew": "GrappleSway.SwayPerpendicular", "near_far": "GrappleSway.SwayParallel"}
 BEFORE, AFTER = "drive-before.log", "drive-after.log"
@@ -71,10 +70,10 @@ def drive(
     signals: dict[str, str],
     change: Change = lambda task: task,
     without: Callable[[str, float], bool] = lambda _log, _time_s: False,
-) -> tuple[Procedure, Proposal]:
+) -> tuple[Procedure, Outcome]:
     # As the step valve would have measured it.
     machine.write_text(machine.read_text().replace("deadband_pct: 0", "deadband_pct: 5"))
-    one = Procedure(Files(machine), Live(driver, change, without), load_deployment, STEPS)
+    one = Procedure(Files(machine), Live(driver, change, without), load_deployment)
     numbers = {name: {"signal": signal} for name, signal in signals.items()}
     one.state.steps["swing"] = Record(Status.DONE, numbers=numbers)
     return one, one.run(one.step("drive"))
@@ -100,7 +99,7 @@ def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path
     measured: Any = proposal.numbers["crane"]
     copy = machine.with_name("copy.yaml")
     copy.write_bytes(machine.read_bytes())
-    other = Procedure(Files(copy), Simulated(Prompts(), []), load_deployment, STEPS, origin=copy)
+    other = Procedure(Files(copy), Simulated(Prompts(), []), load_deployment, origin=copy)
     simulated: Any = other.run(other.step("drive")).numbers["crane"]
     for name in ("residual_before_deg", "residual_after_deg"):
         assert measured[name] == pytest.approx(simulated[name], abs=0.1)
@@ -229,12 +228,11 @@ def test_a_speed_is_no_swing(machine: Path) -> None:
 
 @pytest.mark.slow
 def test_without_the_step_swing_the_sway_sensor_measures(machine: Path) -> None:
-    text = (ROOT / "config" / "forwarder-sensor.yaml").read_text()
-    text = text.replace("../dbc", f"{ROOT}/dbc").replace("limits: {", "limits: { max_pct: 40,")
-    machine.write_text(text)
+    slow = ("limits: {", "limits: { max_pct: 40,")
+    machine_file(machine.parent, "forwarder-sensor", slow)
     driver = Driver()
     _, proposal = drive(machine, driver, {})
     assert proposal.problems == []
     assert driver.questions == []
-    shown = "\n".join(part["text"] for part in proposal.parts if "text" in part)
+    shown = "\n".join(part["text"] for part in proposal.sheet.parts if "text" in part)
     assert "Swing measured: slew by SwayAngle.Across, near_far by SwayAngle.Along" in shown

@@ -10,11 +10,11 @@ import pytest
 from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.procedure.bench import Simulated, Task
 from canshaper.commissioning.procedure.files import Files
-from canshaper.commissioning.procedure.procedure import Procedure, Proposal
-from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.commissioning.procedure.procedure import Procedure
+from canshaper.commissioning.procedure.state import Outcome
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
-from tests.commissioning.procedure.conftest import ROOT
+from tests.rigs.files import ROOT
 
 
 class Otherwise(Simulated):
@@ -28,8 +28,8 @@ class Otherwise(Simulated):
         super().drive(deployment, log, self._change(task))
 
 
-def run(machine: Path, step: str, change: Any) -> Proposal:
-    one = Procedure(Files(machine), Otherwise(change), load_deployment, STEPS, origin=machine)
+def run(machine: Path, step: str, change: Any) -> Outcome:
+    one = Procedure(Files(machine), Otherwise(change), load_deployment, origin=machine)
     return one.run(one.step(step))
 
 
@@ -116,7 +116,7 @@ def test_a_bus_on_which_nothing_comes(machine: Path) -> None:
             log.write_text("")
 
     bench = Silent(None)
-    one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
+    one = Procedure(Files(machine), bench, load_deployment, origin=machine)
     outcome = one.run(one.step("buses"))
     assert any("bus crane: no frame was received: is the machine on" in f for f in outcome.problems)
 
@@ -142,7 +142,7 @@ def test_an_axis_has_whatever_name_the_file_gives_it(machine: Path, step: str) -
     names = {"boom": "slew", "front_slew": "near_far", "hoist": "lift"}
     other = renamed(machine, names)
     bench = Renamed(names)
-    one = Procedure(Files(other), bench, load_deployment, STEPS, origin=other)
+    one = Procedure(Files(other), bench, load_deployment, origin=other)
     proposal = one.run(one.step(step))
     assert proposal.problems == []
     assert {*names} <= proposal.numbers.keys()
@@ -203,7 +203,7 @@ class Listening(Renamed):
 @pytest.mark.parametrize("step", ["buses", "joysticks", "swing", "dry", "motion", "drive"])
 def test_each_step_says_how_long_it_records(machine: Path, step: str) -> None:
     bench = Listening()
-    one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
+    one = Procedure(Files(machine), bench, load_deployment, origin=machine)
     one.run(one.step(step))
     assert bench.tasks
     for task in bench.tasks:
@@ -216,7 +216,7 @@ def test_where_the_old_controller_may_move_the_crane_the_person_is_warned(
     machine: Path, step: str
 ) -> None:
     bench = Listening()
-    one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
+    one = Procedure(Files(machine), bench, load_deployment, origin=machine)
     one.run(one.step(step))
     for task in bench.tasks:
         assert "the controller of before moves the crane wherever it is connected" in task.words
@@ -226,7 +226,7 @@ def test_where_the_old_controller_may_move_the_crane_the_person_is_warned(
 @pytest.mark.slow
 def test_two_axis_motion_begins_after_the_first_motion(first_day: Path) -> None:
     assert load_deployment(first_day).motions == {}
-    one = Procedure(Files(first_day), Otherwise(lambda t: t), load_deployment, STEPS, first_day)
+    one = Procedure(Files(first_day), Otherwise(lambda t: t), load_deployment, first_day)
     proposal = one.run(one.step("motion"))
     assert "-    waits: true" in proposal.diff
     one.accept(proposal)

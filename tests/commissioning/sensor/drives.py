@@ -14,8 +14,8 @@ from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.strokes import Script
 from canshaper_sim.sway_sensor import SwaySensorParameters
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[3]
 FILE = ROOT / "config" / "forwarder-sensor.yaml"
 GYRO = (("message: SwayAngle", "message: SwayRate"), ("kind: angle", "kind: rate"))
 AXES = ("slew", "near_far")

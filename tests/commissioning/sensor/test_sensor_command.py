@@ -25,7 +25,8 @@ from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script
 from canshaper_sim.sway_sensor import SwaySensorParameters
-from tests.commissioning.sensor.drives import FILE, ROOT, machine
+from tests.commissioning.sensor.drives import FILE, machine
+from tests.rigs.files import ROOT, machine_file
 
 REAL = CraneParameters(sway_sensor=SwaySensorParameters(gain=-1.0, delay_s=0.1))
 
@@ -38,10 +39,7 @@ def sensor(*arguments: object, code: int = 0) -> str:
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    path = tmp_path / "machine.yaml"
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    path.write_text(text, encoding="utf-8")
-    return path
+    return machine_file(tmp_path, FILE)
 
 
 def trust(file: Path) -> list[str]:

@@ -1,10 +1,8 @@
 """Manoeuvres and outcomes of a comparison."""
 
-from pathlib import Path
-
 from canshaper.design.comparison.manoeuvres import Manoeuvre, manoeuvres
+from tests.rigs.files import CONFIG
 
-CONFIG = Path(__file__).parents[3] / "config"
 FILE = CONFIG / "forwarder-robust.yaml"
 ROBUST = "robust 1.8 s ±15 %"
 

@@ -23,7 +23,8 @@ from canshaper.design.comparison.measure import measure, measure_all
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
 from canshaper_sim.operator import SCRIPTS
-from tests.design.comparison.candidates import CONFIG, FILE, ROBUST, task
+from tests.design.comparison.candidates import FILE, ROBUST, task
+from tests.rigs.files import CONFIG
 
 
 @pytest.mark.slow

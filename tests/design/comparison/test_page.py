@@ -1,7 +1,6 @@
 """The page has what the command gives: the row of what we recommend, and the limits."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,8 @@ from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
 from canshaper.design.comparison.measure import Outcome, measure
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "comparison.md").read_text("utf-8")
 ROBUST = "robust 1.8 s ±15 %"
 

@@ -7,6 +7,7 @@ import pytest
 from canshaper.design.comparison.manoeuvres import candidates, manoeuvres, with_candidate
 from canshaper.design.comparison.measure import measure
 from canshaper.machine.binding import load_deployment
+from tests.rigs.files import machine_file
 
 FILE = Path(__file__).parents[3] / "config" / "forwarder-sensor.yaml"
 ZV, SENSED = "limit-aware ZV", "ZV +sensor"
@@ -24,9 +25,7 @@ def test_a_sensor_that_damps_has_rows_of_its_own() -> None:
 
 
 def test_a_sensor_that_only_watches_has_none(tmp_path: Path) -> None:
-    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(FILE.parents[1] / "dbc"))
-    path = tmp_path / "machine.yaml"
-    path.write_text(text.replace("use: damp", "use: watch", 1), encoding="utf-8")
+    path = machine_file(tmp_path, FILE, ("invert: true, use: damp", "invert: true, use: watch"))
     assert not [one for one in candidates(load_deployment(path)) if one.sensor]
 
 

@@ -11,8 +11,8 @@ from canshaper.commissioning.tuned import design_tuned
 from canshaper.design.tuning.evaluate import Machine, Traces, gff, press
 from canshaper.machine.binding import load_deployment
 from canshaper.report.style import RAW_COLOUR, TEXT_COLOUR, new_figure, plain, save, titled
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 FILE, AXIS = ROOT / "config" / "forwarder.yaml", "near_far"
 # Weights as the table of the page raises them, and which other one is off.
 ROWS = {

@@ -27,8 +27,8 @@ from canshaper.design.tuning.verdict import Verdict, verdicts
 from canshaper.edit.edit import flow
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).parents[3]
 COUNT = 200
 G_M_S2 = 9.81
 MASS_KG = 300.0

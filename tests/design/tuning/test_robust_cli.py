@@ -8,16 +8,12 @@ from canshaper.config.filters import DesignedFor
 from canshaper.config.section import Origin
 from canshaper.edit.edit import written_by
 from canshaper.machine.binding import load_deployment
-
-ROOT = Path(__file__).parents[3]
+from tests.rigs.files import machine_file
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    path = tmp_path / "machine.yaml"
-    text = (ROOT / "config" / "forwarder.yaml").read_text()
-    path.write_text(text.replace("../dbc", str(ROOT / "dbc")))
-    return path
+    return machine_file(tmp_path, "forwarder")
 
 
 def run(*words: str) -> tuple[int, str]:

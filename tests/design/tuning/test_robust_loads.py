@@ -13,16 +13,13 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.sway import GRAVITY_M_S2
 from tests.cli.invocation import invoke
-from tests.rigs.files import ROOT
+from tests.rigs.files import machine_file
 from tests.rigs.overhead import changed
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    path = tmp_path / "machine.yaml"
-    text = (ROOT / "config" / "forwarder-load.yaml").read_text(encoding="utf-8")
-    path.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
-    return path
+    return machine_file(tmp_path, "forwarder-load")
 
 
 def taps(deployment: Deployment, axis: str) -> list[list[float]]:

@@ -26,8 +26,8 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.rigs.files import machine_file
 
-ROOT = Path(__file__).parents[3]
 TICK_S, G, LAG_S = 0.02, 9.81, 0.1
 VALVE = {"tick_s": TICK_S, "rate_per_s": 5.0}
 Vector = NDArray[np.float64]
@@ -106,12 +106,11 @@ LOGS = DoublePendulum(0.4)
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """The forwarder with the first mode of the logs on its near-far axis."""
-    path = tmp_path / "machine.yaml"
-    text = (ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc", str(ROOT / "dbc"))
     first = LOGS.modes()[0]
     swing = f"period_s: {first.period_s:.4f}, damping_ratio: {first.damping_ratio:.4f}"
-    path.write_text(text.replace("length_m: 1.2, damping_nms: 120, mass_kg: 300", swing))
-    return path
+    return machine_file(
+        tmp_path, "forwarder", ("length_m: 1.2, damping_nms: 120, mass_kg: 300", swing)
+    )
 
 
 def option(range_pct: float = 20.0) -> str:
@@ -241,7 +240,8 @@ def test_the_file_records_it(file: Path) -> None:
         length_range_pct=25.0,
     )
     checked = CliRunner().invoke(app, ["check", str(file)]).output
-    assert checked.count("WARNING") == checked.count("hydraulics: missing") == 1
+    assert checked.count("hydraulics: missing") == checked.count("reversal_s: 2") == 1
+    assert checked.count("WARNING") == 2
     file.write_text(file.read_text().replace("length_range_pct: 25.0", "length_range_pct: 61.0"))
     checked = CliRunner().invoke(app, ["check", str(file)])
     assert checked.exit_code == 2
@@ -265,15 +265,16 @@ def test_another_period_stretches_the_taps_as_long_as_the_second_mode_is_covered
             ValueError, match=r"designed_for\.second\.period_s: expected .*got 0.64"
         ):
             adjusted(config, {key: factor * config.sway.period_s}, config)
-    single = designed(file).config
+    assert designed(file).config.filter.design() == config.filter.design()  # it is kept
+    single = designed(file, "--second", "none").config
     assert adjusted(single, {key: 1.15 * config.sway.period_s}, single) != single
 
 
 @pytest.mark.parametrize(
     ("second", "says"),
     [
-        ("0.6,0.1", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, got '0.6,0.1'"),
-        ("quick", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, got 'quick'"),
+        ("0.6,0.1", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, or none, got '0.6,0.1'"),
+        ("quick", "expected PERIOD,DAMPING,RANGE, such as 0.6,0.1,20, or none, got 'quick'"),
         ("0.1,0.1,20", "expected a period of 0.3 to 1.98 s, got 0.1 s"),
         ("nan,0.1,20", "expected a period of 0.3 to 1.98 s, got nan s"),
         ("2.2,0.1,20", "expected a period of 0.3 to 1.98 s, got 2.2 s"),

@@ -13,8 +13,9 @@ from canshaper.design.tuning.evaluate import Machine, evaluate, gff
 from canshaper.design.tuning.verdict import GOOD, Verdict, judge, verdicts
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.sway import SwayMode
+from tests.design.tuning.random_machines import COUNT, judged
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 DOUBLE = gff((-2.859, -2.859))
 RATES = "rise_per_s: 5, fall_per_s: 5"
@@ -191,3 +192,22 @@ def test_a_stopping_distance_that_ends_the_run_on_is_seen(file: Path) -> None:
 def test_a_profile_is_judged_too() -> None:
     places = [place for place, _ in verdicts(load_deployment(ROOT / "config/j1939-profiles.yaml"))]
     assert ("axes", "slew", "profiles", "quick", "filter") in places
+
+
+@pytest.mark.study
+def test_the_verdict_is_what_a_drive_shows() -> None:
+    results = [judged(seed) for seed in range(COUNT)]
+    wrong = [str(one) for one in results if not one.agrees]
+    assert len(wrong) <= 0.05 * COUNT, wrong
+    assert all(one.left <= 0.15 for one in results if one.verdict.word == "good")
+    assert all(one.machine.damping_ratio > 0.5 for one in results if not one.agrees)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "word"), [(1, "poor"), (6, "good"), (8, "poor"), (101, "useless")]
+)
+def test_each_word_is_what_a_drive_shows(seed: int, word: str) -> None:
+    one = judged(seed)
+    assert (one.verdict.word, one.agrees) == (word, True)
+    assert one.left == pytest.approx(one.verdict.left, abs=0.01)

@@ -15,8 +15,8 @@ from canshaper.design.tuning.optimal import tune
 from canshaper.errors import ConfigError, DesignError, UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.sway import SwayMode
+from tests.rigs.files import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "tuning.md").read_text("utf-8")
 ROW = re.compile(
     r"^\| `--(\w)` \|.*\| ([\d.]+) to ([\d.]+)(?:, `--(\w) 0`)? \| (slower|quicker)"

@@ -5,7 +5,8 @@ import pytest
 from canshaper.machine.binding import load_deployment
 from canshaper.protocols.canopen.network import ValveControl
 from canshaper.shaping.states import Reason
-from tests.rigs.canopen import ACTIVE, DISABLED, FILE, HOLD, INIT, RESET, ROOT
+from tests.rigs.canopen import ACTIVE, DISABLED, FILE, HOLD, INIT, RESET
+from tests.rigs.files import ROOT
 
 MS = 1_000_000
 NOT_READY = 0  # status word

@@ -9,7 +9,8 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.forwarding import Pattern
 from canshaper.protocols.gateway.rules import excluded
-from tests.machine.gateway_files import ROOT, j1939_gateway, load
+from tests.machine.gateway_files import j1939_gateway, load
+from tests.rigs.files import ROOT
 
 J1939_DBC = ROOT / "dbc" / "j1939-bjm-avc.dbc"
 ONE_ID_OF_11_BITS, ONE_ID_OF_29_BITS = 0x800007FF, 0x9FFFFFFF

@@ -13,7 +13,8 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.protocols.j1939.network import J1939Network
 from canshaper.shaping.states import Reason
-from tests.rigs.j1939 import ROOT, TICK_NS
+from tests.rigs.files import machine_file
+from tests.rigs.j1939 import TICK_NS
 
 CRANE, BOOM = ("socketcan", "vcan0"), ("socketcan", "vcan1")
 PLACES = {"crane": CRANE, "boom": BOOM}
@@ -42,7 +43,6 @@ class Received:
 
 def two_buses(folder: Path, *changes: tuple[str, str]) -> Deployment:
     """The shipped machine with its lift on a second bus of J1939, with pieces replaced."""
-    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
     boom = (
         "\n  boom:\n    interface: socketcan\n    channel: vcan1\n    bitrate: 250000\n"
         "    j1939: { address: 0x9D, name: { identity_number: 2, manufacturer_code: 2047 } }\n"
@@ -52,12 +52,8 @@ def two_buses(folder: Path, *changes: tuple[str, str]) -> Deployment:
         (f"bus: crane{end}", f"bus: boom{end}")
         for end in ("\n      message: AVC2", ", message: AVEF2")
     ]
-    for old, new in (("\ndbc:", boom), ("../dbc", str(ROOT / "dbc")), *moved, *changes):
-        assert old in text, old
-        text = text.replace(old, new)
-    file = folder / "machine.yaml"
-    file.write_text(text)
-    return load_deployment(file)
+    changes = (("\ndbc:", boom), *moved, *changes)
+    return load_deployment(machine_file(folder, "j1939-forwarder", *changes))
 
 
 def axes_of(deployment: Deployment, **reasons: Reason) -> dict[str, Any]:

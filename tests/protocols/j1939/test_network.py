@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from canshaper.codec.frame import Frame
 from canshaper.shaping.states import State
-from tests.rigs.j1939 import AVC, JOYSTICK, OTHER, OWN, ROOT, Rig, bjm, flow, ids
+from tests.rigs.files import ROOT, machine_file
+from tests.rigs.j1939 import AVC, JOYSTICK, OTHER, OWN, Rig, bjm, flow, ids
 
 CONFIG = ROOT / "config" / "j1939-forwarder.yaml"
 
@@ -19,13 +20,7 @@ def rig() -> Rig:
 
 
 def variant(directory: Path, *changes: tuple[str, str]) -> Rig:
-    text = CONFIG.read_text().replace("../dbc", str(ROOT / "dbc"))
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    path = directory / "machine.yaml"
-    path.write_text(text)
-    return Rig(path)
+    return Rig(machine_file(directory, CONFIG, *changes))
 
 
 @pytest.mark.parametrize("priority", [0, 3, 6, 7])

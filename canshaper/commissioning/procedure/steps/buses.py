@@ -66,7 +66,7 @@ def figure(traffic: Traffic, deployment: Deployment) -> Figure:
     """Every frame of the first second, a row a message."""
     rows = _rows(traffic, deployment)[:MOST_ROWS]
     height = 330 + 45 * len(rows)
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     panel = fig.add_axes((0.27, 190 / height, 0.7, 45 * len(rows) / height))
     style.plain(panel, size=style.TEXT_PT)
     for number, (_, times) in enumerate(rows):
@@ -75,9 +75,8 @@ def figure(traffic: Traffic, deployment: Deployment) -> Figure:
     panel.set_yticks(range(len(rows)), [name for name, _ in rows])
     panel.set_ylim(len(rows) - 0.5, -0.5)
     panel.set_xlim(0.0, MOST_DRAWN_S)
-    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    title = "The frames of the first second"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
+    style.label(panel, "time, s")
+    style.headline(fig, "The frames of the first second")
     return fig
 
 

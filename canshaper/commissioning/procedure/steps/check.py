@@ -60,17 +60,16 @@ def run(context: Context) -> Outcome:
     return outcome
 
 
-def _write(deployment: Deployment, fast: list[str], allowed: list[str]) -> list[str]:
+def _write(deployment: Deployment, fast: list[str], allowed: list[str]) -> None:
     sections, slow = deployment.config.axes, {"max_pct": REDUCED_PCT}
     slower = [of_limits(name, sections[name], slow) for name in fast]
     change(deployment.path, [*slower, *confirmed(deployment.path, allowed)])
-    return []
 
 
 def figure(axes: list[Stopping]) -> Figure:
     """How far each axis travels on after each event, and how far its limits allow."""
     height = 170 + 330 * len(axes)
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     for number, axis in enumerate(axes):
         bottom = (height - 110 - 330 * (number + 1) + 75) / height
         panel = fig.add_axes((0.2, bottom, 0.76, 215 / height))
@@ -84,8 +83,7 @@ def figure(axes: list[Stopping]) -> Figure:
         panel.invert_yaxis()
         if axis.stated_m is not None and axis.speed.m_s is not None:
             panel.axvline(axis.stated_m, color=style.TEXT_COLOUR, linewidth=1.2)
-    title = "Travel from full speed; the line is stop_distance_m"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
+    style.headline(fig, "Travel from full speed; the line is stop_distance_m")
     return fig
 
 

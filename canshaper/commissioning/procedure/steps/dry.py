@@ -43,7 +43,7 @@ def run(context: Context) -> Outcome:
     outcome = Outcome(files=[log])
     show_states(outcome, traffic)
     for name, axis in traffic.axes.items():
-        least, most = min(axis.joystick.value, default=0.0), max(axis.joystick.value, default=0.0)
+        least, most = axis.reach
         if min(-least, most) < LEAST:
             text = f"its joystick went from {100 * least:.0f} to {100 * most:.0f} %"
             outcome.problems.append(f"{name}: {text}: move it to both ends, enable held")
@@ -72,12 +72,8 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
     table = new_table("axis", "least, %", "most, %", "states")
     for name, axis in traffic.axes.items():
         states = list(dict.fromkeys(state for _, state, _ in axis.states))
-        table.add_row(
-            name,
-            f"{100 * min(axis.joystick.value, default=0.0):.0f}",
-            f"{100 * max(axis.joystick.value, default=0.0):.0f}",
-            ", ".join(states) or "no status message",
-        )
+        ends = (f"{100 * end:.0f}" for end in axis.reach)
+        table.add_row(name, *ends, ", ".join(states) or "no status message")
         outcome.numbers[name] = {"states": states}
     outcome.sheet.print(table)
     if traffic.missed_deadlines is not None:
@@ -88,7 +84,7 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
 def figure(traffic: Traffic, title: str) -> Figure:
     """Joystick and valve of each axis over time, and when its joystick was enabled."""
     height = 190 + 300 * len(traffic.axes)
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     for number, (name, axis) in enumerate(traffic.axes.items()):
         bottom = (height - 110 - 300 * (number + 1) + 95) / height
         panel = fig.add_axes((0.11, bottom, 0.86, 185 / height))
@@ -113,11 +109,11 @@ def figure(traffic: Traffic, title: str) -> Figure:
                 panel.axvline(time_s, color=style.TEXT_COLOUR, linewidth=0.8)
         panel.set_xlim(0.0, traffic.duration_s)
         panel.set_ylim(-110.0, 110.0)
-        panel.set_ylabel("%", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
+        style.label(panel, y="%")
         if not number:
             panel.legend(loc="upper right", fontsize=style.TEXT_PT, frameon=False, ncols=3)
-    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
+    style.label(panel, "time, s")
+    style.headline(fig, title)
     return fig
 
 

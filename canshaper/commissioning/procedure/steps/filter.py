@@ -8,7 +8,7 @@ from rich.table import Table
 
 from canshaper.commissioning import robust_report, tuned
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
-from canshaper.commissioning.procedure.steps.swing import swinging, swings
+from canshaper.commissioning.procedure.steps.swing import swinging
 from canshaper.commissioning.robust import RobustDesign, design_robust
 from canshaper.commissioning.tuned import TunedDesign, design_tuned
 from canshaper.config.filters import Filter
@@ -176,5 +176,5 @@ FILTER = Step(
     run,
     writes="`filter`, `tail_s`",
     needs=("swing", "valve"),
-    applies=swings,
+    applies=swinging,
 )

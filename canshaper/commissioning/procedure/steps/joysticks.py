@@ -37,7 +37,7 @@ def run(context: Context) -> Outcome:
         outcome.files.append(log)
         axis = seen[name] = traffic.axes[name]
         moved = _moved(traffic)
-        least, most = _extremes(axis)
+        least, most = axis.reach
         held = _held(axis)
         table.add_row(
             name,
@@ -71,11 +71,6 @@ def _moved(traffic: Traffic) -> list[str]:
     return sorted((name for name in far if far[name] > MOVED), key=lambda name: -far[name])
 
 
-def _extremes(axis: AxisTraffic) -> tuple[float, float]:
-    values = axis.joystick.value or [0.0]
-    return min(values), max(values)
-
-
 def _held(axis: AxisTraffic) -> float | None:
     """Part of the deflected time in which the enable switch was held; None where not known."""
     if len(axis.enabled.value) != len(axis.joystick.value):
@@ -103,7 +98,7 @@ def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str
     """Return the fault of a joystick, and what to do; None where it is as it should be."""
     command = deployment.axes[name].config.command
     own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
-    least, most = _extremes(axis)
+    least, most = axis.reach
     text = None
     if max(-least, most) < MOVED and moved:
         text = f"{moved[0]} moved, and {own} of the file did not: put its message into joysticks:"
@@ -122,16 +117,15 @@ def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str
     return f"{name}: {text}" if text else None
 
 
-def _write(deployment: Deployment, wrong: dict[str, tuple[str, str]]) -> list[str]:
+def _write(deployment: Deployment, wrong: dict[str, tuple[str, str]]) -> None:
     values = {n: {"joystick": j, "signal": signal} for n, (j, signal) in wrong.items()}
     change(deployment.path, [(("axes", n, "command"), one, "") for n, one in values.items()])
-    return []
 
 
 def figure(axes: dict[str, AxisTraffic]) -> Figure:
     """The command of each axis over time, as the file reads it."""
     height = 150 + 260 * len(axes)
-    fig = style.new_figure(style.WIDTH_PX, height, dpi=style.PRINT_DPI)
+    fig = style.print_figure(height)
     for number, (name, axis) in enumerate(axes.items()):
         bottom = height - 90 - 260 * (number + 1) + 85
         panel = fig.add_axes((0.11, bottom / height, 0.86, 150 / height))
@@ -142,10 +136,8 @@ def figure(axes: dict[str, AxisTraffic]) -> Figure:
         panel.plot(axis.joystick.time_s, values, color=style.SHAPED_COLOUR, linewidth=1.4)
         panel.set_xlim(0.0, MOVE_S)
         panel.set_ylim(-110.0, 110.0)
-        panel.set_ylabel("joystick, %", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    panel.set_xlabel("time, s", fontsize=style.TEXT_PT, color=style.TEXT_COLOUR)
-    title = "Each joystick, moved to both of its ends"
-    fig.suptitle(title, x=0.012, ha="left", fontsize=style.HEAD_PT, weight="bold")
+        style.label(panel, "time, s", "joystick, %")
+    style.headline(fig, "Each joystick, moved to both of its ends")
     return fig
 
 

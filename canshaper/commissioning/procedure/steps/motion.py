@@ -1,12 +1,11 @@
 """The first motion, at reduced speed: right axis, right direction, and neutral at once."""
 
-from bisect import bisect_right
-from collections.abc import Sequence
+import math
 from functools import partial
-from itertools import pairwise
-from statistics import fmean
 
-from canshaper.commissioning.identification.commands import Samples
+import numpy as np
+
+from canshaper.commissioning.identification.series import Command
 from canshaper.commissioning.procedure.bench import Mode, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.check import MOTION
@@ -83,9 +82,8 @@ def run(context: Context) -> Outcome:
     return outcome
 
 
-def _begin(deployment: Deployment, names: list[str]) -> list[str]:
+def _begin(deployment: Deployment, names: list[str]) -> None:
     change(deployment.path, [(("motion", name), {"waits": None}, "") for name in names])
-    return []
 
 
 def _follows(axis: AxisTraffic) -> bool:
@@ -93,40 +91,22 @@ def _follows(axis: AxisTraffic) -> bool:
 
     Slew moves near-far a little too, so what it does besides says nothing.
     """
-    held = _held_at(axis)
-    farthest = max((abs(command) for command, _ in held), default=0.0)
-    for side in (1.0, -1.0):
-        sent = [side * valve for command, valve in held if side * command > 0.5 * farthest]
-        if not sent or fmean(sent) < LEAST_MOVED:
-            return False
-    return True
-
-
-def _held_at(axis: AxisTraffic) -> list[tuple[float, float]]:
-    """Joystick and valve at every frame of the joystick."""
-    times, values = axis.valve.time_s, axis.valve.value
-    pairs = []
-    for time_s, command in zip(*_columns(axis.joystick), strict=True):
-        number = bisect_right(times, time_s) - 1
-        pairs.append((command, values[number] if number >= 0 else 0.0))
-    return pairs
-
-
-def _columns(samples: Samples) -> tuple[Sequence[float], Sequence[float]]:
-    return samples.time_s, samples.value
+    time_s, joystick = axis.joystick.arrays()
+    valve = Command(*axis.valve.arrays()).at(time_s)
+    far = 0.5 * np.abs(joystick).max(initial=0.0)
+    sent = [side * valve[side * joystick > far] for side in (1.0, -1.0)]
+    return all(len(one) and one.mean() >= LEAST_MOVED for one in sent)
 
 
 def _releases(axis: AxisTraffic) -> list[float]:
     """How long the valve took to neutral each time the enable was let go while it moved."""
+    (time_s, valve), (at_s, enabled) = axis.valve.arrays(), axis.enabled.arrays()
     times_s = []
-    times, values = _columns(axis.valve)
-    enabled = list(zip(*_columns(axis.enabled), strict=True))
-    for (_, before), (time_s, now) in pairwise(enabled):
-        if before and not now:
-            moving = [v for t, v in zip(times, values, strict=True) if t < time_s]
-            if moving and abs(moving[-1]) > LEAST_MOVED:
-                after = (t for t, v in zip(times, values, strict=True) if t >= time_s and not v)
-                times_s.append(next(after, float("inf")) - time_s)
+    for released_s in at_s[1:][(enabled[:-1] > 0.0) & (enabled[1:] == 0.0)]:
+        after = np.searchsorted(time_s, released_s)
+        if after and abs(valve[after - 1]) > LEAST_MOVED:
+            neutral_s = time_s[after:][valve[after:] == 0.0]
+            times_s.append(float(neutral_s[0] - released_s) if len(neutral_s) else math.inf)
     return times_s
 
 

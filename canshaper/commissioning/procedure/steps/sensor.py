@@ -1,14 +1,12 @@
 """Sign, delay, offset and noise of the sway sensors."""
 
 from functools import partial
-from pathlib import Path
 
 from canshaper.commissioning.plots import of_sensors
 from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
-from canshaper.commissioning.sensor.finding import DRIVE_IT, Finding, examine
+from canshaper.commissioning.sensor.finding import DRIVE_IT, examine, heading, table, write_sensors
 from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
-from canshaper.commissioning.sensor.report import heading, table, write_sensors
 from canshaper.machine.deployment import Deployment
 
 
@@ -36,17 +34,12 @@ def run(context: Context) -> Outcome:
     if any(finding.fit for finding in findings):
         outcome.figures[""] = partial(of_sensors, findings)
     given = None if bench.simulated else log
-    outcome.edit = partial(_write, findings=findings, log=given)
+
+    def edit(copy: Deployment) -> None:
+        write_sensors(copy, findings, given, live=False)
+
+    outcome.edit = edit
     return outcome
-
-
-def _write(deployment: Deployment, findings: list[Finding], log: Path | None) -> list[str]:
-    write_sensors(deployment, findings, log, live=False)
-    return []
-
-
-def _has_one(deployment: Deployment) -> bool:
-    return any(axis.sway_sensor for axis in deployment.axes.values())
 
 
 SENSOR = Step(
@@ -56,5 +49,5 @@ SENSOR = Step(
     run,
     writes="`sway_sensor`",
     needs=("swing", "valve"),
-    applies=_has_one,
+    applies=lambda deployment: any(axis.sway_sensor for axis in deployment.axes.values()),
 )

@@ -6,12 +6,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from canshaper.commissioning.identification.data import (
-    SIMULATED,
     logged,
     measured_in,
+    simulated_signals,
     timed_by_hand,
 )
 from canshaper.commissioning.identification.plot import figure
@@ -75,10 +73,10 @@ def run(context: Context) -> Outcome:
         log = context.folder / "swing.log"
         bench.drive(deployment, log, _task([*sources.signals], bench.raw_mode("swing")))
         logs.append(log)
-        findings += _identified([log], sources.signals, deployment, bench)
+        findings += _identified(log, sources.signals, context)
     for name, path in sources.tables.items():
         logs.append(path)
-        findings += _identified([path], {}, deployment, bench, axis=name)
+        findings += _identified(path, {}, context, axis=name)
     for name, values in sources.timed.items():
         timed: dict[str, float | None] = dict(zip(_TIMED, values, strict=True))
         findings.append(timed_by_hand(timed, [], name))
@@ -89,11 +87,12 @@ def run(context: Context) -> Outcome:
     outcome.files = [log for log in logs if log.parent == context.folder]
     usable = [one for one in advice if one.sway]
     if usable:
-        origin = _origin(logs, deployment, simulated=bench.simulated)
+        origin = measured_in([*map(str, logs)], deployment.messages)
+        origin |= {"source": "simulated"} if bench.simulated else {}
         outcome.edit = partial(_write, findings=findings, advice=usable, origin=origin)
     seen = [finding for finding in findings if finding.free or finding.driven]
     if seen:
-        outcome.figures[""] = partial(_figure, seen, advice)
+        outcome.figures[""] = lambda: figure(seen, headlines(seen, advice))
     return outcome
 
 
@@ -102,13 +101,10 @@ _TIMED = ("swings", "seconds", "first", "last")
 
 def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
     """Ask what shows the swing of each axis; of the simulated crane it is its own message."""
-    sources = _Sources()
+    sources, own = _Sources(), simulated_signals(deployment, deployment.messages)
     for name in axes:
         sensor = deployment.axes[name].sway_sensor
-        default = sensor.name if sensor else NONE
-        shown = SIMULATED.get(deployment.coordinates.get(name, ""), "")
-        if shown and not isinstance(deployment.messages.find(shown.partition(".")[0]), str):
-            default = shown
+        default = own.get(name, sensor.name if sensor else NONE)
         question = (
             f"swing: {name}: what shows it: MESSAGE.SIGNAL of the bus, file of a phone (.csv), or"
             " stopwatch SWINGS SECONDS FIRST LAST such as 10 23.6 20 5"
@@ -143,28 +139,11 @@ def _task(axes: Sequence[str], mode: Mode) -> Task:
 
 
 def _identified(
-    logs: Sequence[Path],
-    signals: dict[str, str],
-    deployment: Deployment,
-    bench: Bench,
-    axis: str | None = None,
+    log: Path, signals: dict[str, str], context: Context, axis: str | None = None
 ) -> list[Finding]:
-    with bench.person.progress("identifying") as on_progress:
-        return logged(
-            [*map(str, logs)],
-            signals,
-            deployment,
-            deployment.messages,
-            axis=axis,
-            channel=None,
-            about_s=None,
-            on_progress=on_progress,
-        )
-
-
-def _origin(logs: Sequence[Path], deployment: Deployment, *, simulated: bool) -> dict[str, Any]:
-    origin = measured_in([*map(str, logs)], deployment.messages)
-    return {**origin, "source": "simulated"} if simulated else origin
+    machine = context.deployment
+    with context.bench.person.progress("identifying") as shown:
+        return logged([str(log)], signals, machine, machine.messages, axis=axis, on_progress=shown)
 
 
 def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
@@ -195,15 +174,6 @@ def _write(
     return [f"NOTE: {name}: its gain schedule stays as it is" for name in scheduled]
 
 
-def _figure(findings: Sequence[Finding], advice: Sequence[Advice]) -> Figure:
-    return figure(findings, headlines(findings, advice))
-
-
-def swings(deployment: Deployment) -> bool:
-    """Whether any axis makes the grapple swing."""
-    return bool(swinging(deployment))
-
-
 SWING = Step(
     "swing",
     "Swing, recorded and identified",
@@ -211,5 +181,5 @@ SWING = Step(
     run,
     writes="`sway`",
     needs=("joysticks",),
-    applies=swings,
+    applies=swinging,
 )

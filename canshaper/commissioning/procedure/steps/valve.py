@@ -14,7 +14,7 @@ from canshaper.commissioning.calibration.write import (
 from canshaper.commissioning.plots import of_valve
 from canshaper.commissioning.procedure.bench import Bench
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
-from canshaper.commissioning.procedure.steps.swing import swinging, swings
+from canshaper.commissioning.procedure.steps.swing import swinging
 from canshaper.errors import CalibrationError
 from canshaper.machine.deployment import Deployment
 
@@ -83,11 +83,10 @@ def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
     return bench.person.answer(question, default)
 
 
-def _write(deployment: Deployment, results: dict[str, Calibration], simulated: bool) -> list[str]:
+def _write(deployment: Deployment, results: dict[str, Calibration], simulated: bool) -> None:
     for name, result in results.items():
         bus = deployment.config.buses[deployment.axes[name].config.valve.bus]
         write_curve(deployment, name, result, simulated=simulated or bus.is_virtual)
-    return []
 
 
 VALVE = Step(
@@ -97,5 +96,5 @@ VALVE = Step(
     run,
     writes="`limits.curve_*`",
     needs=("joysticks",),
-    applies=swings,
+    applies=swinging,
 )
