@@ -195,7 +195,7 @@ def rows_of_more() -> list[list[Part]]:
             Part(
                 "target",
                 "self-test of an export on an emulated Cortex-M4F",
-                [pytest("tests/native/test_target.py")],
+                [pytest("-s", "tests/native/test_target.py")],
                 no_target,
             )
         ],

@@ -19,8 +19,7 @@ from canshaper.codec.layout import CLASSICAL_BYTES
 from canshaper.design.lockstep import Joysticks
 from canshaper.errors import ConfigError, NativeError
 from canshaper.machine.deployment import Deployment
-from canshaper.native.fmu import FMU_FILES
-from canshaper.native.library import NativeLibrary
+from canshaper.native.library import FMU_FILES, NativeLibrary
 from canshaper_sim.axes import TIP_AXES
 from canshaper_sim.crane import FULL_SPEEDS, INTERNAL_STEP_S, CraneParameters
 from canshaper_sim.cranes import cranes
@@ -36,16 +35,10 @@ QUICK = ("-O3", "-flto", "-fno-semantic-interposition")
 PROBES = 256  # of sine, cosine and exponential function, which libraries round differently
 _FRAME_BYTES = 12
 _ARRIVAL = np.dtype([("number", "i4"), ("changed", "u1", CLASSICAL_BYTES)])
-_VALVE = [
-    "dead_time_s",
-    "deadband",
-    "negative_more_deadband",
-    "hysteresis",
-    "negative_gain",
-    "flow_limit",
-    "rate_limit_1_s",
-    "lag_s",
-]
+_VALVE = (
+    *("dead_time_s", "deadband", "negative_more_deadband", "hysteresis"),
+    *("negative_gain", "flow_limit", "rate_limit_1_s", "lag_s"),
+)
 _MEASURES = (
     *("still_s", "residual_deg", "peak_deg", "run_on_s", "run_on_m"),
     *("travel_error_s", "dip_pct"),
@@ -133,15 +126,14 @@ class NativeCrane:
         self._wiring = [_wiring(deployment, axes.get(one)) for one in TIP_AXES]
 
         still = Script("still", (), 1.0)
-        self._hand = Hand(deployment)
-        self._drive = _drive_type(len(self._hand.cycles_ms))
+        self._cycles_ms = Hand(deployment).cycles_ms
+        self._drive = _drive_type(len(self._cycles_ms))
         self._neutral = []  # anti-sway on, off
         for off in (False, True):
             first = JoystickNode(deployment, still, bypass=off).frames(0)
-            pairs = [*zip(self._hand.cycles_ms, first, strict=True)]
+            pairs = zip(self._cycles_ms, first, strict=True)
             self._neutral.append(tuple((ms, tuple(one.data)) for ms, one in pairs))
-            sent = [(ms, bytes(len(one.data))) for ms, one in pairs]
-        self._numbered = Numbered(self._hand, sent)
+        self._numbered = Numbered(JoystickNode(deployment, still))
 
     def has(self, setting: Setting) -> bool:
         """Whether the C has a part for all of the crane that was drawn."""
@@ -194,13 +186,11 @@ class NativeCrane:
         arrivals: Sequence[Any] = (None, None)
         if disturb := options.get("disturb"):
             arrivals = self._arrivals(disturb(self._numbered), ticks)
-        frames_n = sum(ticks * tick_ms // ms + 1 for ms in self._hand.cycles_ms)
-        empty, measures = (
-            np.array(grapple_numbers(parameters.grapple)),
-            np.zeros(len(_MEASURES) + 1),
-        )
+        frames_n = sum(ticks * tick_ms // ms + 1 for ms in self._cycles_ms)
+        empty = np.array(grapple_numbers(parameters.grapple))
         loaded = np.array([[at, *grapple_numbers(one)] for at, one in loads])
         made, columns = np.empty(frames_n * _FRAME_BYTES, np.uint8), np.empty((_COLUMNS, ticks))
+        measures = np.zeros(len(_MEASURES) + 1)
         arrays = [empty, loaded, np.array(strokes), made, *arrivals, columns, measures]
         at = (None if one is None else one.ctypes.data_as(ctypes.c_void_p) for one in arrays)
         self._c.cs_drive(ctypes.byref(drive), *at)

@@ -11,7 +11,6 @@ import numpy as np
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Joysticks
 from canshaper_sim.axes import WITHOUT_SWAY
-from canshaper_sim.hand import Hand
 from canshaper_sim.operator import random_script, reach_s
 from canshaper_sim.strokes import Script, Stroke
 
@@ -182,27 +181,22 @@ class _Disturbed:
 
 
 class Numbered:
-    """Joystick frames as numbers, in the order in which the C makes them, and no bit of them set.
+    """Joystick frames with their numbers for ids, and no bit of them set, the same in every drive.
 
     Args:
-        hand: when they are due.
-        sent: cycle, ms, and bytes of each joystick's.
+        joysticks: those who hold them, whatever they do.
     """
 
-    def __init__(self, hand: Hand, sent: Sequence[tuple[int, bytes]]) -> None:
-        self._hand, self._sent, self._numbers = hand, sent, count()
-        self._by_tick: list[list[Frame]] = []  # the same in every drive
+    def __init__(self, joysticks: Joysticks) -> None:
+        self._joysticks, self._numbers = joysticks, count()
+        self._by_tick: list[list[Frame]] = []
 
-    def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
+    def frames_of_tick(self, time_ms: int, tick_ms: int) -> Sequence[Frame]:
         """Frames that came since the last tick, in order."""
-        while len(self._by_tick) * tick_ms <= time_ms:
+        while (at_ms := len(self._by_tick) * tick_ms) <= time_ms:
+            sent = self._joysticks.frames_of_tick(at_ms, tick_ms)
             self._by_tick.append(
-                [
-                    Frame("", next(self._numbers), False, data)
-                    for ms in self._hand.due(len(self._by_tick) * tick_ms, tick_ms)
-                    for cycle_ms, data in self._sent
-                    if ms % cycle_ms == 0
-                ]
+                [Frame("", next(self._numbers), False, bytes(len(one.data))) for one in sent]
             )
         return self._by_tick[time_ms // tick_ms]
 

@@ -23,6 +23,7 @@ from canshaper.native.tables import Numbers, tables
 from canshaper.shipped import PACKAGE
 
 C_FILES = PACKAGE / "native" / "c"
+FMU_FILES = C_FILES.with_name("fmu")
 # Never -ffast-math, never contracted: equality to the last bit hangs on them.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math")
 COMPILERS = ("cc", "gcc", "clang")

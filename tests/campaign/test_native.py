@@ -18,7 +18,7 @@ from canshaper.config.uncertainty import Uncertainty
 from canshaper.design.parallel import Processes
 from canshaper.errors import CampaignError, ConfigError, NativeError
 from canshaper.machine.binding import load_deployment
-from canshaper.native.fmu import FMU_FILES
+from canshaper.native.library import FMU_FILES
 from canshaper_sim.strokes import Script
 from tests.native.judge import needs_compiler
 from tests.rigs.files import CONFIG, machine_file
@@ -114,7 +114,7 @@ PLANTED = {
     "code": ("cs_number.h", "rint(((value", "floor(((value"),
     "rest": ("cs_measure.c", "(fabs(joystick) <= 0.02)", "(fabs(joystick) <= 0.2)"),
     "dwell": ("cs_measure.c", "from + d->dwell_s", "from + 2.0 * d->dwell_s"),
-    "travel": ("cs_measure.c", "fabs(way - asked)", "fabs(way)"),
+    "travel": ("cs_measure.c", " - cs_sum_value(&asked)", ""),
     "dip": ("cs_measure.c", "- (held_most - held)", "+ 0 * (held_most - held)"),
     "crossing": ("cs_measure.c", "at += share", "at += 0 * share"),
 }

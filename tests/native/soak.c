@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cs_internal.h"
+#include "cs_number.h"
 #include "cs_selftest.h"
 
 #define BYTES 64 /* of a frame of CAN FD */
@@ -54,11 +54,6 @@ static void move(hand *h, int32_t numbers)
     if (one_in(1000)) { h->count += (int32_t)(any() % 9); }
 }
 
-static void number_write(const cs_number_config *c, uint8_t *data, cs_real value)
-{
-    cs_field_write(&c->field, data, (int32_t)rint((double)(((value * c->full) - c->offset) / c->scale)));
-}
-
 static void receive(cs_controller *s, const cs_message_config *m, uint8_t *data, int64_t now)
 {
     if (one_in(500)) {
@@ -85,7 +80,7 @@ static void receive_all(cs_controller *s, hand *hands, cs_real *radius_m, int64_
         cs_field_write(&c->reset, data, h->reset);
         cs_field_write(&c->off, data, h->off);
         cs_field_write(&c->message.counter, data, h->count);
-        for (int32_t k = 0; k < c->numbers_n; k++) { number_write(&c->number[k], data, h->held[k]); }
+        for (int32_t k = 0; k < c->numbers_n; k++) { cs_number_write(&c->number[k], data, h->held[k]); }
         receive(s, &c->message, data, now);
     }
     for (int32_t i = 0; i < cs_tables.motions_n; i++) {
@@ -93,7 +88,7 @@ static void receive_all(cs_controller *s, hand *hands, cs_real *radius_m, int64_
         uint8_t data[BYTES] = {0};
         *radius_m += (CS_R(any() % 2001) - 1000) / 100000;
         *radius_m = cs_max(cs_min(*radius_m, c->radius.high), c->radius.low);
-        number_write(&c->radius, data, *radius_m);
+        cs_number_write(&c->radius, data, *radius_m);
         if (c->measured && !one_in(33)) { receive(s, &c->message, data, now); }
     }
     if (one_in(2000)) {

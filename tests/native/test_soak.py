@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.native.library import C_FILES
+from canshaper.native.library import C_FILES, FMU_FILES
 from canshaper.native.source import sizes_source, tables_source
 from canshaper.native.tables import tables
 from tests.rigs.files import CONFIG, read
@@ -35,7 +35,7 @@ def built(name: str, folder: Path, *command: str, float_: bool = False) -> Path:
     numbers = tables(read(CONFIG / f"{name}.yaml"))
     (folder / "cs_sizes.h").write_text(sizes_source(numbers), encoding="ascii")
     (folder / "cs_tables.c").write_text(tables_source(numbers), encoding="ascii")
-    places = [f"-I{folder}", f"-I{C_FILES}/src", f"-I{C_FILES}/test"]
+    places = [f"-I{folder}", f"-I{C_FILES}/src", f"-I{C_FILES}/test", f"-I{FMU_FILES}"]
     files = [*(C_FILES / "src").glob("*.c"), C_FILES / "test/cs_inspect.c", SOAK]
     files.append(folder / "cs_tables.c")
     done = folder / command[0]

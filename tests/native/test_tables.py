@@ -113,7 +113,7 @@ def test_the_numbers_are_exact() -> None:
     source = tables_source(found)
     first, second, *_ = found["axis"][0]["runs"]
     assert (first["end"], second["end"], len(found["axis"][0]["runs"])) == (2, 3, 9)
-    assert f"{{{{.end = 2, .tap = R({first['tap'].hex()})}}, {{.end = 3, .tap = R(" in source
+    assert f"{{.end = 2, .tap = R({first['tap'].hex()})}},\n    {{.end = 3, .tap = R(" in source
     assert ".run_on = HUGE_VAL" in source  # of lift, which no distance bounds
     assert "#define CS_TAPS 91\n#define CS_WINDOW 111\n" in sizes_source(found)
 
@@ -127,5 +127,5 @@ def test_the_sign_of_a_zero_is_kept() -> None:
 def test_no_line_of_the_source_is_code() -> None:
     source = tables_source(tables(read(CONFIG / "forwarder-joints.yaml")))
     for line in source.splitlines():
-        starts = ("static const ", "const cs_config ", "#", "/*", "    {", "};", "}")
+        starts = ("const cs_config ", "#", "/*", "    {")
         assert not line or line.startswith(starts), line

@@ -27,21 +27,22 @@ bool cs_within(cs_real velocity, cs_real low, cs_real high, cs_real minimum, cs_
 /* Add without an error (Shewchuk 1997). */
 void cs_sum_add(cs_sum *s, cs_real x)
 {
+    cs_real sum = x;
     int32_t kept = 0;
     for (int32_t i = 0; i < s->n; i++) {
         cs_real part = s->part[i];
-        bool swap = CS_ABS(x) < CS_ABS(part);
-        cs_real large = swap ? part : x;
-        cs_real small = swap ? x : part;
-        x = large + small;
-        small -= x - large;
+        bool swap = CS_ABS(sum) < CS_ABS(part);
+        cs_real large = swap ? part : sum;
+        cs_real small = swap ? sum : part;
+        sum = large + small;
+        small -= sum - large;
         if (small != 0) {
             s->part[kept] = small;
             kept++;
         }
     }
-    if ((x != 0) && (kept < CS_PARTS)) {
-        s->part[kept] = x;
+    if ((sum != 0) && (kept < CS_PARTS)) {
+        s->part[kept] = sum;
         kept++;
     }
     s->n = kept;
