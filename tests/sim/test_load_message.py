@@ -7,7 +7,7 @@ import pytest
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
-from tests.rigs.files import machine_file
+from tests.rigs.files import ROOT, machine_file
 
 LOG = ["log.grip_s=0.25", "log.mass_kg=600"]
 
@@ -35,12 +35,12 @@ def test_the_rope_is_sent_in_the_message_of_the_file(tmp_path: Path) -> None:
     cycle = 'BA_ "GenMsgCycleTime" BO_ 1100 100;\nBA_ "GenMsgCycleTime" BO_ 1041 '
     dbc = dbc.replace("BO_ 1041 ", own, 1).replace('BA_ "GenMsgCycleTime" BO_ 1041 ', cycle)
     (tmp_path / "own.dbc").write_text(dbc, encoding="utf-8")
-    text = (ROOT / "config" / "bridge-crane.yaml").read_text(encoding="utf-8")
-    text = text.replace("../dbc/bridge-crane.dbc", "own.dbc")
-    text = text.replace("message: CranePosition, signal: RopeLength", "message: Winch, signal: Out")
-    text = text.replace("lowest_m: 1.5,", "offset_m: 1, lowest_m: 1.5,")
-    file = tmp_path / "machine.yaml"
-    file.write_text(text, encoding="utf-8")
+    changes = (
+        (str(ROOT / "dbc" / "bridge-crane.dbc"), "own.dbc"),
+        ("message: CranePosition, signal: RopeLength", "message: Winch, signal: Out"),
+        ("lowest_m: 1.5,", "offset_m: 1, lowest_m: 1.5,"),
+    )
+    file = machine_file(tmp_path, "bridge-crane", *changes)
     plant = PlantNode(load_deployment(file), listeners=False)
     sent = []
     for _ in range(9):
