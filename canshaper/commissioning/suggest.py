@@ -18,7 +18,7 @@ from canshaper.machine.used_message import contrary_fault
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
 ENABLING = re.compile(r"(?<!in)(?<!not )(active|enable|operat|ready)|^on$", re.IGNORECASE)
 RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
-ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.?off", re.IGNORECASE)
+ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.{0,8}off", re.IGNORECASE)
 SWAY = re.compile(r"sway|swing|slope|tilt|incl", re.IGNORECASE)
 NEUTRAL = re.compile(r"neutral|centre|center|rest", re.IGNORECASE)
 NEGATIVE = re.compile(r"neg|left|back|down|minus", re.IGNORECASE)

@@ -1,15 +1,16 @@
 """The crane as a node on CAN: valve frames in, feedback frames out. No clock, no sockets."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.message import UNPROTECTED, Sender, SentMessage, SequenceChecker
 from canshaper.codec.signals import find_signal
-from canshaper.config.schema import FeedbackSection
 from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundValue, Choosing
+from canshaper.machine.inputs import BoundValue
 from canshaper_sim.axes import JOINTS, LUFFING, OVERHEAD, ROTATOR, SLEW, TIP, TOWER
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
@@ -106,51 +107,68 @@ class _ValveInput:
         return known
 
 
-class _ValveFeedback:
-    """What a valve says of itself: how far it is open, each cycle of its message."""
+class _Measurement:
+    """A message with one number that the deployment reads, sent each cycle.
 
-    def __init__(self, moves: str, bound: BoundValue[FeedbackSection]) -> None:
-        config = bound.config
+    Args:
+        bound: the message and its signal.
+        value: the number, read off the crane.
+        first_s: when it is sent first.
+    """
+
+    def __init__(
+        self, bound: BoundValue[Any], value: Callable[[Crane], float], first_s: float = 0.0
+    ) -> None:
         source = VALVE_ADDRESS if bound.any_source else bound.key[1] & 0xFF
-        self._moves = moves
-        self._signal = config.signal
-        self._full = config.full or float(bound.signal.maximum or 0.0)
-        self._sender = SentMessage(config.bus, bound.message, source, bound.protection).sender()
-        self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
-        self._left_s = self._cycle_s
+        self._signal, self._value = bound.signal.name, value
+        self._sender = SentMessage(
+            bound.config.bus, bound.message, source, bound.protection
+        ).sender()
+        self._cycle_s = cycle_s(bound)
+        self._left_s = first_s
 
     def frames(self, crane: Crane, passed_s: float) -> Iterator[Frame]:
         """The frame, when it is due after so much more time."""
         self._left_s -= passed_s
         if self._left_s <= 1e-9:
             self._left_s += self._cycle_s
-            value = self._full * crane.opening(self._moves)
-            yield self._sender.frame({self._signal: self._sender.fields.raw(self._signal, value)})
+            raw = self._sender.fields.raw(self._signal, self._value(crane))
+            yield self._sender.frame({self._signal: raw})
 
 
-class _LoadMessage:
-    """Send the load, each cycle: kg, or in any other unit whether there is one.
+def cycle_s(bound: BoundValue[Any]) -> float:
+    """Time between two messages, as the file or the DBC says it."""
+    return (bound.config.cycle_ms or bound.message.cycle_time or 100) / 1000.0
 
-    Args:
-        bound: the signal that the deployment reads.
-    """
 
-    def __init__(self, bound: BoundValue[Choosing]) -> None:
-        self._signal = bound.signal
-        self._sender = SentMessage(
-            bound.config.bus, bound.message, bound.key[1] & 0xFF, bound.protection
-        ).sender()
-        self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
-        self._left_s = 0.0
+def _measurements(deployment: Deployment, sent: Mapping[str, Sender]) -> Iterator[_Measurement]:
+    """Yield what the deployment reads and the crane does not send anyway: valves, load, rope."""
+    for axis, bound in deployment.axes.items():
+        if valve := bound.feedback:
+            moves = deployment.coordinates.get(axis, axis)
+            full = valve.config.full or float(valve.signal.maximum or 0.0)
+            yield _Measurement(valve, partial(_opening, moves, full), cycle_s(valve))
+    load = deployment.load_state
+    if load and load.message.name not in sent:
+        yield _Measurement(load, partial(_load, kg=load.signal.unit == "kg"))
+    ropes = {one.rope.key: one.rope for one in deployment.axes.values() if one.rope}
+    for rope in ropes.values():
+        if rope.message.name not in sent:
+            yield _Measurement(rope, partial(_rope_m, rope.config.offset_m))
 
-    def frames(self, gripped_kg: float, passed_s: float) -> Iterator[Frame]:
-        """The frame, when it is due after so much more time."""
-        self._left_s -= passed_s
-        if self._left_s <= 1e-9:
-            self._left_s += self._cycle_s
-            value = gripped_kg if self._signal.unit == "kg" else float(gripped_kg > 0.0)
-            name = self._signal.name
-            yield self._sender.frame({name: self._sender.fields.raw(name, value)})
+
+def _opening(moves: str, full: float, crane: Crane) -> float:
+    return full * crane.opening(moves)
+
+
+def _load(crane: Crane, *, kg: bool) -> float:
+    """Kg, or in any other unit whether there is a load."""
+    return crane.gripped_kg if kg else float(crane.gripped_kg > 0.0)
+
+
+def _rope_m(offset_m: float, crane: Crane) -> float:
+    assert isinstance(crane.boom, OverheadBoom)  # no other crane has an axis on a rope
+    return crane.boom.signal_m - offset_m
 
 
 class PlantNode:
@@ -217,16 +235,9 @@ class PlantNode:
             self._machine: Machine = ValveDrivenCrane(crane)
         else:
             self._machine = build_machine(name, parameters, sway)
-        self._valve_feedback = [
-            _ValveFeedback(deployment.coordinates.get(axis, axis), bound.feedback)
-            for axis, bound in deployment.axes.items()
-            if bound.feedback
-        ]
+        self._measurements = [*_measurements(deployment, self._senders)]
         sensors = parameters.sway_sensor
         self._sway_sensors = sensor_messages(deployment, sensors)
-        load = deployment.load_state
-        its_own = load is not None and load.message.name not in self._senders
-        self._load = _LoadMessage(load) if load and its_own else None
         self._canopen = CanopenSide(deployment)
         self._passed_s = 0.0
         self._inputs = {axis: _ValveInput(axis, deployment) for axis in deployment.axes}
@@ -267,10 +278,8 @@ class PlantNode:
         """What the valves say of themselves, pose, speeds and sway as frames."""
         state = self.crane.state
         frames = self._measured(state) if self._feedback else []
-        for valve in self._valve_feedback:
-            frames += valve.frames(self.crane, self._passed_s)
-        if self._load:
-            frames += self._load.frames(self.crane.gripped_kg, self._passed_s)
+        for one in self._measurements:
+            frames += one.frames(self.crane, self._passed_s)
         for sensors in self._sway_sensors:
             due = sensors.frames(state, self._passed_s)
             frames += [frame for frame in due if self._canopen.works(frame.bus, sensors.node)]

@@ -97,7 +97,7 @@ def test_what_has_no_word_in_common_is_not_proposed(tmp_path: Path) -> None:
     dbc = made(tmp_path, ONE)
     text = dbc.read_text().replace("SG_ Slew", "SG_ STEER_RATE").replace("SlewValve", "STEER2")
     dbc.write_text(text)
-    assert "no axis was named" in of_dbc(tmp_path, [dbc], "").output
+    assert "no axis has a valve command" in of_dbc(tmp_path, [dbc], "").output
     answers = "steer_rate: valve command = STEER2.Velocity\n"
     assert of_dbc(tmp_path, [dbc], answers).exit_code == 0
 

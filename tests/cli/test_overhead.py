@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
 from tests.rigs.overhead import FILE, changed
 
 
@@ -23,6 +24,31 @@ def test_the_first_file_takes_a_hoist_for_an_axis_that_makes_nothing_swing(tmp_p
     run("init", str(file), "--dbc", dbc, "--answers", str(answers))
     hoist = file.read_text().partition("\n  hoist:\n")[2].split("\n\n")[0]
     assert "filter: { kind: off }" in hoist
+
+
+def test_the_first_file_knows_a_winch_a_switch_by_other_words_and_a_valve_message_of_all(
+    tmp_path: Path,
+) -> None:
+    names = ("bridge", "trolley", "winch")
+    signals = "".join(
+        f' SG_ {name}Hz : {16 * k}|16@1- (0.01,0) [-100|100] "" DRIVES\n'
+        for k, name in enumerate(names)
+    )
+    text = (FILE.parents[1] / "dbc" / "bridge-crane.dbc").read_text()
+    text = text.replace("BO_ 529 ", f"BO_ 531 Drives: 8 SHAPER\n{signals}\nBO_ 529 ", 1)
+    text = text.replace("AntiSwayOff", "SwayControlOff").replace("SG_ Hoist :", "SG_ Winch :")
+    text = text.replace("VAL_ 289 Hoist", "VAL_ 289 Winch")
+    cycle = 'BA_ "GenMsgCycleTime" BO_ 528 20;\n'
+    text = text.replace(cycle, cycle + cycle.replace("528", "531"))
+    dbc, answers, file = (tmp_path / name for name in ("own.dbc", "answers.txt", "own.yaml"))
+    dbc.write_text(text)
+    lines = (f"{name}: valve command = Drives.{name}Hz\n" for name in names)
+    answers.write_text("".join(lines))
+    run("init", str(file), "--dbc", str(dbc), "--answers", str(answers))
+    config = load_deployment(file).config
+    assert {one.anti_sway_off for one in config.joysticks.values()} == {"SwayControlOff"}
+    assert {one.valve.signal for one in config.axes.values()} == {f"{name}Hz" for name in names}
+    assert config.axes["winch"].sway is None
 
 
 @pytest.mark.slow

@@ -83,7 +83,7 @@ def test_a_jump_of_the_radius_is_followed_within_a_second() -> None:
 
 
 @pytest.mark.parametrize("path", [0.5, -0.5])
-def test_an_axis_without_rights_adds_in_the_range_of_its_demands(path: float) -> None:
+def test_luffing_adds_in_the_range_of_its_demands(path: float) -> None:
     stage = OutputStage(OutputLimits(rise_per_s=5.0, fall_per_s=5.0), 125, TICK_S, spreads=False)
     for _ in range(20):
         stage.drive(0.8, 0.8, 0.6, path, 0.0, sensor_damps=False)

@@ -43,7 +43,7 @@ def add_axes(
         default = f"{joystick.name}_{likely}" if likely in names else likely
         text = f"Axis of {message.name}.{command.name}, - for none"
         axis = ask(text, name(names), default if two_sided else NONE)
-        valve = None if axis == NONE else _valve_of(axis, command, others)
+        valve = None if axis == NONE else _valve_of(axis, command, others, axes)
         if valve is None:
             continue
         sender, signal = valve
@@ -83,11 +83,22 @@ def add_axes(
         )
 
 
-def _valve_of(axis: str, command: Signal, others: list[Message]) -> tuple[Message, Signal] | None:
-    """Message and signal of the valve of an axis; it is taken from those that are left."""
+def _valve_of(
+    axis: str, command: Signal, others: list[Message], axes: list[FirstAxis]
+) -> tuple[Message, Signal] | None:
+    """Message and signal of the valve of an axis; it is taken from those that are left.
+
+    A message is left as long as it has another signal that can command one.
+    """
     candidates = suggest.valves(others, command.name)
     possible = [m for m in candidates if _valve_timeouts(m.cycle_time or 0) is not None]
-    commands = {f"{m.name}.{s.name}": (m, s) for m in possible for s in suggest.valve_signals(m)}
+    taken = {(one.valve, one.signal) for one in axes}
+    commands = {
+        f"{m.name}.{s.name}": (m, s)
+        for m in possible
+        for s in suggest.valve_signals(m)
+        if (m.name, s.name) not in taken
+    }
     if not commands:
         echo("  no message is left that can command its valve; axis left out")
         return None
@@ -97,7 +108,9 @@ def _valve_of(axis: str, command: Signal, others: list[Message]) -> tuple[Messag
     answer = ask(text, one([*commands, NONE]), first if alike else NONE)
     if answer == NONE:
         return None
-    others.remove(commands[answer][0])
+    message = commands[answer][0]
+    if sum(one is message for one, _ in commands.values()) == 1:
+        others.remove(message)
     return commands[answer]
 
 

@@ -68,7 +68,7 @@ def machine_of(
     for joystick, message in joysticks:
         add_axes(axes, joystick, message, others, nodes)
     if not axes:
-        raise UsageError("no axis was named; nothing is written")
+        raise UsageError("no axis has a valve command; nothing is written")
     motion = motion_of(axes, others)
     valves = {axis.valve for axis in axes}
     left = [message for message in messages if message.name not in valves]

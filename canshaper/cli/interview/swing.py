@@ -33,7 +33,7 @@ from canshaper.machine.named_codes import is_guess
 from canshaper.machine.sway_sensor import LEAST_FUSION
 
 # By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
-CALM = re.compile(r"lift|hoist|rotat|turn|grip|open|close", re.IGNORECASE)
+CALM = re.compile(r"lift|hoist|winch|rotat|turn|grip|open|close", re.IGNORECASE)
 SLEW = re.compile(r"slew|swing|swivel", re.IGNORECASE)
 NEAR_FAR = re.compile(r"near|far|radial|reach|crowd", re.IGNORECASE)
 SENSOR_CYCLES = 4  # of a sensor's message in its timeout
