@@ -88,7 +88,7 @@ def test_a_load_on_a_sling_hangs_as_the_crane_says() -> None:
 )
 def test_what_a_file_says_is_drawn(name: str, drawn: str) -> None:
     """Of a multicopter that hovers in the picture, as wide as its rope may swing."""
-    deployment = load_deployment(CONFIG / f"{name}.yaml")
+    deployment = read(CONFIG / f"{name}.yaml")
     said = drawn_of(changed_parameters([], deployment), deployment)
     assert said["drawn"] == drawn
     hall = {"runway": 10.0, "span": 10.0, "rope": 5.0, "sling": 0.0}
