@@ -105,9 +105,7 @@ def test_gff_keeps_the_run_on_and_stands_next_to_robust_shapers(
     """What no poles keep is left out; what is written is what was judged, tail included."""
     monkeypatch.setattr(fleet, "_DURATIONS", (0.8, 1.0))
     monkeypatch.setattr(fleet_report, "JUDGING", fleet.JUDGING)
-    path = tmp_path / "machine.yaml"
-    text = WITH_GFF.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    path.write_text(text, encoding="utf-8")
+    path = machine_file(tmp_path, WITH_GFF)
     deployment = load_deployment(path)
     asked, rows = design_fleet(deployment, GFF, 2.3, Processes(1), lambda _, __=None: None)
     assert [len(own) for own in rows.values()] == [1, 1, 1, 1]  # none settles in 1.84 s

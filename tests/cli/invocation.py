@@ -12,5 +12,5 @@ SHIPPED = ROOT / "config" / "forwarder.yaml"
 VERBS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 
 
-def invoke(*arguments: str) -> Any:
-    return CliRunner().invoke(app, list(arguments), prog_name="canshaper")
+def invoke(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(one) for one in arguments], prog_name="canshaper")

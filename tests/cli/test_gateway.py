@@ -1,23 +1,17 @@
 """The verb of the gateway without SocketCAN, and what the check reports about a gateway."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.errors import GatewayError
 from canshaper.protocols.gateway import cangw
 from canshaper.protocols.gateway.cangw import Rule, difference
 from canshaper.protocols.gateway.forwarding import Pattern
+from tests.cli.invocation import invoke
 from tests.rigs.files import ROOT, machine_file
 
 FILE = ROOT / "config" / "gateway-forwarder.yaml"
-
-
-def invoke(*arguments: str) -> Any:
-    return CliRunner().invoke(app, list(arguments), prog_name="canshaper")
 
 
 def test_a_file_without_a_gateway_has_no_rules() -> None:

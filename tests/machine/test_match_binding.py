@@ -14,7 +14,7 @@ from canshaper.daemon.ports import open_ports
 from canshaper.errors import BusError, ConfigError, WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.bus.fake_devices import FakeDevices
-from tests.rigs.files import machine_file
+from tests.rigs.files import line_of, machine_file
 
 ONE = "channel: vcan0, bitrate: 250000"
 TWO = "channel: vcan1, bitrate: 250000"
@@ -24,10 +24,6 @@ def machine(folder: Path, first: str, second: str | None = None) -> Path:
     """Two cranes, with ``match`` put behind the bit rate of their buses."""
     changes = (ONE, f"{ONE}, match: {first}"), (TWO, f"{TWO}, match: {second}" if second else TWO)
     return machine_file(folder, "two-cranes", *changes)
-
-
-def line_of(file: Path, text: str) -> int:
-    return next(n for n, line in enumerate(file.read_text().splitlines(), 1) if text in line)
 
 
 def test_a_match_is_read(tmp_path: Path) -> None:

@@ -5,15 +5,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
 
-from canshaper.cli.app import app
 from canshaper.commissioning.identification.canlog import is_simulated
 from canshaper.config.bus import Bus
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.rigs.files import ROOT, text_of
+from tests.cli.invocation import invoke
+from tests.rigs.files import ROOT, line_of, text_of
 
 MADE = "date: 2026-11-23, by: canshaper calibrate 0.1.0, source:"
 CURVE = "curve_command_pct: [-100, -5, 5, 100], curve_speed_pct: [-100, 0, 0, 100]"
@@ -30,15 +29,6 @@ def machine(tmp_path: Path, *, curve: str = "", sway: str = "", channel: str = "
     file = tmp_path / "machine.yaml"
     file.write_text(text)
     return file
-
-
-def invoke(*words: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
-def line_of(file: Path, text: str) -> int:
-    lines = file.read_text().splitlines()
-    return next(i for i, line in enumerate(lines, 1) if text in line)
 
 
 def test_check_warns_of_each_section_of_a_simulated_crane(tmp_path: Path) -> None:

@@ -56,6 +56,10 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
     ("text", "says"),
     [
         (
+            STOP.replace("Stop", "Halt"),
+            "emergency_stop.message: expected a message of the DBC files, got 'Halt'",
+        ),
+        (
             STOP.replace("Pressed", "Button"),
             "emergency_stop.signal: expected a signal of Stop, got 'Button'; there are Pressed,"
             " Count, Check,",

@@ -37,6 +37,11 @@ def machine_file(folder: Path, file: Path | str, *changes: tuple[str, str], more
     return path
 
 
+def line_of(file: Path, text: str) -> int:
+    """Line of a file that has this first."""
+    return next(n for n, line in enumerate(file.read_text().splitlines(), 1) if text in line)
+
+
 def faults(file: Path) -> list[str]:
     """Every problem of a deployment, without file and line."""
     with pytest.raises(ConfigError) as caught:

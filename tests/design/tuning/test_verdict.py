@@ -6,13 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
 
-from canshaper.cli.app import app
 from canshaper.design.tuning.evaluate import Machine, evaluate, gff
 from canshaper.design.tuning.verdict import GOOD, Verdict, judge, verdicts
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.sway import SwayMode
+from tests.cli.invocation import invoke
 from tests.design.tuning.random_machines import COUNT, judged
 from tests.rigs.files import ROOT
 
@@ -23,10 +22,6 @@ RATES = "rise_per_s: 5, fall_per_s: 5"
 
 def machine(**limits: float) -> Machine:
     return replace(Machine(), limits=replace(Machine().limits, **limits))  # type: ignore[arg-type]
-
-
-def run(*words: str) -> Result:
-    return CliRunner().invoke(app, words)
 
 
 def changed(file: Path, old: str, new: str) -> Path:
@@ -94,14 +89,14 @@ def test_tune_writes_nothing_useless_without_force(file: Path) -> None:
     before = file.read_bytes()
     words = ("tune", str(file), "--axis", "near_far", "--q", "100", "--write", "--starts", "1")
     out = ("--out", str(file.parent / "out"))
-    result = run(*words, *out)
+    result = invoke(*words, *out)
     assert result.exit_code == 1
     text = " ".join(result.output.split())
     assert "Verdict: useless: 53.5 % of the swing is left at the right length" in text
     assert "the filter in the file would leave 4.9 %" in text
     assert "Use a1" not in text
     assert file.read_bytes() == before
-    forced = run(*words, *out, "--force", "--json")
+    forced = invoke(*words, *out, "--force", "--json")
     assert forced.exit_code == 0
     data = json.loads(forced.stdout)
     assert data["verdict"]["word"] == "useless"
@@ -113,7 +108,7 @@ def test_tune_writes_nothing_useless_without_force(file: Path) -> None:
 def test_with_a_slow_valve_tune_is_no_worse_than_the_paper(file: Path) -> None:
     changed(file, RATES, "rise_per_s: 0.6, fall_per_s: 1")
     out = ("--out", str(file.parent / "out"))
-    result = run("tune", str(file), "--axis", "near_far", "--json", "--starts", "1", *out)
+    result = invoke("tune", str(file), "--axis", "near_far", "--json", "--starts", "1", *out)
     data = json.loads(result.stdout)
     before = next(r["machine"] for r in data["in_file"]["residuals"] if r["length_pct"] == 0)
     assert data["verdict"]["left"] < before
@@ -125,22 +120,22 @@ def test_robust_names_the_duration_that_a_slow_valve_needs(file: Path) -> None:
     changed(file, RATES, "rise_per_s: 0.6, fall_per_s: 1")
     before = file.read_bytes()
     words = ("robust", str(file), "--axis", "near_far")
-    result = run(*words, "--write")
+    result = invoke(*words, "--write")
     assert result.exit_code == 1
     assert file.read_bytes() == before
     cure = re.search(r"--duration ([\d.]+) would leave ([\d.]+) %", " ".join(result.output.split()))
     assert cure is not None
     changed(file, "tail_s: 2.0", "tail_s: 4.0")
-    then = json.loads(run(*words, "--duration", cure[1], "--json").stdout)["verdict"]
+    then = json.loads(invoke(*words, "--duration", cure[1], "--json").stdout)["verdict"]
     assert then["word"] == "good"
     assert 100.0 * then["left"] == pytest.approx(float(cure[2]), abs=1.0)
-    assert run(*words, "--write", "--force").exit_code == 0
+    assert invoke(*words, "--write", "--force").exit_code == 0
 
 
 @pytest.mark.parametrize("verb", ["tune", "robust"])
 def test_an_overdamped_tool_is_refused_with_the_bound(file: Path, verb: str) -> None:
     changed(file, "damping_nms: 120", "damping_nms: 2200")
-    result = run(verb, str(file), "--axis", "near_far", "--write")
+    result = invoke(verb, str(file), "--axis", "near_far", "--write")
     assert result.exit_code == 2
     assert "damping ratio: expected 0 to 0.3, got 0.891" in result.output
     assert result.output.count("\n") == 1
@@ -149,8 +144,8 @@ def test_an_overdamped_tool_is_refused_with_the_bound(file: Path, verb: str) -> 
 @pytest.mark.slow
 def test_an_undamped_tool_gets_a_good_filter(file: Path) -> None:
     changed(file, "damping_nms: 120", "damping_nms: 0")
-    assert "Verdict: good" in run("robust", str(file), "--axis", "near_far").output
-    printed = run("tune", str(file), "--axis", "near_far", "--pole-distance", "printed")
+    assert "Verdict: good" in invoke("robust", str(file), "--axis", "near_far").output
+    printed = invoke("tune", str(file), "--axis", "near_far", "--pole-distance", "printed")
     assert printed.exit_code == 2
     assert "allows no pole: the sway is undamped" in printed.output
 
@@ -167,7 +162,7 @@ def test_every_shipped_filter_is_good(path: Path) -> None:
 @pytest.mark.slow
 def test_check_warns_of_a_filter_that_does_not_damp(file: Path) -> None:
     changed(file, "a1: 0.708, a2: 0.12 } # near-far", "a1: 6, a2: 9 } # near-far")
-    result = run("check", str(file))
+    result = invoke("check", str(file))
     assert result.exit_code == 0
     line = (
         file.read_text()
@@ -175,7 +170,7 @@ def test_check_warns_of_a_filter_that_does_not_damp(file: Path) -> None:
         .index(next(row for row in file.read_text().splitlines() if "a1: 6" in row))
     )
     assert f"WARNING: {file}:{line + 1}: axes.near_far.filter: useless: " in result.output
-    data = json.loads(run("check", str(file), "--json").stdout)
+    data = json.loads(invoke("check", str(file), "--json").stdout)
     assert [(one["place"][1], one["word"]) for one in data["filters"]] == [
         ("slew", "good"),
         ("near_far", "useless"),
