@@ -1,4 +1,4 @@
-"""A machine and its controller for a program of one's own: frames in, frames out, no I/O."""
+"""A machine and its controller for one's own program: frames in, frames out, no I/O."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from canshaper.shipped import deployment_path
 
 
 def load_machine(file: str | Path) -> Deployment:
-    """Load a deployment file with its DBC files, and check the whole.
+    """Load a deployment file with its DBC files, and check everything.
 
     Args:
         file: path of the deployment file, or the name of one that comes with canshaper.
@@ -23,8 +23,8 @@ def load_machine(file: str | Path) -> Deployment:
         The machine. It does not change, and serves any number of controllers.
 
     Raises:
-        ConfigError: it must not start; ``problems`` has everything that is wrong, with file, line
-            and what is allowed.
+        ConfigError: the machine must not start; ``problems`` lists every fault with its file, line
+            and allowed values.
 
     Examples:
         >>> from canshaper import load_machine
@@ -39,9 +39,9 @@ class AxisState(NamedTuple):
     """State, reason and output of an axis.
 
     Attributes:
-        state: its state.
-        reason: why it is in it.
-        output: velocity that the valve frames carry, -1 to 1 of the full speed.
+        state: state of the axis.
+        reason: reason of this state.
+        output: velocity setpoint in the valve frames, -1 to 1 of full speed.
     """
 
     state: State
@@ -50,14 +50,14 @@ class AxisState(NamedTuple):
 
 
 class Controller:
-    """The controller of a machine with its gate: what the daemon runs, without buses.
+    """The controller of a machine with its gate, as the daemon runs it, but without buses.
 
-    It has no clock: times are the caller's, in ns, of one that never goes back. It belongs to one
-    thread. ``tick`` has to be called every ``machine.config.tick_ms``; where a valve gets no frame
-    for its timeout it closes by itself.
+    The controller has no clock: the caller passes times in ns, of a clock that never goes back. One
+    thread calls the controller. It calls ``tick`` every ``machine.config.tick_ms``: a valve that
+    gets no frame for its timeout closes by itself.
 
     Args:
-        machine: what ``load_machine`` gave.
+        machine: the result of ``load_machine``.
 
     Examples:
         Without a joystick every valve gets neutral, and the axes wait:
@@ -77,23 +77,23 @@ class Controller:
         self._guarded = Guarded(self._inner)
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Hand in a frame that came from a bus.
+        """Pass a received frame to the controller.
 
         Args:
-            frame: any frame; those that are not of the machine are passed over.
-            arrived_ns: when it arrived; not after the tick that follows.
+            frame: any frame; the controller ignores frames that the machine does not use.
+            arrived_ns: arrival of the frame, ns; not later than the next tick.
 
         Returns:
-            What it leaves as on the other bus of a gateway, to be sent at once; else None.
+            On a gateway the frame to send at once to the other bus; else None.
         """
         return self._guarded.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        """Compute one tick.
+        """Compute the frames of one tick.
 
         Args:
-            now_ns: time of the tick.
-            missed: ticks that should have come since the last one, and did not.
+            now_ns: time of the tick, ns.
+            missed: number of ticks that were due since the last one and did not run.
 
         Returns:
             The frames to send now, in this order.
@@ -101,20 +101,20 @@ class Controller:
         return list(self._guarded.tick(now_ns, missed))
 
     def send_failed(self, frame: Frame) -> None:
-        """Report that a frame of ``tick`` did not get onto its bus."""
+        """Report that a frame of ``tick`` was not sent."""
         self._guarded.send_failed(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """A neutral frame for every valve: the last thing to send before the program ends."""
+        """Return a neutral frame for every valve: the last frames before the program ends."""
         return self._guarded.neutral_frames()
 
     def axes(self) -> dict[str, AxisState]:
-        """Return the state of each axis by its name."""
+        """Return the state of each axis by name."""
         runners = self._inner.axes.items()
         return {name: AxisState(one.axis.state, one.reason, one.axis.sent) for name, one in runners}
 
     def events(self) -> list[Event]:
-        """Return the events since the last call: changes of states, valves, other nodes.
+        """Return the events since the last call: changes of axis states, valves and other nodes.
 
         Returns:
             Events, oldest first; each has a ``text`` as in the log of the daemon.

@@ -1,6 +1,6 @@
 """The closed loop without clock and bus: operator, controller and crane tick by tick.
 
-The controller is the daemon's own, and everything passes through the same frames.
+The loop runs the daemon's own controller and passes all data in the same frames.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,24 +30,24 @@ Received = Callable[[Key], bool]
 
 
 class Joysticks(Protocol):
-    """Source of joystick frames, as ``JoystickNode`` is."""
+    """A source of joystick frames, such as ``JoystickNode``."""
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> Sequence[Frame]:
-        """Frames that came since the last tick, in order."""
+        """Return the frames since the last tick, in order; times in ms."""
 
 
 class PlantPort:
-    """All buses of a machine at once, between the plant and the joysticks.
+    """One port in place of all buses of a machine, between controller, plant and joysticks.
 
     Args:
-        plant: the crane, which gets what is sent.
-        received: whether a socket of the machine lets frames of the crane with this bus, id and
-            format through; None where it lets all.
-        on_frame: called with every frame and its time in s; None where no one listens.
-        sends: all that may be sent, by bus, id and format; None without a limit.
+        plant: the crane, which receives the sent frames.
+        received: returns whether the machine's sockets pass frames of this bus, id and format;
+            None passes all.
+        on_frame: called with every frame and its time in s; None if nobody listens.
+        sends: the messages that may be sent, by bus, id and format; None without a limit.
 
     Attributes:
-        arrived_ns: every frame that waits came just before the tick.
+        arrived_ns: arrival time of every waiting frame: just before the tick.
     """
 
     def __init__(
@@ -66,13 +66,13 @@ class PlantPort:
         self._time_s = 0.0
 
     def begin(self, time_ms: int, frames: Sequence[Frame]) -> None:
-        """Begin a tick; these frames come from the joysticks, after those of the plant."""
+        """Begin a tick; these joystick frames wait behind the frames of the plant."""
         self.arrived_ns, self._time_s = time_ms * 1_000_000, time_ms / 1000.0
         self._report(frames, self._time_s)
         self._waiting += frames
 
     def end(self, step_s: float) -> None:
-        """End the tick: the plant moves until the next one, and sends what it measures."""
+        """End the tick: the plant moves for step_s seconds and sends its feedback."""
         self._plant.advance(step_s)
         frames = self._plant.feedback()
         self._report(frames, self._time_s + step_s)
@@ -85,7 +85,7 @@ class PlantPort:
                 self._on_frame(frame, time_s)
 
     def frames(self) -> Iterator[Frame]:
-        """Yield every frame that waits."""
+        """Yield every waiting frame."""
         waiting, self._waiting = self._waiting, []
         return iter(waiting)
 
@@ -94,7 +94,7 @@ class PlantPort:
         return iter(())
 
     def send(self, frame: Frame) -> bool:
-        """Send to the plant; what may not be sent is left out, as by a port that listens."""
+        """Send a frame to the plant; drop one that may not be sent, as a listen-only port does."""
         if self._sends is not None and frame[:3] not in self._sends:
             return True
         self._plant.receive(frame)
@@ -108,15 +108,15 @@ class LockStep:
 
     Args:
         deployment: the machine.
-        processor: the controller, or what stands around one.
+        processor: the controller, or a wrapper around it.
         plant: the crane.
-        joysticks: those who hold the joysticks.
-        on_frame: called with every frame and its time in s; None where no one listens.
+        joysticks: the sources of joystick frames.
+        on_frame: called with every frame and its time in s; None if nobody listens.
         received: see ``PlantPort``.
 
     Attributes:
-        time_ms: when the next tick is.
-        processor: as above; another one may take its place between two ticks.
+        time_ms: time of the next tick.
+        processor: the ``processor`` above; it may be replaced between two ticks.
     """
 
     def __init__(
@@ -163,13 +163,13 @@ class DriveOptions(TypedDict, total=False):
     Attributes:
         bypass: drive with anti-sway switched off.
         parameters: the crane; by default the nominal one.
-        machine: tip, tip-controller or joints; by default what the axes of the deployment say.
+        machine: one of ``MACHINES``; by default the one that the deployment's axes name.
         sway: swing of the grapple at the start; by default it hangs still.
-        loads: times in s at which something else hangs from the tip, and what.
-        prepare: called with the fresh controller, to put another filter in.
-        crane: which one moves, where the deployment has several; the others' joysticks stand still.
-        disturb: puts something between joysticks and bus.
-        unit: FMU in place of our crane.
+        loads: (time in s, grapple with its load) for each change of the load.
+        prepare: called with the new controller before the drive, to replace its filter.
+        crane: name of the crane that moves, if the deployment has several; the others stand still.
+        disturb: returns a source of frames that disturbs those of the joysticks.
+        unit: file of an FMU in place of our crane.
     """
 
     bypass: bool
@@ -184,7 +184,7 @@ class DriveOptions(TypedDict, total=False):
 
 
 def driven_part(deployment: Deployment, crane: str | None) -> Deployment:
-    """The part of a deployment that is one of its cranes; the whole where it has only one.
+    """Return the part of a deployment that belongs to this crane; the whole if crane is None.
 
     Raises:
         DriveError: no such crane.
@@ -200,9 +200,9 @@ class Simulation:
 
     Args:
         deployment: the machine; its buses are not opened.
-        script: what the operator does.
-        on_frame: called with every frame and its time in s; None where no one listens: then the
-            plant sends nothing that the controller does not receive.
+        script: the strokes of the operator.
+        on_frame: called with every frame and its time in s; None if nobody listens: then the
+            plant sends only frames that the controller receives.
         options: see ``DriveOptions``.
 
     Attributes:
@@ -211,7 +211,7 @@ class Simulation:
 
     Raises:
         ConfigError: the deployment does not fit the machine.
-        DriveError: nor does the script, or there is no such machine or start pose.
+        DriveError: the script does not fit the machine, or there is no such machine or start pose.
     """
 
     def __init__(
@@ -255,7 +255,7 @@ class Simulation:
         """Drive the script.
 
         Yields:
-            The time of each tick in ms, when the crane has moved on until the next one.
+            The time of each tick in ms, once the crane has moved until the next tick.
         """
         lock_step, loads = self._lock_step, self._loads
         while (time_ms := lock_step.time_ms) < self._end_ms:
@@ -277,17 +277,17 @@ def drive(
 
     Args:
         deployment: the machine; its buses are not opened.
-        script: what the operator does.
-        on_progress: called with the simulated seconds now and then.
+        script: the strokes of the operator.
+        on_progress: called once for each simulated second, with the simulated time in s.
         on_frame: called with every frame and its time in s.
         options: see ``DriveOptions``.
 
     Returns:
-        The recorded drive, one row a tick.
+        The recorded drive, one row for each sway frame of the crane.
 
     Raises:
         ConfigError: the deployment does not fit the machine.
-        DriveError: nor does the script, or there is no such machine or start pose.
+        DriveError: the script does not fit the machine, or there is no such machine or start pose.
     """
     driven = driven_part(deployment, options.get("crane"))
     recorder = Recorder(driven, options.get("parameters"))

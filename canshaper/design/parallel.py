@@ -1,4 +1,4 @@
-"""Many pieces of work on the processes of this machine."""
+"""Many independent jobs on the processors of this machine."""
 
 import multiprocessing
 import os
@@ -28,20 +28,20 @@ R = TypeVar("R")
 
 
 class _Queue(Generic[J]):
-    """Jobs that are still to do, each with how often its process died."""
+    """The jobs still to do, each with the number of deaths of its process."""
 
     def __init__(self, jobs: Iterable[J]) -> None:
         self._jobs = iter(jobs)
         self._again: deque[tuple[J, int]] = deque()
 
     def take(self) -> tuple[J, int] | None:
-        """Return the next job; None where there is none."""
+        """Return the next job and its number of deaths; None if no job is left."""
         if self._again:
             return self._again.popleft()
         return next(((job, 0) for job in self._jobs), None)
 
     def put_back(self, job: J, deaths: int) -> None:
-        """Put back a job whose process died."""
+        """Put back a job whose process died; raise CampaignError if it died too often."""
         if deaths + 1 >= MOST_DEATHS:
             raise CampaignError(f"the process died {MOST_DEATHS} times of {job}")
         self._again.append((job, deaths + 1))
@@ -49,25 +49,25 @@ class _Queue(Generic[J]):
 
 @dataclass
 class Processes:
-    """Processes of this machine.
+    """A pool of processes of this machine.
 
     Attributes:
-        count: how many; by default one a processor. With 1 the work is done in this one.
+        count: number of processes; by default one a processor. 1: in the calling process.
     """
 
     count: int | None = None
 
     def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Do every job once; each with its result, in any order.
+        """Do every job once; yield each job with its result, in any order.
 
-        Interrupted it ends at once, and so do its processes.
+        An interrupt ends it and its processes at once.
 
         Args:
-            work: what to do; a function of a module, or ``functools.partial`` of one.
+            work: function to call with each job: one of a module, or a ``functools.partial`` of it.
             jobs: taken one by one, a few more than are being done.
 
         Raises:
-            CampaignError: the processes die of a job.
+            CampaignError: the process of one job died again and again.
         """
         if self.count == 1:
             yield from ((job, work(job)) for job in jobs)
@@ -93,7 +93,7 @@ class Processes:
         queue: _Queue[J],
         interrupted: Callable[[], bool],
     ) -> Generator[tuple[J, R], None, bool]:
-        """Do all; whether it is done. It is not where a process died, which takes all down."""
+        """Do all jobs, yield results; return False if a process died, which ends the whole pool."""
         doing: dict[Future[R], tuple[J, int]] = {}
         ahead, dead = 2 * (self.count or multiprocessing.cpu_count()), False
         while True:
@@ -120,10 +120,10 @@ class Processes:
 
 @contextmanager
 def _interrupt_seen() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C came, instead of an exception at any place.
+    """Give a function that returns whether Ctrl-C came; Ctrl-C then raises no exception.
 
-    Within the pool's own lines an exception would leave a lock taken, for which its end then waits
-    for ever. A thread that is not the main one gets none, nor does a shell's background job.
+    An exception within the pool's own lines would leave a lock taken, for which the end of the pool
+    then waits for ever. Only the main thread gets Ctrl-C, and no background job of a shell does.
     """
     seen = []
     before = signal.getsignal(signal.SIGINT)

@@ -1,4 +1,4 @@
-"""Operator, daemon and plant as processes on a bus: they end with their parent."""
+"""Operator, daemon and plant as processes on a bus; the processes end with their parent."""
 
 import ctypes
 import os
@@ -39,8 +39,8 @@ main()
 def end_with_parent(how: signal.Signals) -> None:
     """Have the kernel send this process a signal when its parent ends (prctl(2)).
 
-    A parent that ended before the call is not seen: the caller looks for it afterwards.
-    Only Linux has it; elsewhere nothing is done.
+    The kernel does not signal a parent that ended before the call: the caller checks for it
+    afterwards. On systems other than Linux the function does nothing.
 
     Args:
         how: the signal.
@@ -50,9 +50,9 @@ def end_with_parent(how: signal.Signals) -> None:
 
 
 def canshaper_command(*words: str) -> list[str]:
-    """Command line of ``canshaper`` as a child of this process.
+    """Return the command line that runs ``canshaper`` as a child of this process.
 
-    It gets SIGTERM when this process ends without ending it: a daemon leaves the valves neutral.
+    If this process ends first, the child gets SIGTERM: a daemon then leaves the valves neutral.
 
     Args:
         words: the verb, its arguments and options.
@@ -71,7 +71,7 @@ LISTEN_STEP_S = 0.1
 
 @dataclass(frozen=True)
 class Transport:
-    """The bus the processes meet on, as options of python-can."""
+    """The bus that connects the processes, as options of python-can."""
 
     interface: str
     channel: str
@@ -80,14 +80,14 @@ class Transport:
 
 @dataclass(frozen=True)
 class BusDrive:
-    """A drive on a bus, and the deadlines that the daemon missed in it."""
+    """A drive on a bus, and the number of deadlines that the daemon missed in it."""
 
     recording: Recording
     missed_deadlines: int
 
 
 def choose_transport(request: str, deployment: Deployment) -> Transport:
-    """SocketCAN where its channel opens, otherwise multicast; ``request`` may name one.
+    """Return SocketCAN if its channel opens, otherwise multicast; ``request`` may name one.
 
     Raises:
         DriveError: the deployment has several buses or cranes, or the requested transport does not
@@ -113,7 +113,7 @@ def choose_transport(request: str, deployment: Deployment) -> Transport:
 
 
 def on_transport(deployment: Deployment, transport: Transport) -> Deployment:
-    """The deployment with its bus put on this transport."""
+    """Return the deployment with its bus on this transport."""
     change = {
         "interface": transport.interface,
         "channel": transport.channel,
@@ -133,15 +133,15 @@ def drive_on_bus(
     on_progress: Callable[[float], None],
     on_frame: Callable[[Frame, float], object] | None = None,
 ) -> BusDrive:
-    """Drive a script with the three processes; the frames received on the bus are recorded.
+    """Drive a script with three processes; record the frames received on the bus.
 
     Args:
         deployment: the machine.
-        transport: where the processes meet.
-        script: what the operator does.
+        transport: the bus that connects the processes.
+        script: the strokes of the operator.
         changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
         bypass: drive with anti-sway switched off.
-        on_progress: called with the seconds driven.
+        on_progress: called with the driven time in s.
         on_frame: called with every frame and its time in s.
 
     Raises:
@@ -183,7 +183,7 @@ def _listen(
     *,
     on_frame: Callable[[Frame, float], object] | None = None,
 ) -> None:
-    """Record what is on the buses until ``done``; without ``report`` within the start limit."""
+    """Record frames from the bus until ``done``; without ``report`` raise after the start limit."""
     limit = time.monotonic() + START_LIMIT_S
     files = [port.fileno() for port in ports.values()]
     while not done():
@@ -202,7 +202,7 @@ def _listen(
 
 
 class Crew:
-    """The child processes of one drive; all are ended, whatever happens."""
+    """The child processes of one drive; ``stop`` ends all of them."""
 
     def __init__(self, deployment: Deployment, transport: Transport, logs: Path) -> None:
         self._file = str(deployment.path)
@@ -219,11 +219,11 @@ class Crew:
             )
 
     def ended(self, verb: str) -> bool:
-        """Whether this process has ended."""
+        """Return whether the process of this verb has ended."""
         return self._processes[verb].poll() is not None
 
     def check(self) -> None:
-        """Raise DriveError when a process has failed; the operator may end, the others may not."""
+        """Raise DriveError if a process has failed; only the operator may end, with status 0."""
         for verb, process in self._processes.items():
             status = process.poll()
             if status is not None and not (verb == "operator" and status == 0):
@@ -231,14 +231,14 @@ class Crew:
                 raise DriveError(f"canshaper {verb} ended with status {status}:\n{text}")
 
     def stop(self) -> None:
-        """End all processes; the daemon goes first and leaves the valves neutral."""
+        """End all processes, the daemon first: it leaves the valves neutral."""
         for verb in ("run", "operator", "sim"):
             if (process := self._processes.get(verb)) is not None:
                 end(process)
 
 
 def end(process: "subprocess.Popen[bytes]") -> None:
-    """End a process: asked first, so that a daemon leaves the valves neutral, then for good."""
+    """End a process by SIGTERM, so that a daemon leaves the valves neutral; kill it after 10 s."""
     process.terminate()
     try:
         process.wait(STOP_LIMIT_S)

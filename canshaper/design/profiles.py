@@ -1,4 +1,4 @@
-"""Measures of each profile of a deployment with a full press, on the simulated crane."""
+"""Measures of each profile of a deployment after a full press on the simulated crane."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -26,14 +26,14 @@ class Figures:
 
     Attributes:
         axis: the axis.
-        profile: the profile; ``OWN`` for the axis' own filter.
+        profile: name of the profile; ``OWN`` for the axis' own filter.
         still_s: from the release until the swing stays below ``still_deg`` of the file.
-        swings_on: whether that is a lower bound: it swings longer than the drive of 10 s.
-        run_on_s: from the release to the tip below 5 % of full speed.
-        run_on_travel_s: distance run on, seconds of full speed.
+        swings_on: ``still_s`` is a lower bound: the grapple swings longer than the drive of 10 s.
+        run_on_s: from the release until the tip is below 5 % of full speed.
+        run_on_travel_s: travel after the release, seconds of full speed.
         peak_deg: largest swing.
-        residual_deg: swing left with the right length.
-        residual_wrong_deg: the most that is left with the length 15 % wrong.
+        residual_deg: swing left at the right pendulum length.
+        residual_wrong_deg: largest swing left with the pendulum length 15 % off.
     """
 
     axis: str
@@ -48,7 +48,7 @@ class Figures:
 
 
 class Chosen:
-    """A profile that stays chosen."""
+    """A chooser with one fixed profile."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -59,7 +59,7 @@ class Chosen:
 
 
 def choosing(name: str) -> Callable[[Controller], None]:
-    """Choose a profile in a fresh controller; its gain schedule goes on by the load."""
+    """Return a function that fixes a new controller's profile; the load still sets its gains."""
 
     def choose(controller: Controller) -> None:
         for runner in controller.axes.values():
@@ -74,7 +74,7 @@ def figures(deployment: Deployment, crane: CraneParameters) -> Iterator[Figures]
 
     Raises:
         DesignError: the deployment has no profiles.
-        DriveError: the simulated crane does not fit it.
+        DriveError: the simulated crane does not fit the deployment.
     """
     if len(profile_names(deployment.config)) == 1:
         raise DesignError("expected an axis with profiles, got none")
@@ -104,10 +104,10 @@ def _press(deployment: Deployment, axis: str, name: str, crane: CraneParameters)
 
 
 def swinging_axis(deployment: Deployment, name: str) -> tuple[BoundAxis, Sway]:
-    """An axis and its sway data.
+    """Return an axis and its sway data.
 
     Raises:
-        DesignError: there is no such axis, or it has none; names those that have.
+        DesignError: no such axis, or it has no sway data; the message names those that have.
     """
     bound = deployment.axes.get(name)
     sway = bound.config.sway if bound else None

@@ -1,8 +1,8 @@
 """Change single values of a deployment file and leave every other byte as it is.
 
-The YAML parser says where keys and values stand; only those spans are replaced. All changes of a
-call are written next to the file, must load as a deployment with its DBC files, and then take the
-file's place in one step: whenever the program is killed, the old file stands there or the new one.
+The YAML parser locates keys and values; only their spans are replaced. The module writes all
+changes of a call to a temporary file next to the file, loads that as a deployment with its DBC
+files, and then replaces the file in one step: a killed program leaves the old file or the new one.
 """
 
 import copy
@@ -42,12 +42,12 @@ such values by their keys; None takes the key away."""
 
 
 def plain(text: str) -> str:
-    """A text as it stands in YAML: in quotes where it could be read as something else."""
+    """Return a text as YAML: in quotes if YAML could read it as something else."""
     return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)  # YAML too
 
 
 def flow(value: float | str | Sequence[float | str] | Mapping[str, Any]) -> str:
-    """A value on one line; of a number the shortest decimal form that is read back as it is."""
+    """Return a value as YAML on one line; a number in its shortest form that reads back equal."""
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{key}: {flow(one)}' for key, one in value.items())} }}"
     if not isinstance(value, str | int | float):
@@ -63,7 +63,7 @@ def flow(value: float | str | Sequence[float | str] | Mapping[str, Any]) -> str:
 
 
 def read_back(value: Any) -> Any:
-    """A value as it is read where it was written by ``flow``."""
+    """Return a value as YAML reads it after ``flow`` has written it."""
     if isinstance(value, str):
         return value
     if isinstance(value, Mapping):
@@ -78,7 +78,7 @@ Change = tuple[Place, Mapping[str, FileValue], str]
 
 
 def of_limits(name: str, axis: AxisSection, values: Mapping[str, Any]) -> Change:
-    """Return the change of values in the section limits of an axis, which may not be there yet."""
+    """Return the change of values in the section limits of an axis, which may be missing."""
     if "limits" in axis.model_fields_set:
         return ("axes", name, "limits"), values, ""
     return ("axes", name), {"limits": values}, ""
@@ -87,24 +87,24 @@ def of_limits(name: str, axis: AxisSection, values: Mapping[str, Any]) -> Change
 def change(path: Path, changes: Iterable[Change]) -> list[str]:
     """Write values into sections of a deployment file, all of them or none.
 
-    Keys that are there get the new value, keys that are not are put in, keys with None are taken
-    out. Comments, order, spacing, line ends and everything else stay.
+    Existing keys get the new value, missing keys are inserted, keys with None are removed.
+    Comments, order, spacing, line ends and everything else stay.
 
-    With a note, comments that spoke of other values are replaced by it: directly above a key that
-    is written and behind it on its line, and where all keys of the section are written those of
-    the section. Of a section on one line only these are.
+    A note replaces the comments that described the old values: directly above a written key and
+    behind it on its line; if all keys of the section are written, also those of the section. In a
+    section on one line it replaces only the comments of the section.
 
     Args:
         path: the deployment file; a symbolic link is followed.
-        changes: section, such as ("axes", "slew", "filter"), values and note of each.
+        changes: (section, values, note) of each, the section such as ("axes", "slew", "filter").
 
     Returns:
-        Lines that have changed.
+        The changed lines, marked with - and + as in a diff.
 
     Raises:
-        ConfigError: the section is not there or cannot be changed without touching anything
-            else, the result is no valid deployment, or the file cannot be written. The file is as
-            it was.
+        ConfigError: the section is missing or cannot be changed without changing something
+            else, the result is no valid deployment, or the file cannot be written. The file then
+            is unchanged.
     """
     path = path.resolve()
     text = before = _read(path)
@@ -117,17 +117,17 @@ def change(path: Path, changes: Iterable[Change]) -> list[str]:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Put another text in place of a deployment file, by the same way.
+    """Replace the whole text of a deployment file, in one step as ``change`` does.
 
     Raises:
-        ConfigError: it is no valid deployment, or cannot be written. The file is as it was.
+        ConfigError: the text is no valid deployment or cannot be written; the file is unchanged.
     """
     path = path.resolve()
     _replace(path, _read(path), text, None)
 
 
 def _changed(before: str, after: str) -> Iterator[str]:
-    """Lines of the file that went and came."""
+    """Yield the removed and the added lines of the file."""
     lines = unified_diff(before.splitlines(), after.splitlines(), n=0, lineterm="")
     for line in list(lines)[2:]:
         if not line.startswith("@@"):
@@ -140,7 +140,7 @@ def edited(
     """Return the text of a YAML file with values of one section changed; see ``change``.
 
     Raises:
-        ConfigError: the section cannot be changed; ``name`` is the file it names.
+        ConfigError: the section cannot be changed; the message names the file ``name``.
     """
     if note:
         edit = Edit(text, place, name)
@@ -158,7 +158,7 @@ def edited(
 
 
 def _expected(data: Any, place: Place, values: Mapping[str, FileValue]) -> Any:
-    """Data of the file as it has to be afterwards."""
+    """Return the data that the file must have after the change."""
     result = copy.deepcopy(data)
     section = result
     for key in place:
@@ -181,7 +181,7 @@ def _read(path: Path) -> str:
 
 
 def _replace(path: Path, before: str, text: str, expected: Any) -> None:
-    """Write next to the file, check, and put it in place of the file; all or nothing."""
+    """Write a temporary file, check it, and put it in place of the file; all or nothing."""
     temporary: Path | None = None
     try:
         status = path.stat()
@@ -211,7 +211,7 @@ def _replace(path: Path, before: str, text: str, expected: Any) -> None:
 def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | None]]:
     """Return the numbers of each section of a file, by keys such as ``axes.slew.sway.period_s``.
 
-    What says where a sway model was measured is taken out: it is no longer what was measured.
+    A changed sway section loses its ``origin``: its numbers are no longer the measured ones.
     """
     sections: dict[Place, dict[str, float | None]] = {}
     for text, number in values.items():
@@ -225,7 +225,7 @@ def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | No
 
 
 def _check(path: Path, temporary: Path, expected: Any) -> None:
-    """The new file is a valid deployment and differs in nothing but what was asked."""
+    """Check that the new file is a valid deployment with no other difference than the changes."""
     try:
         source = load_deployment(temporary).source
     except ConfigError as error:
@@ -244,7 +244,7 @@ def _failed(path: Path, error: OSError) -> ConfigError:
 
 
 def shortened(numbers: Sequence[float]) -> list[float | str]:
-    """The list as it is written; ``config.section.expanded`` gives it back to the last bit."""
+    """Return the list with runs, as a file has it; ``config.section.expanded`` undoes this."""
     runs: list[float | str] = []
     for number, equal in groupby(numbers):
         count = len([*equal])
@@ -253,12 +253,12 @@ def shortened(numbers: Sequence[float]) -> list[float | str]:
 
 
 def written_by(verb: str, *, simulated: bool | None, log: str | None = None) -> dict[str, Any]:
-    """Origin of numbers that are written now, by key.
+    """Return the origin of numbers that are written now, as keys of a section.
 
     Args:
-        verb: that writes them.
-        simulated: whether they were measured on a simulated crane; None where it is not known.
-        log: name of the log they were computed from.
+        verb: the verb that writes the numbers.
+        simulated: the numbers were measured on a simulated crane; None if unknown.
+        log: name of the log from which the numbers were computed.
     """
     values: dict[str, Any] = {"date": f"{datetime.now(UTC).date()}"}
     if log is not None:
@@ -270,5 +270,5 @@ def written_by(verb: str, *, simulated: bool | None, log: str | None = None) -> 
 
 
 def note(verb: str) -> str:
-    """Return the comment that replaces those on numbers that a verb has written."""
+    """Return the comment that replaces those on numbers written by a verb."""
     return f"Written by canshaper {verb}."

@@ -1,6 +1,6 @@
-"""Text of one mapping of a YAML file: where keys, values and comments stand, and new ones there.
+"""Text edits in one mapping of a YAML file: replace values and comments, insert and remove keys.
 
-The YAML parser says where they stand; every other byte of the text stays.
+The YAML parser locates keys and values; every other byte of the text stays.
 """
 
 import re
@@ -13,7 +13,7 @@ from canshaper.errors import ConfigError, Problem
 
 
 class Edit:
-    """Replacements of spans in one mapping of a text."""
+    """Replacements of spans in one mapping of a text; ``text`` applies them."""
 
     def __init__(self, text: str, place: Place, name: str) -> None:
         self._text = text
@@ -45,7 +45,7 @@ class Edit:
         self._newline = "\r\n" if "\r\n" in text else "\n"
 
     def replace(self, key: str, value: str) -> bool:
-        """Give a key that is there a new value; False where it is not there."""
+        """Give an existing key a new value; return False if the key is missing."""
         for key_node, node in self._pairs:
             if key_node.value == key:
                 self._not_shared(node)
@@ -54,7 +54,7 @@ class Edit:
         return False
 
     def _put(self, key: yaml.Node, node: yaml.Node, value: str) -> None:
-        """Put a value in place of another; that of a block, however indented, behind its key."""
+        """Replace a value; a new value for a block goes behind its key, on one line."""
         start, end = self._span(node)
         if isinstance(node, yaml.CollectionNode) and not node.flow_style:
             colon = self._text.index(":", key.end_mark.index) + 1
@@ -67,7 +67,7 @@ class Edit:
         self._spans.append((start, end, value))
 
     def remove(self, key: str) -> None:
-        """Take a key out with its value; a comment behind it stays, on a line of its own."""
+        """Remove a key with its value; a comment behind it stays, on a line of its own."""
         for i, (key_node, node) in enumerate(self._pairs):
             if key_node.value == key:
                 self._not_shared(node)
@@ -77,7 +77,7 @@ class Edit:
                 self._removed.append(i)
 
     def replace_comments(self, keys: Collection[str], note: str) -> None:
-        """Put a note in place of the comments on keys, and on the section where it is all of it."""
+        """Replace comments on keys by a note, also those on the section if all keys are given."""
         written = [pair for pair in self._pairs if pair[0].value in keys]
         commented = [] if self._flow else written
         if len(written) == len(self._pairs) and self._head:
@@ -92,7 +92,7 @@ class Edit:
                 note = ""
 
     def _comments(self, key: yaml.Node, node: yaml.Node) -> Iterator[tuple[int, int]]:
-        """Spans of the comments directly above a key, at its column, and behind it on its line."""
+        """Yield the spans of comments directly above a key, at its column, and behind it."""
         column = key.start_mark.column
         line_start = start = key.start_mark.index - column
         while start:
@@ -109,7 +109,7 @@ class Edit:
             yield behind.span(1)
 
     def insert(self, pairs: list[tuple[str, str]]) -> None:
-        """Put keys in: where a removed one stood, or behind the last one."""
+        """Insert keys: in place of a removed one, or behind the last one."""
         indent = " " * int(self._pairs[0][0].start_mark.column)
         between = ", " if self._flow else self._newline + indent
         text = between.join(f"{key}: {value}" for key, value in pairs)
@@ -131,14 +131,14 @@ class Edit:
             self._spans.append((end, end, between + text))
 
     def text(self) -> str:
-        """The text with all replacements."""
+        """Return the text with all replacements."""
         result = self._text
         for start, end, new in sorted(self._spans, reverse=True):
             result = result[:start] + new + result[end:]
         return result
 
     def _span(self, node: yaml.Node) -> tuple[int, int]:
-        """Where a value stands; the parser ends a block at what follows it."""
+        """Return the span of a value; the parser's own span of a block reaches to what follows."""
         start, end = node.start_mark.index, node.end_mark.index
         if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -146,7 +146,7 @@ class Edit:
         return start, end
 
     def _with_comma(self, i: int, start: int, end: int) -> tuple[int, int]:
-        """Span of a pair of a flow mapping with the comma that goes with it."""
+        """Return the span of a pair in a flow mapping with its comma."""
         if i > 0:
             start = self._span(self._pairs[i - 1][1])[1]
             between = self._text[start : self._pairs[i][0].start_mark.index]
@@ -158,7 +158,7 @@ class Edit:
         return start, end
 
     def _with_line(self, start: int, end: int) -> tuple[int, int]:
-        """Span of a pair of a block mapping with its line, where nothing else stands on that."""
+        """Return the span of a pair in a block mapping, with its line if it stands there alone."""
         line_end = self._text.find("\n", end)
         line_end = len(self._text) if line_end < 0 else line_end + 1
         line_start = self._text.rfind("\n", 0, start) + 1
@@ -170,7 +170,7 @@ class Edit:
         return start, end
 
     def _count(self, node: yaml.Node | None) -> None:
-        """Count how often each node is used: anchors make one stand in several places."""
+        """Count the uses of each node: an anchor makes a node stand in several places."""
         if node is None:
             return
         self._uses[id(node)] = self._uses.get(id(node), 0) + 1

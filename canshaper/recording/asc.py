@@ -1,4 +1,4 @@
-"""Vector's ASC, PEAK's TRC 1.0 to 2.1, and what text logs share: identifiers, data, line by line.
+"""Readers of Vector's ASC and PEAK's TRC 1.0 to 2.1, and the line reader that text logs share.
 
 TRC: PEAK CAN TRC File Format, document of PEAK-System.
 """
@@ -20,12 +20,12 @@ SHOWN = 60
 
 
 def lines(file: BinaryIO, place: Place, *, last: bool = False) -> Iterator[bytes]:
-    """Lines with their end; a last one without is cut off, however good it looks.
+    """Yield lines with their line end.
 
     Args:
         file: the log.
-        place: where the reader is.
-        last: whether the format has no end at its last line.
+        place: position of the reader, in which the lines are counted.
+        last: the last line needs no end; else a line without one raises CutOffError.
     """
     for line in iter(partial(file.readline, LONGEST_LINE), b""):
         place.number += 1
@@ -38,7 +38,7 @@ def lines(file: BinaryIO, place: Place, *, last: bool = False) -> Iterator[bytes
 
 
 def shown(line: bytes) -> str:
-    """A line as a person reads it, its beginning where it is long."""
+    """Return a line in quotes for a person; only the beginning of a long line."""
     text = line.decode("utf-8", "replace").rstrip()
     return repr(text if len(text) <= SHOWN else text[: SHOWN - 3] + "...")
 
@@ -56,7 +56,7 @@ ASC_NUMBERS = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with n
 
 
 def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Vector's ASC. What is neither a frame nor wrong (statistics, comments, events) is no loss."""
+    """Yield the data frames of Vector's ASC; skip statistics, comments and events silently."""
     base, relative, before_ns = 16, False, 0
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").rstrip()
@@ -92,7 +92,7 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, bool]:
-    """Base of the numbers, and whether times are relative, behind a line without a frame."""
+    """Read a line without a frame; return the number base and whether times are relative."""
     if header := _BASE.match(line):
         base = 10 if header[1].lower() == "dec" else 16
         relative = bool(header[2]) and header[2].lower() == "relative"
@@ -104,10 +104,10 @@ def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, b
 def _numbers(
     number: str, count: str, data: list[str], base: int, *, fd: bool
 ) -> tuple[int, int, bytes]:
-    """Id, length and data of a line; on a channel of CAN FD the length is decimal.
+    """Return id, length and data of a line; on a CAN FD channel the length is decimal.
 
     Raises:
-        ValueError: something else stands there.
+        ValueError: a cell is no number.
     """
     length = int(count) if fd else min(8, int(count, base))
     digits = "".join((number, count, *data[:length]))
@@ -118,13 +118,11 @@ def _numbers(
 
 
 def _data(words: list[str]) -> list[str]:
-    """Length and data of a line of a CAN FD channel, whose frames may be of both kinds.
+    """Return length and data of a line of a CAN FD channel, whose frames may be of both kinds.
 
-    Of a remote frame the length is R. Where length or flags are no numbers the length is empty,
-    for the caller to report.
-
-    In front are a name, where there is one, two flags and the length code; behind the data are
-    its duration, its bits and the flags of the frame.
+    A remote frame has the length R. If length or flags are no numbers, the length is empty and the
+    caller reports it. Before the data stand a name (not always), two flags and the length code;
+    after the data stand the frame's duration, number of bits and flags.
     """
     if words and words[0] not in ("0", "1"):
         words = words[1:]
@@ -151,7 +149,7 @@ _NO_ID = "FFFFFFFF"  # of a warning, in version 1.0
 
 
 def trc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Its data frames; the last line needs no end."""
+    """Yield the data frames of a TRC log; its last line needs no end."""
     begin_us = 0
     version = "1.0"
     columns = COLUMNS[version]
@@ -182,10 +180,10 @@ def trc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _begin_us(days: str, place: Place) -> int:
-    """The begin of the log from the epoch of all others, us.
+    """Return the start time of the log in microseconds since 1970.
 
     Raises:
-        LogError: it is no day.
+        LogError: ``days`` is no date.
     """
     try:
         return round((_EPOCH + timedelta(days=float(days))).timestamp() * 1e6)
@@ -194,11 +192,11 @@ def _begin_us(days: str, place: Place) -> int:
 
 
 def _frame(cells: list[str], columns: str, begin_ns: int, place: Place) -> TimedFrame | None:
-    """The frame of a line; None where it is another one, or none.
+    """Return the data frame of a line; None for a line with another frame or an event.
 
     Raises:
-        LogError: it is no whole frame.
-        ValueError, IndexError: it is no line of these columns.
+        LogError: the frame is not complete.
+        ValueError, IndexError: the line does not have these columns.
     """
     at = columns.index
     kind = cells[at("T")] if "T" in columns else "DT"

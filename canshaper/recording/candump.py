@@ -1,4 +1,4 @@
-"""Logs of candump, as files and as on the screen, of Kvaser's converter and of BUSMASTER."""
+"""Readers of logs of candump (as files and as on the screen), Kvaser's converter and BUSMASTER."""
 
 import re
 from binascii import unhexlify
@@ -44,7 +44,7 @@ _DROPPED = re.compile(rb"DROPCOUNT: dropped (\d{1,10}) CAN frames? on .*\s*")
 
 
 def candump(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """``candump -L``, ``candump -l`` and python-can's logger: microseconds, or nanoseconds."""
+    """Yield frames of ``candump -L``, ``candump -l`` and python-can's logger; times in us or ns."""
     quick = _QUICK.fullmatch
     sources: dict[bytes, tuple[str, int, bool] | None] = {}
     rows = lines(file, place)
@@ -82,7 +82,7 @@ def candump(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def _are_differences(head: bytes) -> bool:
-    """Whether the times of a log do not grow: each is that since the frame before."""
+    """Return whether the times of a log are differences, each since the frame before."""
     matches = (_PADDED.match(line) for line in head.split(b"\n", MOST_STAMPS)[:-1])
     stamps = [int(f"{one[2].decode()}{one[3].decode()}") for one in matches if one]
     if len(stamps) < LEAST_STAMPS:
@@ -96,7 +96,7 @@ def _are_differences(head: bytes) -> bool:
 
 
 def _summed(rows: Iterator[bytes]) -> Iterator[bytes]:
-    """Lines with the times from the first one on in place of those from line to line."""
+    """Yield lines with times since the first line in place of the times since the line before."""
     time_us = 0
     for row in rows:
         if (stamp := _PADDED.match(row)) is None:
@@ -107,7 +107,7 @@ def _summed(rows: Iterator[bytes]) -> Iterator[bytes]:
 
 
 def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] | None:
-    """Channel and id of a line of candump; None for an error frame."""
+    """Return channel, id and whether the id is extended; None for an error frame."""
     channel, word = source.split()
     can_id, extended = int(word, 16), len(word) == 8
     if len(word) not in (3, 8):
@@ -120,10 +120,10 @@ def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] |
 
 
 def _screen(line: bytes, place: Place) -> TimedFrame | None:
-    """A frame of a line as candump shows it; None where it is no data frame.
+    """Return the frame of a line as candump shows it on the screen; None for other frames.
 
     Raises:
-        LogError: it is no such line, or has no time.
+        LogError: candump shows no such line, or the line has no time.
     """
     match = _SCREEN.fullmatch(line)
     if match is None:
@@ -168,12 +168,12 @@ _BUSMASTER = re.compile(
 
 
 def log(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """A file ``.log``: of BUSMASTER by its first line, else of candump."""
+    """Yield the frames of a ``.log`` file: of BUSMASTER by its first line, else of candump."""
     return (busmaster if file.peek(12)[:12] == b"***BUSMASTER" else candump)(file, place)
 
 
 def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Kvaser's plain text."""
+    """Yield the frames of Kvaser's plain text."""
     bases, below = {"id": 16, "data": 16}, False
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").rstrip()
@@ -200,7 +200,7 @@ def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def busmaster(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """BUSMASTER's log, with times of the day, from the start or from frame to frame."""
+    """Yield frames of BUSMASTER's log; times count from midnight, the start or the last frame."""
     base, relative, day_ns, before_ns = 16, False, 0, 0
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").strip()
@@ -223,7 +223,7 @@ def busmaster(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def _frame(place: Place, raw: bytes, bases: dict[str, int], *what: Any) -> TimedFrame:
-    """A frame of time, channel, id, whether that is extended, length and data."""
+    """Return the frame with these values: time, channel, id, extended, length and data."""
     time_ns, channel, number, extended, length, words = what
     try:
         can_id = int(number, bases["id"])

@@ -1,6 +1,6 @@
-"""Vector's BLF, and captures of SocketCAN by tcpdump and Wireshark.
+"""Readers of Vector's BLF, and of captures of SocketCAN by tcpdump and Wireshark.
 
-BLF has packed containers of objects, of which those that are frames are read. Captures are pcap
+BLF packs objects in containers; this module reads the objects that are frames. Captures are pcap
 and pcapng (draft-ietf-opsawg-pcapng).
 """
 
@@ -42,7 +42,7 @@ _PADDING = 8
 
 
 def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Vector's BLF; times to the nanosecond or ten microseconds, as the logger had them."""
+    """Yield the frames of Vector's BLF; times to the ns or to ten us, as the logger wrote them."""
     wrong = cut_off(file)  # which python-can passes over in silence
     file.seek(0)
     try:
@@ -57,9 +57,9 @@ def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 class _Reader(can.BLFReader):
-    """python-can's, which opens and unpacks; the objects are read here, as frames.
+    """python-can's reader, which opens and unpacks the file; this class reads the frames.
 
-    Its own takes twice as long, and never ends where an object of a damaged file has no length.
+    python-can's own loop takes twice as long, and never ends at a damaged object of length 0.
     """
 
     def __init__(self, file: BinaryIO, place: Place) -> None:
@@ -68,7 +68,7 @@ class _Reader(can.BLFReader):
         self._start_ns = round(self.start_timestamp * 1000) * 1_000_000
 
     def _parse_data(self, data: bytes) -> Iterator[Any]:
-        """Frames of one container; ``_pos`` is where its first object that is not read begins."""
+        """Yield the frames of one container; ``_pos`` is the start of the first object not read."""
         find, start, frame_of = data.find, _OBJECT.unpack_from, self._frame
         at, end, last = 0, len(data), len(data) - _OBJECT.size
         while True:
@@ -90,7 +90,7 @@ class _Reader(can.BLFReader):
                     yield frame
 
     def _frame(self, data: bytes, kind: int, begin: int, body: int, end: int) -> TimedFrame | None:
-        """The data frame of an object from ``begin`` to ``end``; None where it is none."""
+        """Return the data frame of an object from ``begin`` to ``end``; None for another frame."""
         place = self._place
         place.number += 1
         if body + _BYTES[kind] > end:
@@ -119,7 +119,7 @@ class _Reader(can.BLFReader):
 def _fd(
     data: bytes, kind: int, begin: int, body: int, end: int
 ) -> tuple[int, int, int, int, bytes]:
-    """Channel, whether it is remote, most bytes, id and data of a frame on a channel of CAN FD."""
+    """Return channel, remote flag, largest length, id and data of a frame on a CAN FD channel."""
     if kind == _FD:
         channel, flags, number, fd_flags, count = _FD_FRAME.unpack_from(data, body)
         remote, is_fd = flags & _REMOTE, fd_flags & _IS_FD
@@ -135,7 +135,7 @@ def _fd(
 
 
 def cut_off(file: BinaryIO) -> str:
-    """Where a BLF file ends within an object; empty where it does not."""
+    """Return where a BLF file ends within an object; an empty text if it does not."""
     file.seek(0)
     head = file.read(8)
     if len(head) < 8 or head[:4] != b"LOGG":
@@ -165,7 +165,7 @@ MOST_BLOCK = 1 << 24
 
 
 def pcap(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Either of them, by its first bytes."""
+    """Yield the frames of a pcap or pcapng capture; its first bytes tell which."""
     head = file.peek(4)[:4]
     try:
         if head == SECTION:
@@ -214,7 +214,7 @@ def _blocks(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def _interface(body: bytes, order: str, name: str) -> tuple[str, int]:
-    """Name of an interface, and units of its times in a second."""
+    """Return the name of an interface, and the number of its time units in a second."""
     per_s, at = 1_000_000, 8
     while at + 8 <= len(body):
         code, count = struct.unpack_from(f"{order}2H", body, at)
@@ -234,7 +234,7 @@ def _check_link(link: int, place: Place) -> None:
 
 
 def _frame(data: bytes, time_ns: int, channel: str, place: Place) -> Iterator[TimedFrame]:
-    """The data frame of a packet, if it is one."""
+    """Yield the data frame of a packet, if the packet is one."""
     place.number += 1
     word = int.from_bytes(data[:4])
     if len(data) < 8 or not data[4] <= min(len(data) - 8, MOST_BYTES):

@@ -1,4 +1,4 @@
-"""Frames of a log, the channels that they are on, and of which input each is."""
+"""Frames of a log, the buses of its channels, and the input that each frame belongs to."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
@@ -20,7 +20,7 @@ from canshaper.protocols.j1939.groups import AnySource, ReceivedGroup
 
 
 class Kind(Enum):
-    """Kind of a frame for the daemon of a deployment."""
+    """Meaning of a frame on the bus for the daemon of a deployment."""
 
     RECEIVED = "received"
     """The frame waits in the first socket, and is read before the valves have their frames."""
@@ -35,16 +35,16 @@ class Kind(Enum):
 def bus_of_channel(
     deployment: Deployment, channels: Collection[str], given: Mapping[str, str]
 ) -> dict[str, str]:
-    """Names of the buses by the channels of a log.
+    """Return the name of the bus for each channel of a log.
 
     Args:
         deployment: the machine.
-        channels: those of the log.
-        given: channels by bus, as the command line says; else the deployment's own channel counts,
-            then the name of the bus, then the only one that there is.
+        channels: channels of the log.
+        given: channel by bus from the command line. For other buses the function tries the
+            deployment's own channel, then the name of the bus, then the only channel.
 
     Raises:
-        LogError: a bus has no channel in the log, or two have the same.
+        LogError: a bus has no channel in the log, or two buses have the same channel.
     """
     buses = deployment.config.buses
     chosen: dict[str, str] = {}
@@ -66,7 +66,7 @@ def bus_of_channel(
 
 
 class Sorter:
-    """Says what frames are to a deployment; each kind of frame is looked at once."""
+    """Sorts frames by their ``Kind`` for a deployment; it judges each id once."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._buses = deployment.routing.buses
@@ -77,7 +77,7 @@ class Sorter:
         self._kinds = {identity.message.key: Kind.IGNORED} if identity else {}
 
     def kind(self, key: Key) -> Kind:
-        """Return the kind of a frame by bus, id and whether that is extended."""
+        """Return the kind of a frame by its key: bus, id and whether the id is extended."""
         kind = self._kinds.get(key)
         if kind is None:
             kind = self._kinds[key] = self._judge(key)
@@ -105,10 +105,10 @@ class TimedFrame(NamedTuple):
     """A data frame with the time of its reception.
 
     Attributes:
-        time_ns: on the clock of the log, whatever that counts from.
-        channel: as the log names it; empty where the format has no channels.
+        time_ns: on the clock of the log, whatever its origin.
+        channel: name of the channel in the log; empty if the format has no channels.
         can_id: 11 or 29 bits.
-        extended: whether it has 29.
+        extended: the id has 29 bits.
         data: up to 8 bytes, of CAN FD up to 64.
     """
 
@@ -120,20 +120,20 @@ class TimedFrame(NamedTuple):
 
 
 def fits(can_id: int, *, extended: bool) -> bool:
-    """Whether an id has room in its 11 or 29 bits."""
+    """Return whether an id fits into 11 bits, or 29 if it is extended."""
     return can_id < 1 << (29 if extended else 11)
 
 
 @dataclass
 class Place:
-    """Where in a log the reader is, for people, and what it has left out so far.
+    """Position of the reader in a log, for messages, and counts of what it has left out.
 
     Attributes:
         path: the log.
-        unit: what is counted: lines or frames.
-        number: the one that is being read, from 1.
-        left_out: frames that are no data frames, and lines of tools among them, by kind.
-        notes: what else one has to know of the log.
+        unit: name of what ``number`` counts: line or frame.
+        number: number of the present line or frame, from 1.
+        left_out: counts by kind of frames that are no data frames, and of lines of tools.
+        notes: other things that a person must know about the log.
     """
 
     path: Path
@@ -147,11 +147,11 @@ class Place:
         return LogError(f"{self}: expected {expected}, got {got}")
 
     def cut_off(self, reason: str) -> CutOffError:
-        """The log ends here, in the middle of something."""
+        """Return an error for a log that ends here, within a line or frame."""
         return CutOffError(f"{self}: the log is cut off: {reason}")
 
     def checked(self, frame: TimedFrame, length: int) -> TimedFrame:
-        """The frame, if it has so many bytes and its id has room in its bits; else a LogError."""
+        """Return the frame if it has ``length`` bytes and its id fits; else raise LogError."""
         if len(frame.data) != length or length > MOST_BYTES:
             raise self.error(f"{len(frame.data)} of {length} bytes", "all of them")
         if not fits(frame.can_id, extended=frame.extended):
@@ -171,14 +171,14 @@ _Input = TypeVar("_Input", bound=BoundInput)
 
 
 class InputFinder(Generic[_Input]):
-    """Finds inputs by identifier, those of J1939 by group and source, whatever their priority.
+    """Finds the input of a frame by its identifier; for J1939 by group and source, at any priority.
 
-    Of a message that may come from any address the first one that sends is used, until it is
-    silent for ``timeout_ms``.
+    If a message may come from any address, the finder uses the first sender until it is silent for
+    ``timeout_ms``.
 
     Args:
         buses: buses of the machine by name.
-        inputs: those of its inputs that are looked for.
+        inputs: the inputs to find.
     """
 
     def __init__(self, buses: Mapping[str, Bus], inputs: Iterable[_Input]) -> None:
@@ -201,7 +201,7 @@ class InputFinder(Generic[_Input]):
                 group.of[can_id & 0xFF] = noted
 
     def find(self, frame: Frame, now_ns: int) -> _Input | None:
-        """Return the input that a frame is of, or None; ``now_ns``: its arrival, of any clock."""
+        """Return the input of a frame, or None; ``now_ns`` is its arrival on any clock."""
         if (bound := self._by_key.get(frame[:3])) is not None:
             return bound
         self._input = None
@@ -210,19 +210,19 @@ class InputFinder(Generic[_Input]):
         return self._input
 
     def note(self, bound: _Input) -> None:
-        """Note that the present frame is of this input."""
+        """Note that the present frame belongs to this input."""
         self._input = bound
 
 
 class _Noted(Generic[_Input]):
-    """An input that keeps nothing, but notes that the frame is its own."""
+    """Stands for an input in a J1939 group: notes that the frame belongs to it, keeps no state."""
 
     def __init__(self, finder: InputFinder[_Input], bound: _Input) -> None:
         self._finder = finder
         self._bound = bound
 
     def receive(self, _data: bytes, _arrived_ns: int, /) -> FrameFault:
-        """Note it."""
+        """Note this input as that of the frame."""
         self._finder.note(self._bound)
         return FrameFault.NONE
 
@@ -233,9 +233,9 @@ class _Noted(Generic[_Input]):
 def joystick_commands(
     joystick: BoundJoystick, axes: Mapping[str, BoundAxis], data: bytes
 ) -> tuple[dict[str, Any], dict[str, float]]:
-    """Decode a joystick's frame: its raw values, and the command of each of its axes.
+    """Return the raw values in a joystick's frame, and the demand of each of its axes, -1 to 1.
 
-    Both are empty for a frame of another length; a command that is no value is left out.
+    Both are empty for a frame of another length; an axis with an invalid demand is left out.
     """
     if len(data) != joystick.message.length:
         return {}, {}
@@ -250,7 +250,7 @@ def joystick_commands(
 
 
 def valve_part(axis: BoundAxis, layout: Layout, data: bytes) -> float | None:
-    """Command in a valve frame, part of full; None for a frame of another length or a wrong one."""
+    """Return the command in a valve frame, part of full; None for a wrong length or value."""
     if len(data) != axis.valve_message.length:
         return None
     steps = axis.valve.read(layout.decode(data))

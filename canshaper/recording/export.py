@@ -1,7 +1,7 @@
-"""Export of a drive to MCAP and MF4: one form, and a writer for each suffix.
+"""Export of a drive to MCAP and MF4: one form, and one writer for each suffix.
 
-Frames as they are, signals of the DBC files with units, axes with states and reasons, the pose of
-the crane, events. Nothing of it is imported by the daemon.
+An export has the frames as sent, the signals of the DBC files with units, the axes with states and
+reasons, the pose of the crane, and events. The daemon imports none of this.
 """
 
 import math
@@ -35,10 +35,10 @@ MOST_CODE_BITS = 8  # of a signal whose values are names
 def exporting(
     path: Path | None, deployment: Deployment, parameters: CraneParameters | None = None
 ) -> Iterator["Export | None"]:
-    """Write a drive into a file of one of ``EXTRAS``; without a path there is none.
+    """Open a file of one of ``EXTRAS`` for the export of a drive; give None if path is None.
 
     Raises:
-        UsageError: another suffix, or its extra is not installed.
+        UsageError: the file has another suffix, or its extra is not installed.
         OSError: the file cannot be written.
     """
     if path is None:
@@ -55,7 +55,7 @@ def exporting(
 
 
 def _writer(path: Path, buses: Sequence[str]) -> Writer:
-    """The writer of a suffix."""
+    """Return the writer for the suffix of a file."""
     extra = EXTRAS.get(path.suffix.lower())
     if extra is None:
         raise UsageError(f"--export: expected a file with {' or '.join(EXTRAS)}, got {path}")
@@ -72,12 +72,12 @@ def _writer(path: Path, buses: Sequence[str]) -> Writer:
 
 
 class Export:
-    """Takes a drive frame by frame, or tick by tick, and writes all that is known of it.
+    """Takes a drive frame by frame, or tick by tick, and writes all data about it.
 
     Args:
-        writer: of the file.
-        deployment: whose drive it is.
-        parameters: the crane that is drawn.
+        writer: writer of the file.
+        deployment: the machine that is driven.
+        parameters: the crane to draw.
     """
 
     def __init__(self, writer: Writer, deployment: Deployment, parameters: CraneParameters) -> None:
@@ -90,7 +90,7 @@ class Export:
         self._last_ns = 0
 
     def frame(self, frame: ReceivedFrame) -> None:
-        """Take a frame of a bus: states, reasons and pose are those that its frames report."""
+        """Take a frame of a bus; states, reasons and pose are those that the frames report."""
         decoded = self._take(frame, sent=False)
         if frame.kind:
             return
@@ -107,7 +107,7 @@ class Export:
             self._axes[name](frame.time_ns, row)
 
     def tick(self, tick: Tick, result: Result) -> None:
-        """Take a tick of a replay; the crane is the simulated one behind the valve frames."""
+        """Take a tick of a replay; the pose is that of a crane simulated behind its frames."""
         for time_ns, frame in tick.received:
             self._take(self._received(time_ns, frame), sent=False)
         for frame in tick.others:
@@ -143,7 +143,7 @@ _Known = tuple[Message, dict[str, Signal], Callable[[bytes], dict[str, float]]]
 
 
 class _Decoder:
-    """Decodes every message of the DBC files, each when its first frame comes."""
+    """Decodes every message of the DBC files; builds each decoder at its first frame."""
 
     def __init__(self, deployment: Deployment, writer: Writer) -> None:
         self._messages, self._writer = deployment.messages, writer
@@ -153,7 +153,7 @@ class _Decoder:
         self._rows: dict[str, Row] = {}
 
     def decode(self, frame: ReceivedFrame) -> tuple[str, dict[str, float]] | None:
-        """Write the signals of a frame; return the name of its message, and their values."""
+        """Write the signals of a frame; return the name of its message and the signals' values."""
         key = frame.bus, frame.can_id, frame.extended
         if key not in self._known:
             self._known[key] = self._found(frame)
@@ -205,7 +205,7 @@ def _decoding(message: Message) -> Callable[[bytes], dict[str, float]]:
 
 
 class _CranePose:
-    """Pose of the crane: measured by its frames, else simulated behind its valve frames."""
+    """Pose of the crane: measured by its frames, or simulated behind its valve frames."""
 
     def __init__(self, writer: Writer, deployment: Deployment, parameters: CraneParameters) -> None:
         self._writer, self._grapple = writer, parameters.grapple
@@ -222,7 +222,7 @@ class _CranePose:
         self._tick_s = deployment.config.tick_ms / 1000.0
 
     def measured(self, time_ns: int, message: str, values: Mapping[str, float]) -> None:
-        """Take a message of the crane, as ``canshaper sim`` sends them."""
+        """Take the values of a message of the crane, as ``canshaper sim`` sends it."""
         if message == "TipPosition":
             self._tip = values["SlewAngle"], values["Radius"], values["Height"]
         elif message == "GrappleSway" and self._tip:
@@ -230,7 +230,7 @@ class _CranePose:
             self._write(time_ns, (*self._tip, across, along))
 
     def simulate(self, time_ns: int, sent: Sequence[Frame]) -> None:
-        """Drive the simulated crane for a tick with the valve frames that were sent."""
+        """Drive the simulated crane for a tick with the sent valve frames."""
         if self._machine is None:
             return
         data = {frame[:3]: frame.data for frame in sent}

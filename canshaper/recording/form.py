@@ -1,6 +1,6 @@
-"""The form of what is exported of a drive: frames, values with units, events, pose of the crane.
+"""The form of an exported drive: frames, values with units, events, pose of the crane.
 
-Each format has a ``Writer``; what is written is said once, in ``export``.
+Each format has a ``Writer``; ``export`` decides for all formats what is written.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +14,7 @@ EXTRAS = {".mcap": "mcap", ".mf4": "mf4"}
 
 
 class Channel(NamedTuple):
-    """One value over time: its unit, and the names of its values where it is a code."""
+    """One value over time: name, unit, and the texts of its values if it is a code."""
 
     name: str
     unit: str = ""
@@ -22,7 +22,7 @@ class Channel(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Channels whose values have one time; the name is a path, such as axes/slew."""
+    """Channels with common times; the name is a path, such as axes/slew."""
 
     name: str
     channels: tuple[Channel, ...]
@@ -41,16 +41,16 @@ class Writer(Protocol):
         """Write a frame as it was on its bus."""
 
     def group(self, group: Group) -> Row:
-        """Return what writes the values of a new group."""
+        """Return a function that writes the values of a new group."""
 
     def event(self, time_ns: int, text: str) -> None:
-        """Write a line for people."""
+        """Write an event as a line for people."""
 
     def pose(self, time_ns: int, boom: Sequence[Point], grapple: Point) -> None:
-        """Write the crane: the points of its boom up to the tip, and the grapple."""
+        """Write the pose of the crane: the points of its boom up to the tip, and the grapple."""
 
     def close(self) -> None:
-        """Write what is still held, and end the file."""
+        """Write all data still in memory, and end the file."""
 
 
 AXIS = (
@@ -70,5 +70,5 @@ POSE = (
 
 
 def install(extra: str) -> str:
-    """Command that installs an extra that is missing."""
+    """Return the text with the command that installs a missing extra."""
     return f"which is missing: pip install 'canshaper[{extra}]'"

@@ -1,4 +1,4 @@
-"""History of the status messages of a daemon: states with their reasons, counters."""
+"""History of a daemon's status messages: states with their reasons, and counters."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +11,12 @@ from canshaper.recording.listen import ReceivedFrame
 
 @dataclass(frozen=True, slots=True)
 class AxisStatus:
-    """Status of one axis, as it was received.
+    """Status of one axis, as received.
 
     Attributes:
-        time_ns: when.
-        values: those of its fields, by their names, decoded.
-        shown: the same for people.
+        time_ns: time of reception.
+        values: decoded fields by name.
+        shown: the same fields as texts for people.
     """
 
     time_ns: int
@@ -25,30 +25,31 @@ class AxisStatus:
 
     @property
     def state(self) -> str:
-        """Name of the state, or its number where it is unknown."""
+        """Name of the state, or its number if it is unknown."""
         return self.shown["State"]
 
     @property
     def reason(self) -> str:
-        """Name of the reason, or its number where it is unknown."""
+        """Name of the reason, or its number if it is unknown."""
         return self.shown["Reason"]
 
 
 @dataclass(frozen=True, slots=True)
 class HistoryEvent:
-    """One line for people: a state that is new, or a counter that has gone up."""
+    """One line for people: a new state, or a changed counter."""
 
     time_ns: int
     text: str
 
 
 class History:
-    """Takes frames; knows the last status of everything, and notes what changes.
+    """Takes frames; keeps the last status of each axis and the service, and notes every change.
 
     Attributes:
         axes: last status by axis.
-        counters: last counters of the service, and LastFault by its name.
-        counted_ns: when they were reported; None before.
+        counters: last counters of the service by name.
+        last_fault: name of the service's last fault.
+        counted_ns: time of the last counters; None before the first.
         changes: every change, oldest first.
     """
 
@@ -68,7 +69,7 @@ class History:
             self._codecs[deployment.status.message.key] = deployment.status
 
     def receive(self, frame: ReceivedFrame) -> str | None:
-        """Take a data frame, pass over one that is no status; the axis whose status it is."""
+        """Take a data frame; return the axis if it is an axis' status, else None."""
         key = (frame.bus, frame.can_id, frame.extended)
         codec = self._codecs.get(key)
         if codec is None or (values := codec.decode(frame.data)) is None:

@@ -1,4 +1,4 @@
-"""The buses of a deployment, only listened to: nothing here can send."""
+"""Read-only access to the buses of a deployment: this module cannot send."""
 
 import select
 import socket
@@ -41,14 +41,14 @@ class ReceivedFrame(NamedTuple):
     """One frame, as it was received.
 
     Attributes:
-        time_ns: wall clock, by the kernel where it has it.
-        bus: name in the deployment.
-        channel: its channel.
-        can_id: with the error flag of SocketCAN where it is an error frame.
-        extended: whether the id has 29 bits, or is an error class.
-        data: its bytes.
-        kind: empty for a data frame, else what it is.
-        flags: of a frame of CAN FD, as SocketCAN has them; None of a classical one.
+        time_ns: wall clock, taken by the kernel if it can.
+        bus: name of the bus in the deployment.
+        channel: channel of the bus.
+        can_id: id, with the error flag of SocketCAN for an error frame.
+        extended: the id has 29 bits, or is an error class.
+        data: bytes of the frame.
+        kind: empty for a data frame, else "remote" or "error".
+        flags: flags of a CAN FD frame, as in SocketCAN; None for a classical frame.
     """
 
     time_ns: int
@@ -61,7 +61,7 @@ class ReceivedFrame(NamedTuple):
     flags: int | None = None
 
     def line(self) -> str:
-        """Line as ``candump -L`` writes it."""
+        """Return the line that ``candump -L`` writes for the frame."""
         seconds, ns = divmod(self.time_ns, 10**9)
         can_id = f"{self.can_id:08X}" if self.extended else f"{self.can_id:03X}"
         data = "R" if self.kind == "remote" else self.data.hex().upper()
@@ -74,12 +74,12 @@ class Listener:
     """Listens to buses.
 
     Args:
-        buses: by name.
+        buses: (name, bus) of each.
 
     Attributes:
-        lost: frames that the kernel could not keep for us.
-        errors: what interfaces of python-can raised in place of a frame, by bus.
-        last_error: the last of them, with its bus.
+        lost: number of frames that the kernel dropped before they were read.
+        errors: number of errors that interfaces of python-can raised in place of a frame, by bus.
+        last_error: text of the last error, with its bus.
 
     Raises:
         BusError: a bus cannot be opened.
@@ -112,10 +112,10 @@ class Listener:
                 self._files.append(opened)
 
     def frames(self, timeout_s: float = LOOK_S) -> list[ReceivedFrame]:
-        """All frames that wait, by time; after the timeout perhaps none.
+        """Return all waiting frames by time; wait for up to ``timeout_s`` seconds for the first.
 
         Raises:
-            BusError: a bus cannot be read any more.
+            BusError: a bus can no longer be read.
         """
         all_have_files = len(self._files) == len(self._sockets)
         try:
@@ -136,7 +136,7 @@ class Listener:
         return received
 
     def _python_can(self, one: can.BusABC, name: str, channel: str) -> Iterator[ReceivedFrame]:
-        """Frames of python-can; an error of its interface is counted, until it is nothing else."""
+        """Yield the frames of a python-can bus; count errors, raise after many without a frame."""
         for message in waiting(one, MOST_AT_ONCE):
             if not isinstance(message, Exception):
                 self._failing[name] = 0
@@ -159,14 +159,14 @@ class Listener:
 
 
 def _raw(one: socket.socket, bus: str, channel: str) -> Iterator[ReceivedFrame]:
-    """Frames of SocketCAN that wait."""
+    """Yield the waiting frames of a SocketCAN socket."""
     with suppress(BlockingIOError):
         while True:
             yield _of_socket(*one.recvmsg(FD_SIZE, ANCILLARY_BYTES)[:2], bus, channel)
 
 
 def _of_socket(data: bytes, ancillary: Any, bus: str, channel: str) -> ReceivedFrame:
-    """A frame of SocketCAN."""
+    """Return the frame in a packet of SocketCAN."""
     stamp = stamp_ns(ancillary)
     time_ns = time.time_ns() if stamp is None else stamp
     word, payload, flags = Packet.unpack(data)
@@ -179,7 +179,7 @@ def _of_socket(data: bytes, ancillary: Any, bus: str, channel: str) -> ReceivedF
 
 
 def _python_can(message: can.Message, bus: str, channel: str) -> ReceivedFrame:
-    """A frame of python-can."""
+    """Return the frame in a message of python-can."""
     time_ns = round(message.timestamp * 1e6) * 1000
     can_id, extended, kind = message.arbitration_id, message.is_extended_id, ""
     flags = None

@@ -1,4 +1,4 @@
-"""A log of CAN frames, one frame at a time, in the formats of ``READERS``, also packed with gzip.
+"""Reader of a log of CAN frames, one frame at a time, in the formats of ``READERS``, also gzipped.
 
 A million lines take no more memory than a hundred.
 """
@@ -48,14 +48,14 @@ class LogFile:
     """One log; each iteration reads it from its beginning.
 
     Args:
-        path: the log; its suffix is the format, ``.gz`` behind it that it is packed.
+        path: the log; its suffix names the format, a further ``.gz`` marks a packed log.
         progress: called now and then with the part that is read, 0 to 1.
 
     Attributes:
-        left_out: frames that are no data frames, and lines of tools among them, by kind; of the
+        left_out: counts by kind of frames that are no data frames, and of lines of tools, in the
             last iteration.
-        disordered: frames that stand behind a later one, by up to ``OUT_OF_ORDER_NS``; they are
-            handed out in the order of the file, with the time of that later one.
+        disordered: number of frames that stand behind a later frame, by up to
+            ``OUT_OF_ORDER_NS``; each comes in the order of the file, with that later time.
     """
 
     def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
@@ -66,10 +66,10 @@ class LogFile:
         self._progress = progress
 
     def __iter__(self) -> Iterator[TimedFrame]:
-        """Every frame in the order of the file.
+        """Yield every frame in the order of the file.
 
         Raises:
-            CutOffError: the log is cut off; every whole frame was handed out before.
+            CutOffError: the log is cut off; every whole frame was yielded before.
             LogError: the log cannot be used.
         """
         place = Place(self._path)
@@ -87,7 +87,7 @@ class LogFile:
             raise place.error(f"damaged packing ({error})", "a log that is whole") from None
 
     def warnings(self) -> Iterator[str]:
-        """Yield what to know of the last iteration, before its frames are believed."""
+        """Yield what a person must know of the last iteration before relying on its frames."""
         yield from self._notes
         if self.left_out:
             counts = ", ".join(f"{count} {kind}" for kind, count in self.left_out.items())
@@ -96,7 +96,7 @@ class LogFile:
             yield f"{self.disordered} frames stand behind later ones; the log's order counts"
 
     def _frames(self, place: Place) -> Iterator[TimedFrame]:
-        """Its frames, whose times never go back."""
+        """Yield the frames of the log; their times never go back."""
         packed, suffix = _format(place)
         place.unit = "frame" if suffix in BINARY else "line"
         until_progress = 1
@@ -139,7 +139,7 @@ class LogFile:
         return place.error("no frame", "a log with frames, its suffix that of its format")
 
     def _first_or_out_of_order(self, time_ns: int, last_ns: int | None, place: Place) -> int:
-        """The time of a frame that does not follow that of the one before."""
+        """Return the time of a first or out-of-order frame; raise LogError for mixed clocks."""
         if abs(time_ns) > LATEST_NS:
             got = f"a time further than {LATEST_S} s from zero"  # itself too long to be shown
             raise place.error(got, "a date before 2286, or a time from the start of the log")
@@ -155,11 +155,11 @@ class LogFile:
 
 
 class _UnpackedWithoutEndError(Exception):
-    """A packed file grows by more than any log would: it is made to fill the memory."""
+    """A packed file grows by more than any log would: someone made it to fill the memory."""
 
 
 class _Unpacked(RawIOBase):
-    """Unpacked content of a gzip file; of a file that is cut off, all of it before the error."""
+    """Unpacked content of a gzip file; a file that is cut off gives its content, then the error."""
 
     def __init__(self, file: BufferedReader) -> None:
         self._packed = file
@@ -188,7 +188,7 @@ class _Unpacked(RawIOBase):
 
 
 class _Utf8(RawIOBase):
-    """UTF-8, without a mark, of a text in another encoding."""
+    """The text of a file in another encoding as UTF-8, without a byte order mark."""
 
     def __init__(self, file: BufferedReader, encoding: str) -> None:
         self._file = file
@@ -209,7 +209,7 @@ class _Utf8(RawIOBase):
 
 
 def _format(place: Place) -> tuple[bool, str]:
-    """Whether a log is packed, and the suffix of its format."""
+    """Return whether a log is packed, and the suffix of its format."""
     suffixes = [s.lower() for s in place.path.suffixes]
     packed = suffixes[-1:] == [".gz"]
     suffix = "".join(suffixes[:-1] if packed else suffixes)

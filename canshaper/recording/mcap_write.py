@@ -1,7 +1,7 @@
-"""A drive as MCAP: frames and values as messages of protobuf, zstd in chunks of a megabyte.
+"""Writer of a drive as MCAP: protobuf messages of frames and values, in zstd chunks of 1 MB.
 
-Messages of Foxglove have its names and numbers (github.com/foxglove/foxglove-sdk, schemas), and of
-their fields those that are used here: what Foxglove, rerun and PlotJuggler all read.
+The messages of Foxglove have its names and numbers (github.com/foxglove/foxglove-sdk, schemas) and
+only the fields used here, which Foxglove, rerun and PlotJuggler all read.
 """
 
 import re
@@ -48,16 +48,16 @@ _ENUMS = {
 
 
 class Schema:
-    """A message that is written: its class, and its schema for the file.
+    """A type of message: its protobuf class, and its schema for the file.
 
     Args:
-        name: with its package.
-        channels: of a message of values; by default it is one of the table.
+        name: name of the message with its package.
+        channels: channels of a message of values; None for a message of the table ``_FIELDS``.
 
     Attributes:
-        name: as above.
+        name: name of the message with its package.
         message: class of protobuf.
-        data: serialised FileDescriptorSet, with all that it needs.
+        data: serialised FileDescriptorSet with all dependencies.
     """
 
     def __init__(self, name: str, channels: Iterable[Channel] | None = None) -> None:
@@ -108,7 +108,7 @@ def _add(message: Any, fields: str, package: str) -> None:
 
 
 def _enum(message: Any, field: Any, texts: Any, scope: str) -> None:
-    """Make a field one of named values; the names of two enums in one message may be the same."""
+    """Make a field an enum with these texts; two enums in one message may share names."""
     holder = message.nested_type.add(name=f"{field.name}_")
     field.type, field.type_name = 14, f"{scope}.{holder.name}.Value"
     enum, used = holder.enum_type.add(name="Value"), set()
@@ -129,13 +129,13 @@ INFO = 2  # foxglove.Log.Level
 
 
 class McapWriter:
-    """Writes while it is driven: what is cut off can be read up to the last chunk.
+    """Writes during the drive: a file that is cut off can be read up to its last chunk.
 
     Args:
-        path: the file; one that is there is replaced.
+        path: the file; an existing one is replaced.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -151,7 +151,7 @@ class McapWriter:
         self._frame = frame.message
 
     def _channel(self, topic: str, schema: str) -> tuple[int, Any]:
-        """A new topic of a message of the table: its number, and the class of its messages."""
+        """Register a topic for a message of the table; return its number and message class."""
         number, one = self._schema(Schema(schema))
         return self._mcap.register_channel(topic, "protobuf", number), one.message
 
@@ -182,7 +182,7 @@ class McapWriter:
         self._mcap.add_message(channel, time_ns, head + bytes((len(data),)) + data, time_ns)
 
     def group(self, group: Group) -> Row:
-        """Return what writes the values of a new group, on the topic of its name."""
+        """Return a function that writes the values of a new group to the topic of its name."""
         # Names of protobuf are words.
         words = (re.sub(r"\W|^(?=\d)", "_", one, flags=re.ASCII) for one in group.name.split("/"))
         units = {channel.name: channel.unit for channel in group.channels if channel.unit}
@@ -202,11 +202,11 @@ class McapWriter:
         return row
 
     def event(self, time_ns: int, text: str) -> None:
-        """Write a line for people."""
+        """Write an event as a line for people."""
         self._add(self._log, time_ns, timestamp=_stamp(time_ns), level=INFO, message=text)
 
     def pose(self, time_ns: int, boom: Sequence[Point], grapple: Point) -> None:
-        """Write the crane as lines and a ball, and the places of tip and grapple as frames."""
+        """Write the crane as lines and a ball, and tip and grapple as coordinate frames."""
         tip, at = boom[-1], {"timestamp": _stamp(time_ns)}
         lines = [
             {
@@ -232,7 +232,7 @@ class McapWriter:
         self._mcap.add_message(number, time_ns, message(**fields).SerializeToString(), time_ns)
 
     def close(self) -> None:
-        """Write index and end."""
+        """Write index and end of the file."""
         try:
             self._mcap.finish()
         finally:

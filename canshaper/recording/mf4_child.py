@@ -1,7 +1,7 @@
-"""Reader of MF4 logs by asammdf, in a process of its own: a damaged file may end it.
+"""Reader of MF4 logs by asammdf, in a process of its own: a damaged file may crash it.
 
-It prints what it does not understand, too. Frames go to the standard output, in parts of
-``marshal``; nothing else of canshaper is loaded here.
+asammdf also prints what it does not understand. The process writes frames to its standard output,
+in parts of ``marshal``, and loads nothing else of canshaper.
 
     python -m canshaper.recording.mf4_child FILE
 """
@@ -29,9 +29,9 @@ CLASSICAL_BYTES, FD_BYTES = 8, 64
 
 
 def read(path: str) -> Iterator[list[Any] | dict[str, Any]]:
-    """Yield frames in lists, at last what is left out, and a fault with what was expected.
+    """Yield lists of frames, at last the counts of left-out frames and a fault.
 
-    What was expected is empty where a package is missing.
+    The fault is (got, expected), or None; expected is empty if a package is missing.
     """
     left_out: Counter[str] = Counter()
     fault: tuple[str, str] | None = None
@@ -60,7 +60,7 @@ def read(path: str) -> Iterator[list[Any] | dict[str, Any]]:
 
 
 def _bus_events(mdf: Any) -> Iterator[tuple[int, str, int]]:
-    """Indices of the groups of frames, their names and how many records they have."""
+    """Yield index, name and number of records of each group of frames."""
     for index, group in enumerate(mdf.groups):
         name = next((one.name for one in group.channels if one.name in GROUPS.values()), None)
         if name and group.channel_group.flags & BUS_EVENT:
@@ -68,7 +68,7 @@ def _bus_events(mdf: Any) -> Iterator[tuple[int, str, int]]:
 
 
 def _records(mdf: Any, index: int, count: int, left_out: Counter[str]) -> Iterator[tuple[Any, ...]]:
-    """Frames of a group, as ``TimedFrame`` has them; those that none can be are left out."""
+    """Yield the frames of a group as rows of ``TimedFrame``; leave out impossible ones."""
     start = mdf.header.start_time
     start_ns = int(start.timestamp()) * 10**9 + start.microsecond * 1000
     comment = mdf.groups[index].channel_group.comment if mdf.header.project == PROJECT else ""

@@ -1,6 +1,6 @@
-"""A drive as MF4 (ASAM MDF 4.10): bus logging of its frames, and its values with units.
+"""Writer of a drive as MF4 (ASAM MDF 4.10): bus logging of its frames, and values with units.
 
-Times are seconds as floats from a whole second, which is exact to the ns for 20 days.
+Times are seconds as floats since a whole second, which is exact to the ns for 20 days.
 """
 
 import struct
@@ -43,14 +43,14 @@ _ESI = 0x02  # linux/can.h, CANFD_ESI
 
 
 class Mf4Writer:
-    """Keeps what is written in a temporary file; the file itself is written at the end.
+    """Collects a drive in a temporary file and writes the MF4 file at the end.
 
     Args:
-        path: the file; one that is there is replaced.
-        buses: their names; the first one is channel 1.
+        path: the file; an existing one is replaced.
+        buses: names of the buses; the first bus is channel 1.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
 
     def __init__(self, path: Path, buses: Sequence[str]) -> None:
@@ -116,7 +116,7 @@ class Mf4Writer:
         self._mdf.groups[self._groups[name]].channel_group.acq_source = source
 
     def group(self, group: Group) -> Row:
-        """Return what writes the values of a new group."""
+        """Return a function that writes the values of a new group."""
         table = _Table(group)
         self._tables.append(table)
 
@@ -129,12 +129,12 @@ class Mf4Writer:
         return row
 
     def event(self, time_ns: int, text: str) -> None:
-        """Write a line for people."""
+        """Write an event as a line for people."""
         self._begin(time_ns)
         self._events.append((time_ns, text))
 
     def pose(self, time_ns: int, boom: Sequence[Point], grapple: Point) -> None:
-        """Write nothing: MF4 has no scenes, and the group of the crane has its values."""
+        """Write nothing: MF4 has no scenes, and the group "crane" has the values."""
 
     def close(self) -> None:
         """Write the file."""
@@ -156,14 +156,14 @@ class Mf4Writer:
 
 
 class _Table:
-    """Values of a group that are not in the file yet."""
+    """Values of a group that are not yet in the file."""
 
     def __init__(self, group: Group) -> None:
         self.rows: list[tuple[float, ...]] = []
         self._group, self._index = group, -1
 
     def write(self, mdf: Any, seconds: Any) -> None:
-        """Write the rows behind those that were written before."""
+        """Append the rows to those already written."""
         times, *columns = zip(*self.rows, strict=True)
         self.rows.clear()
         channels = self._group.channels
@@ -185,7 +185,7 @@ class _Table:
 
 
 def _texts(channel: Channel) -> dict[str, object] | None:
-    """The names of the values of a code, as asammdf takes them."""
+    """Return the texts of a code's values, as asammdf takes them."""
     if channel.texts is None:
         return None
     names: dict[str, object] = {"default_addr": b"unknown"}

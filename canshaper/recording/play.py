@@ -1,4 +1,4 @@
-"""A black box, played: every call that the daemon made, in its order, and every frame compared."""
+"""Replay of a black box: every call that the daemon made, in order, with every frame compared."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -22,19 +22,19 @@ OF_A_FRAME = frozenset((Kind.RX, Kind.TX, Kind.FAILED, Kind.WITHHELD))
 
 
 def of_same_files(box: Box, deployment: Deployment) -> bool:
-    """Whether a black box is of this deployment, by the hashes of its files."""
+    """Return whether a black box is of this deployment, by the hashes of its files."""
     return bool(box.header["identity"][2:] == deployment.identity.lines()[2:])
 
 
 def of_its_copies(box: Box, deployment: Deployment) -> bool:
-    """Whether this deployment is made of the files that were put into the bundle of a black box."""
+    """Return whether this deployment consists of the files in the bundle of a black box."""
     identity = deployment.identity
     carried = box.header.get("carried") or [identity.deployment, *identity.content]
     return bool(carried == [identity.deployment, *identity.content])
 
 
 def frames_of(box: Box) -> Iterator[TimedFrame]:
-    """The frames that the daemon received, as a log has them."""
+    """Yield the frames that the daemon received, like those of a log."""
     buses = box.header["buses"]
     since_1970_ns = box.header["time_ns"] - box.header["clock_ns"]
     for segment in box.segments:
@@ -46,14 +46,14 @@ def frames_of(box: Box) -> Iterator[TimedFrame]:
 
 
 class Player:
-    """Plays a black box.
+    """Replays a black box.
 
     Args:
         box: the black box.
-        deployment: that of the daemon.
+        deployment: the deployment of the daemon.
 
     Raises:
-        StateError: a controller of this deployment cannot be played.
+        StateError: a controller of this deployment cannot take recorded states.
     """
 
     def __init__(self, box: Box, deployment: Deployment) -> None:
@@ -67,10 +67,10 @@ class Player:
         self._states = States(Guarded(controller), controller)
 
     def run(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
-        """Every tick, with all that was received and sent since the one before it.
+        """Yield every tick, with all frames received and sent since the tick before.
 
         Raises:
-            BoxError: what is recorded cannot be.
+            BoxError: the recording does not fit this program or deployment.
         """
         number, box = -1, self._box
         since_1970_ns = box.header["time_ns"] - box.header["clock_ns"]
@@ -94,7 +94,7 @@ class Player:
 
 
 class _Played:
-    """A controller that is called as the daemon has called its own."""
+    """A controller that gets the calls that the daemon made to its own."""
 
     def __init__(self, guarded: Guarded, controller: Controller, buses: list[str]) -> None:
         self._guarded, self._controller, self._buses = guarded, controller, buses
@@ -111,7 +111,7 @@ class _Played:
         self._result = Result([], {}, [])
 
     def run(self, data: bytes) -> Iterator[tuple[int, Tick, Result]]:
-        """Every tick, with how many deadlines were missed before it."""
+        """Yield (deadlines missed before the tick, tick, result) for every tick."""
         self._records, self._at = list(records(data)), 0
         while (record := self._next()) is not None:
             if record.kind != Kind.TICK:
@@ -133,13 +133,13 @@ class _Played:
         return self._records[self._at - 1]
 
     def _next_of(self, kinds: frozenset[Kind]) -> Record | None:
-        """The next record, where it is one of these."""
+        """Return the next record if it is of one of these kinds, else None."""
         if self._at < len(self._records) and self._records[self._at].kind in kinds:
             return self._next()
         return None
 
     def _compare(self, ours: Frame) -> None:
-        """Compare a frame that was computed now with the one that was then."""
+        """Compare a frame computed now with the recorded one."""
         result = self._result
         result.sent.append(ours)
         record = self._next_of(SENT)

@@ -1,6 +1,6 @@
-"""The picture of a replay: joystick and command, predicted sway, and the states of each deployment.
+"""The picture of a replay: joystick and command, predicted sway, and each deployment's states.
 
-It draws through the object API, so no display and no global state is involved.
+It uses the object API of matplotlib: no display and no global state.
 """
 
 import re
@@ -21,7 +21,7 @@ from canshaper_sim.recording import Recording
 
 
 class _Look(NamedTuple):
-    """Look of a deployment's curves; later ones are thinner and lie above the others."""
+    """Look of a deployment's curves; those of later deployments are thinner and lie on top."""
 
     colour: str
     width: float
@@ -56,7 +56,7 @@ _LATE = 0.8  # of the time axis: a reason from here on ends where its state does
 
 
 def figure(replays: Sequence[Replayed]) -> Figure:
-    """The picture of all axes that move, of all replays.
+    """Return the picture of all axes that move, of all replays.
 
     Args:
         replays: at least one, with rows.
@@ -104,7 +104,7 @@ def _moves(recording: Recording, name: str) -> bool:
 
 
 def _head(fig: Figure, replays: Sequence[Replayed], idle: Sequence[str], height: float) -> None:
-    """Name the curves, the lanes, and what is left out."""
+    """Name the curves, the lanes, and the axes that are left out."""
     words = [("joystick straight to the valve (thin)", STRAIGHT.colour)]
     styles = ("solid", "dashed", "dotted", "thin solid")
     for i, one in enumerate(replays):
@@ -116,7 +116,7 @@ def _head(fig: Figure, replays: Sequence[Replayed], idle: Sequence[str], height:
 
 
 def _title(name: str, replays: Sequence[Replayed]) -> str:
-    """Name of an axis, its sway and below its run-on, straight and of each deployment."""
+    """Return name and sway of an axis, below them its run-on: straight and of each deployment."""
     having = [one for one in replays if name in one.measures]
     texts = []
     for words, key, unit in _NUMBERS:
@@ -133,7 +133,7 @@ def _title(name: str, replays: Sequence[Replayed]) -> str:
 def _draw_command(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
-    """Draw the command of the valve, over the joystick as a filled step."""
+    """Draw the command of the valve on top of the joystick as a filled step."""
     if name in straight.axes:
         joystick, colour = straight.axes[name].joystick, style.JOYSTICK_COLOUR
         panel.fill_between(straight.t_s, joystick, step="post", color=colour, linewidth=0)
@@ -148,7 +148,7 @@ def _draw_command(
 def _draw_sway(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
-    """Draw the predicted sway, and that of the joystick straight to the valve."""
+    """Draw the predicted sway, also that of the joystick straight to the valve."""
     style.label(panel, y="predicted\nsway, degrees")
     joystick = straight.axes.get(name)
     if joystick is not None and joystick.sway_deg is not None:
@@ -165,7 +165,7 @@ def _plot(panel: Axes, x: Sequence[float], y: Sequence[float], look: _Look, **op
 def _draw_lanes(
     panel: Axes, name: str, replays: Sequence[Replayed], shown_s: tuple[float, float]
 ) -> None:
-    """A lane a deployment: the states of the axis, and other events as marks."""
+    """Draw one lane for each deployment: the states of the axis, and other events as marks."""
     first_s, last_s = shown_s
     late_s = first_s + _LATE * (last_s - first_s)
     for i, one in enumerate(replays):
@@ -196,7 +196,7 @@ def _draw_lanes(
 
 
 def _spans(one: Replayed, axis: str) -> Iterator[tuple[float, float, State, Reason]]:
-    """Yield begin, end (s), state and reason of an axis; unknown before its first event."""
+    """Yield begin and end (s), state and reason of an axis, from its first event on."""
     changes = [(_seconds(one, at), m[2], m[3]) for at, m in _matches(one) if m[1] == axis]
     end = (_seconds(one, one.trace.end_ns), "", "")
     for (start_s, state, reason), (end_s, *_) in pairwise([*changes, end]):

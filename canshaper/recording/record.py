@@ -1,6 +1,6 @@
-"""Every frame of the buses into a log, and one file to attach to a report.
+"""Record every frame of the buses into a log, and pack one file to attach to a report.
 
-That has log, deployment, DBC files, versions and the history of the status messages.
+That file has log, deployment, DBC files, versions and the history of the status messages.
 """
 
 import json
@@ -34,15 +34,15 @@ MOST_RATIO, RATIO_FROM_BYTES = 100, 1_000_000
 def pack(
     path: Path, log: Path, deployment: Deployment, history: History, facts: dict[str, object]
 ) -> None:
-    """Make a bundle.
+    """Write a bundle: one file with a log and all that a replay of it needs.
 
     Args:
-        path: the bundle, which is replaced where it is there.
+        path: the bundle; an existing one is replaced.
         log: the recorded log.
-        deployment: whose buses were recorded; its file and DBC files go in, so that the paths in
-            the file hold when it is unpacked.
-        history: what the status messages reported.
-        facts: anything else about the recording.
+        deployment: the recorded machine; its file and DBC files go in under paths that still
+            hold when the bundle is unpacked.
+        history: history of the status messages.
+        facts: other facts about the recording, by name.
 
     Raises:
         OSError: a file cannot be read or written.
@@ -60,13 +60,13 @@ def pack(
 
 
 def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
-    """Unpack a bundle into a folder; from any source, nothing is written or read elsewhere.
+    """Unpack a bundle into a folder; even a hostile one reads and writes nothing outside it.
 
     Returns:
         (log, deployment file).
 
     Raises:
-        LogError: it is no bundle, a damaged one, or too large; the message names the member.
+        LogError: the file is no bundle, damaged, or too large; the message names the member.
     """
     where = f"{path}"
     try:
@@ -98,10 +98,10 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
 
 
 def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> None:
-    """Write one member as a regular file, whatever it says it is.
+    """Write one member as a regular file.
 
     Raises:
-        ValueError: a name that leads elsewhere, a link, or more bytes than there may be.
+        ValueError: the member's name leads out of the folder, it is a link, or it is too large.
     """
     parts = PurePosixPath(member.filename).parts
     kind = stat.S_IFMT(member.external_attr >> 16)
@@ -125,7 +125,7 @@ def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> 
 
 
 def history_lines(history: History) -> list[str]:
-    """Every change with its time, then the counters as they were last."""
+    """Return every change with its time, then the last counters."""
     lines = [f"{time_text(event.time_ns)} {event.text}" for event in history.changes]
     if history.counted_ns is not None:
         counters = " ".join(f"{name}={count}" for name, count in history.counters.items())
@@ -135,7 +135,7 @@ def history_lines(history: History) -> list[str]:
 
 
 def time_text(time_ns: int) -> str:
-    """Time of the day with its date, in UTC, to the millisecond."""
+    """Return date and time of the day in UTC, to the millisecond."""
     return datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")
 
 
@@ -147,11 +147,11 @@ class Recording:
     """A recording under way, or done.
 
     Attributes:
-        frames: by kind, the empty one for data frames.
-        lost: frames that the kernel could not keep for us.
-        errors: of the interfaces, each in place of a frame.
-        history: what the status messages reported.
-        seconds: how long.
+        frames: number of frames by kind; the kind of data frames is empty.
+        lost: number of frames that the kernel dropped before they were read.
+        errors: number of errors that interfaces raised in place of a frame.
+        history: history of the status messages.
+        seconds: duration so far.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -173,18 +173,18 @@ class Recording:
     def run(
         self, path: Path, seconds: float | None, on_progress: Callable[["Recording"], bool]
     ) -> None:
-        """Record until the time is over, or ``on_progress`` says that it is enough.
+        """Record until the time is over or ``on_progress`` returns False.
 
         Args:
-            path: the log, of candump or by its suffix one of ``EXTRAS``; one that is there is
+            path: the log, of candump or by its suffix one of ``EXTRAS``; an existing one is
                 replaced.
-            seconds: how long; None without end.
-            on_progress: called some times a second; False ends the recording.
+            seconds: duration; None without end.
+            on_progress: called several times a second; returns False to end the recording.
 
         Raises:
-            BusError: a bus cannot be opened, or not be read any more.
+            BusError: a bus cannot be opened, or can no longer be read.
             OSError: the log cannot be written; what was written stays.
-            UsageError: what its format needs is not installed.
+            UsageError: the extra for the format of the log is not installed.
         """
         listener = Listener(self._deployment.config.buses.items())
         try:
@@ -210,7 +210,7 @@ class Recording:
 def _opened(
     path: Path, deployment: Deployment
 ) -> Iterator[tuple[Callable[[ReceivedFrame], object], Callable[[], object]]]:
-    """A log: what writes a frame, and what puts all that was written onto the disk."""
+    """Open a log; give a function that writes a frame, and one that flushes to the disk."""
     if path.suffix.lower() in EXTRAS:
         with exporting(path, deployment) as export:
             assert export is not None

@@ -1,4 +1,4 @@
-"""Replay of a recorded drive: what canshaper would have done with it, or what it did."""
+"""Replay of a recorded drive: the frames that canshaper would have sent in it, or did send."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -27,12 +27,12 @@ MOST_NAMED = 8
 
 @dataclass
 class Verdict:
-    """A replay of a black box compared with what the daemon sent.
+    """A replay of a black box, compared with the frames that the daemon sent.
 
     Attributes:
-        compared: frames that were compared.
-        different: how many of them are not the same.
-        examples: the first differences, with their times.
+        compared: number of compared frames.
+        different: number of frames that differ.
+        examples: the first differences, with their times in ns.
     """
 
     compared: int = 0
@@ -49,13 +49,13 @@ class Verdict:
 
 @dataclass
 class Drive:
-    """A log before it is replayed: its channels, and whether it is a black box.
+    """A log before its replay: its channels, and its black box if it is one.
 
     Attributes:
         path: the log.
         channels: bus by channel.
-        box: the log, where it is a black box.
-        exact: whether it is one of this deployment: every call is played, every frame compared.
+        box: the log if it is a black box, else None.
+        exact: the black box is of this deployment: its replay compares every frame.
     """
 
     path: Path
@@ -65,13 +65,13 @@ class Drive:
 
 
 def look(deployment: Deployment, path: Path, given: Mapping[str, str], *, own: bool) -> Drive:
-    """Look at the beginning of a log: which channel is which bus, and is it a black box?
+    """Look at the beginning of a log for its channels, and whether it is a black box.
 
     Args:
         deployment: the machine.
         path: the log.
-        given: channels by bus, as the command line says.
-        own: whether the deployment came with the log.
+        given: channel by bus from the command line.
+        own: the deployment came with the log.
 
     Raises:
         LogError: the log cannot be used, or its channels are not those of the deployment.
@@ -98,19 +98,19 @@ def look(deployment: Deployment, path: Path, given: Mapping[str, str], *, own: b
 
 
 class Replay:
-    """One deployment through one log.
+    """Replay of one log through one deployment.
 
     Args:
         deployment: the machine.
         drive: the log.
 
     Attributes:
-        exact: whether every call of the daemon is played, and every frame compared.
-        log: for what it has left out.
-        received: frames of each message that is received.
-        verdict: of a black box.
-        cut_off: the log is cut off, and why; else empty.
-        never_ready: ticks of each reason, of axes that were never ready in a log.
+        exact: the replay makes every call of the daemon and compares every frame.
+        log: the log, for the counts of left-out frames.
+        received: number of received frames by message.
+        verdict: result of the comparison with a black box.
+        cut_off: why the log is cut off; empty if it is whole.
+        never_ready: axis that was never ready -> number of ticks of each of its reasons.
     """
 
     def __init__(self, deployment: Deployment, drive: Drive) -> None:
@@ -124,10 +124,10 @@ class Replay:
         self.log = LogFile(drive.path)
 
     def run(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
-        """Every tick with what it made.
+        """Yield every tick with its result.
 
         Raises:
-            LogError: the log cannot be used; one that is cut off is used up to there.
+            LogError: the log cannot be used; a log that is cut off is used up to its end.
         """
         for tick, result in self._played(progress) if self.exact else self._clocked(progress):
             for _, frame in tick.received:
@@ -159,7 +159,7 @@ class Replay:
             yield tick, result
 
     def check_joysticks(self) -> None:
-        """Look whether there was anything to replay.
+        """Check after the replay that the log had a joystick.
 
         Raises:
             LogError: the log has no frame of any joystick.
@@ -177,7 +177,7 @@ class Replay:
             )
 
     def _missing(self) -> list[str]:
-        """Joysticks without frames in the log."""
+        """Return the joysticks without frames in the log, as texts."""
         there = {(bus, group_of(i) if extended else i) for bus, i, extended in self.received}
         return [
             f"{joystick.message.name}, id {joystick.key[1]:#x} on {joystick.key[0]}"
@@ -187,7 +187,7 @@ class Replay:
         ]
 
     def ticks_of(self) -> str:
-        """Whose ticks these are, for people."""
+        """Return a sentence for a person on where the ticks come from: the daemon or a clock."""
         box = self._drive.box
         if self.exact:
             return "the ticks are those of the daemon that the black box is of"
@@ -195,7 +195,7 @@ class Replay:
         return f"the ticks are those of a clock: {why}"
 
     def warnings(self) -> Iterator[str]:
-        """Yield warnings about the log, to read before its replay is believed."""
+        """Yield warnings about the log, to read before relying on its replay."""
         box, program = self._drive.box, self._deployment.identity.lines()[1]
         if self.exact and box and program not in box.header["identity"]:
             yield "the black box is of another program than this one; what is different may be that"
@@ -209,7 +209,7 @@ class Replay:
         yield from self.log.warnings()
 
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
-        """Frames of the log on the buses of the deployment, but those that no daemon sees."""
+        """Yield the frames of the log that a daemon of the deployment would see."""
         channels, box = self._drive.channels, self._drive.box
         known: dict[Key, tuple[str, Kind]] = {}
         new, ignored = new_frame, Kind.IGNORED

@@ -1,4 +1,4 @@
-"""Report of a replay, for people and as numbers, and the replay as a recorded drive."""
+"""Report of a replay for people and as numbers, and the replay as a recorded drive."""
 
 import math
 from array import array
@@ -38,18 +38,18 @@ MOST_ROWS = 540_000
 class Trace:
     """Rows of the ticks of one replay.
 
-    The log has no sway and no speed of the crane. Sway is that of the deployment's own model, and
-    the speed of an axis is taken to be what was sent to its valve.
+    A log has no sway and no speed of the crane. The trace takes sway from the deployment's own
+    model, and as speed of an axis the setpoint sent to its valve.
 
     Args:
-        deployment: whose axes they are.
-        begin_s: seconds after the first tick from which rows are kept.
-        end_s: up to where; None for the end.
+        deployment: the machine of the axes.
+        begin_s: time of the first row to keep, seconds after the first tick.
+        end_s: time of the last row to keep; None for the end.
 
     Attributes:
-        start_ns: time of the first tick; None before.
-        end_ns: of the last one.
-        full: whether there were more ticks than rows are kept.
+        start_ns: time of the first tick; None before it.
+        end_ns: time of the last tick.
+        full: the drive had more ticks than ``MOST_ROWS``; the rest was dropped.
     """
 
     def __init__(self, deployment: Deployment, begin_s: float, end_s: float | None) -> None:
@@ -67,7 +67,7 @@ class Trace:
                 self._models[name] = SwayModel(sway.mode(), tick_s), sway.full_speed_m_s
 
     def add(self, tick: Tick, result: Result) -> None:
-        """Take the rows of a tick."""
+        """Take a tick and its result."""
         if self.start_ns is None:
             self.start_ns = tick.now_ns
         self.end_ns = tick.now_ns
@@ -90,15 +90,15 @@ class Trace:
 
     @property
     def rows(self) -> int:
-        """How many ticks are kept."""
+        """Number of ticks kept."""
         return len(self._t_s)
 
     def recording(self) -> Recording:
-        """The drive as it was replayed."""
+        """Return the drive as it was replayed."""
         return self._recording(sent=1, sway=2)
 
     def straight(self) -> Recording:
-        """The drive as it would be with the joystick straight to the valve."""
+        """Return the drive as it would be with the joystick straight to the valve."""
         return self._recording(sent=0, sway=3)
 
     def _recording(self, sent: int, sway: int) -> Recording:
@@ -112,17 +112,18 @@ class Trace:
 
 @dataclass
 class Replayed:
-    """One deployment's replay, done.
+    """A finished replay of one deployment.
 
     Attributes:
-        name: for people; no two have the same.
+        name: unique name for people.
         deployment: the machine.
-        replay: it.
-        trace: its rows.
-        events: (time in the log, ns; text) of what the daemon would have reported.
-        ticks: how many.
-        missed: deadlines that the daemon missed.
-        measures: by axis; None for an axis that cannot be measured.
+        replay: the replay.
+        trace: rows of the replay.
+        events: (time in the log, ns; text) of each event that the daemon would have reported.
+        ticks: number of ticks.
+        missed: number of deadlines that the daemon missed.
+        measures: measures by axis; empty for a drive of fewer than two rows.
+        straight: the same with the joystick straight to the valve.
     """
 
     name: str
@@ -146,12 +147,12 @@ class Replayed:
             self.straight[axis] = axis_metrics(straight, axis, still_deg)
 
     def count(self, axis: str, state: str) -> int:
-        """How often an axis went into a state."""
+        """Return how often an axis entered a state."""
         begin = f"axis={axis} state={state} "
         return sum(text.startswith(begin) for _, text in self.events)
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return everything as plain data."""
         replay, verdict = self.replay, self.replay.verdict
         start_ns = self.trace.start_ns or 0
         return {
@@ -179,7 +180,7 @@ class Replayed:
 
 
 def print_replays(replays: Sequence[Replayed], console: Console) -> None:
-    """A table an axis: the joystick straight to the valve, then each deployment."""
+    """Print one table for each axis: the joystick straight to the valve, then each deployment."""
     for axis in dict.fromkeys(axis for one in replays for axis in one.measures):
         table = WholeTable(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, title_justify="left")
         table.add_column(axis_title(axis), no_wrap=True)
@@ -200,7 +201,7 @@ def print_replays(replays: Sequence[Replayed], console: Console) -> None:
 
 
 def verdict_lines(one: Replayed, *, examples: bool) -> Iterator[str]:
-    """Yield the result of the comparison with the log, with the first differences or without."""
+    """Yield the result of the comparison with the log, and the first differences if wanted."""
     verdict = one.replay.verdict
     if not verdict.compared:
         return
@@ -218,7 +219,7 @@ def _same(different: int) -> str:
 
 
 def _difference_text(deployment: Deployment, difference: Difference) -> str:
-    """A difference in the words of the DBC."""
+    """Return a difference in the names and values of the DBC."""
     bus, can_id, extended = difference.key
     messages = [
         m

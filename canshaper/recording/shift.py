@@ -1,8 +1,8 @@
 """The work in logs: figures by shift, profile and anti-sway, from a replay of each log.
 
-A replay gives joysticks, states and profiles. Valve frames in a log say what the valves really got,
-from any sender; without any, it is what the deployment would have sent. The swing is that of the
-axis' model behind these commands, corrected by what a sway sensor shows.
+A replay gives joysticks, states and profiles. The valve commands are those of the valve frames in
+the log, from any sender; without valve frames, those that the deployment would have sent. The swing
+is that of the axis' model behind these commands, corrected by a sway sensor if there is one.
 """
 
 import math
@@ -37,7 +37,7 @@ MOST_TICKS = 15_000
 
 
 class LogOfWork(NamedTuple):
-    """A log before it is counted: which machine, name for people, first frame, and what it is."""
+    """A log before it is counted: machine, name for people, first frame, deployment and drive."""
 
     machine: str
     name: str
@@ -47,24 +47,24 @@ class LogOfWork(NamedTuple):
 
 
 def first_ns(drive: Drive) -> int:
-    """Time of the first frame of a log; LogError where it cannot be read."""
+    """Return the time of a log's first frame, ns; raise LogError if the log cannot be read."""
     frames = frames_of(drive.box) if drive.box else iter(LogFile(drive.path))
     return next((frame.time_ns for frame in frames), 0)
 
 
 def day_of(time_ns: int) -> str:
-    """Day of a time of a log, in UTC; empty where its clock has none."""
+    """Return the day of a time in a log, in UTC; empty if its clock has no date."""
     if time_ns < FIRST_DAY_NS:
         return ""
     return datetime.fromtimestamp(time_ns / 1e9, UTC).date().isoformat()
 
 
 class Shifts:
-    """The table of the work in many logs, each given to ``add`` in the order of their times.
+    """The table of the work in many logs; ``add`` takes the logs in the order of their times.
 
     Args:
-        by: what a shift is: ``gap``, ``day`` or ``file``.
-        gap_s: time without a frame that ends one.
+        by: limit of a shift: ``gap``, ``day`` or ``file``.
+        gap_s: time without a frame that ends a shift, s.
     """
 
     def __init__(self, by: str, gap_s: float) -> None:
@@ -74,7 +74,7 @@ class Shifts:
         self._shift: dict[str, str] = {}
 
     def rows(self) -> list[dict[str, Any]]:
-        """Rows of the table, by the columns of ``FIGURES``, of what was driven if anything was."""
+        """Return the rows of the table by column; rows without driving only if no row has any."""
         names = ("machine", "shift", "crane", "profile", "anti_sway")
         driven = {key: one for key, one in self._figures.items() if one.driven_s}
         return [
@@ -83,13 +83,13 @@ class Shifts:
         ]
 
     def add(self, log: LogOfWork, progress: Callable[[float], None]) -> list[str]:
-        """Count a log; what is in one of the same machine before it counts once.
+        """Count a log; ticks that an earlier log of the same machine also has count once.
 
         Returns:
-            What to know of the log before its figures are believed.
+            Notes on the log to read before relying on its figures.
 
         Raises:
-            LogError: the log cannot be used; one that is cut off is used up to there.
+            LogError: the log cannot be used; a log that is cut off is used up to its end.
         """
         replay, machine = Replay(log.deployment, log.drive), log.machine
         readers = _Readers(log.deployment)
@@ -122,7 +122,7 @@ class Shifts:
         return notes
 
     def _begin(self, log: LogOfWork, now_ns: int) -> None:
-        """Name the shift of a tick."""
+        """Name the shift that a tick belongs to."""
         machine, day = log.machine, day_of(now_ns)
         if self._by == "file" or not day:
             self._shift[machine] = log.name
@@ -136,7 +136,7 @@ class Shifts:
 
 
 class _Axis:
-    """Motion of one axis in a log, tick by tick; ``foreign``: no canshaper drives it."""
+    """Motion of one axis in a log, tick by tick; ``foreign``: another program drives the axis."""
 
     def __init__(self, bound: BoundAxis, tick_s: float) -> None:
         config = bound.config
@@ -151,26 +151,26 @@ class _Axis:
         self.radius: Value | None = None
 
     def use_sensor(self, message: SwaySensorInput) -> None:
-        """Take measurements of this message too."""
+        """Also use the sway measurements of this message."""
         one, model = self.bound.sway_sensor, self.model
         assert one and model
         self._observer = SwayObserver(model, one.timing, one.limits, one.gains)
         self._signal, self._lost_ns = SwaySignal(message, one), 1e9 * one.timing.lost_s
 
     def on_valve_frame(self, data: bytes, time_ns: int) -> None:
-        """Take a frame of its valve that is in the log."""
+        """Take a frame of the axis' valve from the log."""
         layout, valve = self.bound.valve.message.fields.layout, self.bound.valve
         if len(data) == layout.length and (steps := valve.read(layout.decode(data))) is not None:
             self._logged, self.valve_ns = self._limits.velocity(steps / valve.steps), time_ns
 
     def on_status(self, data: bytes, time_ns: int) -> None:
-        """Take a frame of its status that is in the log."""
+        """Take a frame of the axis' status from the log."""
         values = self.bound.status.decode(data) if self.bound.status else None
         if values and values["State"] in {*State}:
             self._status, self._status_ns = State(values["State"]), time_ns
 
     def step(self, row: Row, now_ns: int, ticks: int) -> None:
-        """Go on by so many ticks, to what a replay made of the last one."""
+        """Advance by this number of ticks to the replay's row of the last one."""
         self.velocity, self.state, self.foreign = row.applied, row.state, False
         if self.valve_ns >= 0:  # it closes by itself
             silent = now_ns - self.valve_ns > 1_000_000 * self.bound.config.valve.timeout_ms
@@ -213,7 +213,7 @@ class _Axis:
 
 
 class _Crane:
-    """The axes of one crane, and what it has done."""
+    """The axes of one crane, and the counter of its work."""
 
     def __init__(self, name: str, axes: Mapping[str, _Axis], still_deg: float) -> None:
         self._name, self._axes, self._anti_sway = name, axes, ""
@@ -224,7 +224,7 @@ class _Crane:
         self._profiles = next(((name, names) for name, names in profiles if names), None)
 
     def part(self, rows: Mapping[str, Row]) -> tuple[str, str, str]:
-        """Crane, profile and anti-sway of this tick."""
+        """Return crane, profile and anti-sway of this tick."""
         if moving := [one for one in self._swinging.values() if one.velocity]:
             off = any(one.foreign or one.state is State.BYPASS_ON for one in moving)
             self._anti_sway = "off" if off else "on"
@@ -232,7 +232,7 @@ class _Crane:
         return self._name, names[rows[axis].active_set] if axis else "", self._anti_sway
 
     def count(self, figures: Figures, rows: Mapping[str, Row], seconds: float) -> None:
-        """Count a tick."""
+        """Count a tick of this many seconds."""
         joysticks, swings = {}, {}
         for name, one in self._axes.items():
             command = rows[name].command
@@ -253,7 +253,7 @@ class _Crane:
 
 
 class _Readers:
-    """Everything that follows one log: its axes and cranes, and who reads which frame."""
+    """All objects that follow one log: axes and cranes, and the readers of each frame."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.tick_ns = 1_000_000 * deployment.config.tick_ms
@@ -287,7 +287,7 @@ class _Readers:
             crane.counter.end()
 
     def notes(self) -> Iterator[str]:
-        """Yield a line for each kind of frames that the log lacks, and what takes their place."""
+        """Yield a line for each kind of frame that the log lacks, with its substitute."""
         if computed := [name for name, one in self.axes.items() if one.valve_ns < 0]:
             yield f"no valve frames of {', '.join(computed)}: taken is what the file would send"
         if foreign := [name for name, one in self.axes.items() if one.foreign]:

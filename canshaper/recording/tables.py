@@ -1,7 +1,7 @@
-"""Logs that are tables whose header names the columns, and the writer of logs.
+"""Readers of logs that are tables with named columns, and the writer of logs.
 
-Those of python-can, GVRET (SavvyCAN), CANedge, Kvaser and Vector, with commas, semicolons or tabs,
-and what Excel makes of them.
+They read the tables of python-can, GVRET (SavvyCAN), CANedge, Kvaser and Vector, with commas,
+semicolons or tabs, also after Excel has saved them.
 """
 
 import csv as quoted
@@ -52,13 +52,13 @@ Known = tuple[str, int, bool, int | None] | str
 
 
 def is_log(header: str) -> bool:
-    """Whether this first line of a table is that of a log of frames, or nearly one."""
+    """Return whether this first line of a table is that of a log of frames, or nearly one."""
     of_kvaser = header.strip().startswith(("CSV CAN data", "Kvaser Memorator Log"))
     return of_kvaser or "arbitration_id" in header or Table.of(header) is not None
 
 
 def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """A table by its header, which may stand below some lines."""
+    """Yield the frames of a table; its header may stand below other lines."""
     rows, bases = lines(file, place), {}
     first = header = next(rows, b"").decode("utf-8", "replace").strip()
     while (table := Table.of(header)) is None:
@@ -74,7 +74,7 @@ def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _unwrapped(frames: Iterator[TimedFrame]) -> Iterator[TimedFrame]:
-    """Frames of a clock of 32 bits, signed or not: from 0 where it began below, and on over it."""
+    """Yield frames with the wraps of a 32-bit clock undone; a negative first time becomes 0."""
     offset_ns: int | None = None
     before_ns = 0
     for frame in frames:
@@ -87,11 +87,11 @@ def _unwrapped(frames: Iterator[TimedFrame]) -> Iterator[TimedFrame]:
 
 
 class Table:
-    """Columns of a table, by the names in ``NAMES``, and the frames in its rows.
+    """The columns of a table, by the names in ``NAMES``, and the reader of its rows.
 
     Attributes:
-        bases: of identifiers and bytes.
-        of_gvret: whether its times are microseconds, which GVRET does not say.
+        bases: number bases of identifiers ("id") and bytes ("data").
+        of_gvret: GVRET wrote the table: its times are in microseconds, without a unit.
     """
 
     def __init__(self, header: str, delimiter: str, at: dict[str, int], *, cells: bool) -> None:
@@ -104,7 +104,7 @@ class Table:
 
     @classmethod
     def of(cls, header: str) -> "Table | None":
-        """The table under a header; None where its rows are no frames."""
+        """Return the table under a header; None if its rows are no frames."""
         delimiter = next((one for one in ";\t," if one in header), ",")
         at: dict[str, int] = {}
         cells = False
@@ -120,7 +120,7 @@ class Table:
         return cls(header, delimiter, at, cells=cells)
 
     def frames(self, rows: Iterator[bytes], place: Place) -> Iterator[TimedFrame]:
-        """Yield the data frames of rows."""
+        """Yield the data frames of these rows."""
         others = [at for name, at in self._at.items() if name not in ("time", "data")]
         key_of = itemgetter(*others)
         width, delimiter, at_time = max(self._at.values()) + 1, self._delimiter, self._at["time"]
@@ -155,7 +155,7 @@ class Table:
             yield frame
 
     def _kind(self, cells: Sequence[str], place: Place) -> Known:
-        """Channel, id and length of a row; or what it is instead of a data frame."""
+        """Return channel, id, extended and length of a row; or the kind of a left-out row."""
         row = {name: cells[at].strip().lower() for name, at in self._at.items()}
         flags = int(row.get("flags") or "0")
         for name, bit in (("error", _ERROR), ("remote", _REMOTE)):
@@ -219,12 +219,12 @@ def _number(word: str, base: int) -> int:
 
 
 class LogWriter:
-    """Writes what was received and what was sent, as ``candump -L`` does.
+    """Writes received and sent frames as ``candump -L`` does.
 
     Args:
-        file: where to.
+        file: the open log.
         channel_of: channel by bus.
-        fd: messages of CAN FD; what is longer than classical frames is one, too.
+        fd: messages of CAN FD; a frame longer than a classical one is also written as CAN FD.
     """
 
     def __init__(
@@ -236,7 +236,7 @@ class LogWriter:
         self._last_ns = 0
 
     def write(self, tick: Tick, result: Result) -> None:
-        """Write one tick; its others are without a time of their own."""
+        """Write one tick; frames of ``others`` get the time of the line before."""
         for time_ns, frame in tick.received:
             self._line(time_ns, frame)
         for frame in tick.others:

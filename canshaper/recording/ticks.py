@@ -1,4 +1,4 @@
-"""A tick of a replay, what it made, and the ticks of a clock for a log that has none."""
+"""A tick of a replay, its result, and the clock that makes ticks for a log without them."""
 
 import math
 import re
@@ -32,11 +32,11 @@ class Tick:
     """One tick.
 
     Attributes:
-        number: of its deadline, from 0.
-        now_ns: when it was.
-        received: frames that came since the tick before, with their arrival, in order.
-        others: those among them that are read after the valves have their frames.
-        logged: frames of the log such as the daemon sends: of a daemon, or of who drove instead.
+        number: number of its deadline, from 0.
+        now_ns: time of the tick.
+        received: (arrival in ns, frame) since the tick before, in order.
+        others: frames that the daemon reads after the valves have their frames.
+        logged: (arrival in ns, frame) of the kind that the daemon sends, from any sender.
     """
 
     number: int
@@ -47,10 +47,11 @@ class Tick:
 
 
 class Row(NamedTuple):
-    """One axis after a tick: command and applied velocity, [-1, 1]; predicted sway, degrees.
+    """One axis after a tick.
 
-    Then what a motion of two axes adds to the velocity, which makes no swing; state, number of the
-    parameter set, and its sway mode.
+    The row has the demand ``command`` and the sent velocity ``applied``, [-1, 1]; the predicted
+    sway, degrees; the part ``added`` to the velocity by a motion of two axes, which makes no swing;
+    state, number of the parameter set, and its sway mode.
     """
 
     command: float
@@ -67,7 +68,7 @@ new_row = tuple.__new__  # Row(...) in half the time
 
 @dataclass(slots=True)
 class Difference:
-    """A frame that is not what was recorded; None where there is none."""
+    """A frame that differs from the recorded one; None for a frame that is missing."""
 
     key: Key
     ours: bytes | None
@@ -79,11 +80,11 @@ class Result:
     """Result of a tick.
 
     Attributes:
-        sent: frames, in order.
-        rows: by axis.
-        events: what the daemon would have logged.
-        differences: to what was recorded.
-        compared: frames that were compared.
+        sent: sent frames, in order.
+        rows: row of each axis.
+        events: texts that the daemon would have logged.
+        differences: differences from the recorded frames.
+        compared: number of compared frames.
     """
 
     sent: list[Frame]
@@ -94,7 +95,7 @@ class Result:
 
 
 def rows_of(controller: Controller) -> Callable[[], dict[str, Row]]:
-    """Return what makes the rows of its axes, as they are when it is called."""
+    """Return a function that returns the present row of each axis of a controller."""
     rows = [(name, _row_of(controller, one)) for name, one in controller.axes.items()]
     return lambda: {name: row() for name, row in rows}
 
@@ -118,10 +119,10 @@ def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
 
 
 def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
-    """Ticks of a clock, from half a tick after the first frame that is received to the last frame.
+    """Yield the ticks of a clock, from half a tick after the first received frame to the last.
 
-    What a daemon has sent is another daemon's, and kept apart. Of a pause that is longer than
-    ``PAUSE_NS`` the ticks after that are left out, but for the last ones before the next frame.
+    Frames of the kind that the daemon sends go into ``logged``. In a pause longer than ``PAUSE_NS``
+    the ticks after that time are left out, except the last ones before the next frame.
     """
     tick: Tick | None = None
     for time_ns, frame, kind in frames:
@@ -147,14 +148,14 @@ def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
 
 
 class LogPort:
-    """All buses of a log at once.
+    """One port in place of all buses of a log.
 
     Args:
-        stamped: names of the buses whose frames have the time of their arrival.
+        stamped: names of the buses whose frames carry the time of their arrival.
 
     Attributes:
-        arrived_ns: arrival of the frame that ``frames`` has just handed out.
-        sent: frames that were sent since the tick began.
+        arrived_ns: arrival of the frame that ``frames`` yielded last.
+        sent: frames sent since the tick began.
     """
 
     def __init__(self, stamped: Container[str]) -> None:
@@ -166,12 +167,12 @@ class LogPort:
         self._before_ns = 0
 
     def begin(self, tick: Tick, before_ns: int) -> None:
-        """Begin a tick; the one before it was at another time."""
+        """Begin a tick; ``before_ns`` is the time of the last cycle."""
         self.sent, self._before_ns = [], before_ns
         self._received, self._others = tick.received, tick.others
 
     def frames(self) -> Iterator[Frame]:
-        """Yield every frame that waits."""
+        """Yield every waiting frame."""
         waiting, self._received = self._received, []
         for time_ns, frame in waiting:
             # Without stamps a port knows only when it was read before.
@@ -179,12 +180,12 @@ class LogPort:
             yield frame
 
     def background(self) -> Iterator[Frame]:
-        """Return the frames that are read after the valves have their frames."""
+        """Return the frames that the daemon reads after the valves have their frames."""
         waiting, self._others = self._others, []
         return iter(waiting)
 
     def send(self, frame: Frame) -> bool:
-        """Keep what was sent."""
+        """Keep a sent frame."""
         self.sent.append(frame)
         return True
 
@@ -193,7 +194,7 @@ class Stepper:
     """A deployment driven by the ticks of a clock, through the I/O cycle of the daemon.
 
     Args:
-        controller: a fresh one.
+        controller: a new controller.
     """
 
     def __init__(self, controller: Controller) -> None:

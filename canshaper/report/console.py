@@ -1,4 +1,4 @@
-"""Text on a terminal: names of others are text, one look of tables, one bar, drives compared."""
+"""Text on a terminal: safe names, one look of tables, one progress bar, report of two drives."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,10 +18,10 @@ MOST_COLUMNS = 10_000  # of a terminal that takes any table
 
 
 class SafeConsole(Console):
-    """A console of rich on which names out of files and logs are text, whatever is in them.
+    """A console of rich that prints names from files and logs as plain text, whatever is in them.
 
-    Brackets are no markup, and control characters are shown, so that a file can neither colour nor
-    clear the terminal, nor give it commands.
+    Brackets are no markup, and control characters are printed visibly, so that a file can neither
+    colour nor clear the terminal, nor give it commands.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -30,16 +30,16 @@ class SafeConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Segments of text; rich's own, which move the cursor, stay as they are."""
+        """Yield segments of printable text; rich's own control segments stay as they are."""
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else printable(text), style, control)
 
 
 class WholeTable(Table):
-    """A table that loses no digit on a narrow terminal: several below each other instead."""
+    """A table that loses no digit on a narrow terminal: it splits into several tables instead."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the table where it fits, else its first column with the others part by part."""
+        """Yield the whole table if it fits, else parts that each repeat the first column."""
         if len(self.columns) < 2 or self._width(console, options) <= options.max_width:
             yield from super().__rich_console__(console, options)
             return
@@ -55,11 +55,11 @@ class WholeTable(Table):
             yield from Table.__rich_console__(part, console, options)
 
     def _width(self, console: Console, options: ConsoleOptions) -> int:
-        """Columns of a terminal that it needs."""
+        """Return the number of terminal columns that the table needs."""
         return self.__rich_measure__(console, options.update(max_width=MOST_COLUMNS)).maximum
 
     def _part(self, numbers: list[int]) -> "WholeTable":
-        """The first column and these; the first is wrapped where it has to be."""
+        """Return a table of the first column and these; only the first column may wrap."""
         part = WholeTable(
             title_justify="left", box=self.box, padding=self.padding, pad_edge=self.pad_edge
         )
@@ -78,7 +78,7 @@ class WholeTable(Table):
 
 
 def new_table(first: str, *heads: str, title: str | None = None) -> Table:
-    """A table without rows: a column of words, then columns of figures; no cell is wrapped."""
+    """Return a table without rows: a column of words, then columns of figures; no cell wraps."""
     table = WholeTable(
         title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False
     )
@@ -89,15 +89,15 @@ def new_table(first: str, *heads: str, title: str | None = None) -> Table:
 
 
 class OnProgress(Protocol):
-    """Called with how much is done, and with what comes now where that changes."""
+    """A function called with the part done, and with the name of the next step when it changes."""
 
     def __call__(self, done: float, what: str | None = None) -> None:
-        """Show it."""
+        """Show the progress."""
 
 
 @contextmanager
 def progress_bar(what: str, total: float = 1.0, *, refresh_hz: float = 10) -> Iterator[OnProgress]:
-    """A bar on the terminal, next to the output; gone when done, and none where no person looks."""
+    """Show a bar on stderr until done, none if stderr is no terminal; give its ``OnProgress``."""
     console = SafeConsole(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),
@@ -143,8 +143,8 @@ _PAIR_ROWS: Sequence[PairRow] = (
 def print_report(report: Mapping[str, Any], console: Console) -> None:
     """Print a report of ``metrics.report_dict``; it fits in 80 columns.
 
-    Sway is given in degrees, raw then shaped, and the reduction; dip and re-rise in percent of
-    full command. A row is what the drive has at least one measure of; "-" where an axis has none.
+    Sway is printed in degrees, raw then shaped, with its change; dip and re-rise in percent of
+    full command. A row appears if at least one axis has this measure; "-" marks the other axes.
     """
     arrow = "→" if (console.encoding or "").lower().startswith("utf") else "->"
     if crane := report["crane"]:
@@ -168,12 +168,12 @@ def print_report(report: Mapping[str, Any], console: Console) -> None:
 
 
 def axis_title(name: str) -> str:
-    """Name of an axis as a reader expects it: ``near_far`` becomes ``Near-far``."""
+    """Return the name of an axis as a reader expects it: ``near_far`` becomes ``Near-far``."""
     return name.replace("_", "-").capitalize()
 
 
 def _table(axes: Mapping[str, Any], pairs: Sequence[PairRow], arrow: str) -> Table:
-    """One column an axis, one row a measure: fits a narrow terminal."""
+    """Return a table with one column for each axis and one row for each measure."""
     table = new_table("", *map(axis_title, axes))
     title, key, scale, digits = _STILL
     rows = [(title, [_pair_cell(axis, key, scale, digits, arrow) for axis in axes.values()])]
@@ -211,7 +211,7 @@ def _pair_cell(axis: Mapping[str, Any], key: str, scale: float, digits: int, arr
 
 
 def _cross_line(name: str, axis: Mapping[str, Any], arrow: str) -> Text | None:
-    """Say what swing is left in the other plane; None where there is none to speak of."""
+    """Return a line on the residual sway in the other plane; None if it is negligible."""
     raw, shaped = axis["raw"]["cross_residual_deg"], axis["shaped"]["cross_residual_deg"]
     if max(raw or 0.0, shaped or 0.0) < MIN_RAW_DEG:
         return None
@@ -234,7 +234,7 @@ def _drive_line(report: Mapping[str, Any]) -> Text:
 
 
 def change_text(reduction_pct: float) -> str:
-    """A reduction as a change with its sign: of 97 % it reads "-97 %", nearly all is not all."""
+    """Return a reduction as a signed change: 97 % becomes "-97 %"; nearly all is never "-100 %"."""
     change = round(-reduction_pct)
     if change == -100 and reduction_pct < 100.0:
         return f"{-reduction_pct:+.1f} %" if reduction_pct < 99.95 else "-99.9 %"
@@ -242,7 +242,7 @@ def change_text(reduction_pct: float) -> str:
 
 
 def _change(reduction_pct: float) -> tuple[str, str]:
-    """Return the change, and a style that says whether it is one for the better."""
+    """Return the change as text, and the style of its colour: green for less, red for more."""
     return change_text(reduction_pct), "bold red" if round(-reduction_pct) > 0 else "bold green"
 
 

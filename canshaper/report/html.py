@@ -1,4 +1,4 @@
-"""Report of a verb as one HTML file: to read without a network, to print on A4, to sign."""
+"""Report of a verb as one HTML file, to read without a network, to print on A4, and to sign."""
 
 import socket
 from base64 import b64encode
@@ -48,14 +48,14 @@ def document(
     *,
     signed: bool = True,
 ) -> str:
-    """The whole file; nothing in it loads or runs anything.
+    """Return the whole HTML file; it loads nothing and runs no script.
 
     Args:
-        title: of the report.
-        facts: (name, value) of what it is of, in order.
-        parts: of ``text``, ``table`` and ``picture``, in order.
-        first: such parts in front of the facts.
-        signed: whether there is room for a signature.
+        title: title of the report.
+        facts: (name, value) of each fact about the report, in order.
+        parts: results of ``text``, ``table`` and ``picture``, in order.
+        first: such parts before the facts.
+        signed: leave room for a signature.
     """
     rows = "".join(f"<tr><th>{_safe(k)}</th><td>{_safe(v)}</td></tr>" for k, v in facts)
     lines = "".join("<td></td>" for _ in _SIGNATURES)
@@ -89,27 +89,27 @@ def facts(deployment: "Deployment | None", date: datetime) -> list[tuple[str, st
 
 
 def verdict(line: str) -> str:
-    """The result in one sentence."""
+    """Return the result in one sentence as HTML."""
     return f'<p class="verdict">{_safe(line)}</p>'
 
 
 def heading(line: str) -> str:
-    """A heading."""
+    """Return a heading as HTML."""
     return f"<h2>{_safe(line)}</h2>"
 
 
 def listing(lines: str) -> str:
-    """Lines of a file."""
+    """Return lines of a file as HTML."""
     return f"<pre>{_safe(lines)}</pre>"
 
 
 def text(line: str) -> str:
-    """A line or more."""
+    """Return one or more lines of text as HTML."""
     return f"<p>{_safe(line)}</p>"
 
 
 def table(shown: Table) -> str:
-    """A table of the terminal, its columns at the side where they stand there."""
+    """Return a table of the terminal as HTML, its columns aligned as on the terminal."""
     sides = [' class="right"' if column.justify == "right" else "" for column in shown.columns]
 
     def row(kind: str, cells: Iterable[object]) -> str:
@@ -124,12 +124,12 @@ def table(shown: Table) -> str:
 
 
 def picture(data: bytes, kind: str, name: str) -> str:
-    """A picture.
+    """Return a picture as HTML that contains its data.
 
     Args:
-        data: the file.
+        data: content of the picture file.
         kind: "svg+xml" or "png".
-        name: in words, for who cannot see it.
+        name: description for readers who cannot see the picture.
     """
     code = b64encode(data).decode("ascii")
     return f'<figure><img alt="{_safe(name)}" src="data:image/{kind};base64,{code}"></figure>'

@@ -1,4 +1,4 @@
-"""Metrics of a pair of drives: swing, speed of response and feel of each axis, raw and shaped."""
+"""Measures of a pair of drives: swing, speed of response and feel of each axis, raw and shaped."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -49,29 +49,29 @@ class AxisMetrics:
     Attributes:
         still_s: from the release until |sway| in the plane of the axis stays below the bound of a
             still grapple. Longest over the strokes of this axis alone.
-        swings_on: whether that is a lower bound: the rest ended with more swing.
+        swings_on: ``still_s`` is a lower bound: the rest ended with more swing.
         peak_deg: largest |sway| in the plane of the axis over the whole drive, degrees.
         rms_deg: square root of the time mean of sway^2 over the whole drive (trapezoids, so a
             lost sample gets no extra weight), degrees.
         residual_deg: largest |sway| later than ``dwell_s`` after the release of the axis,
             until any joystick is moved; only after strokes during which no other axis was moved.
-            Swing still left from before the press is in it.
-        cross_residual_deg: the same windows, the sway of the other planes.
-        time_to_95_s: from the press to the tip speed reaching 95 % of the asked speed, while the
-            joystick is held at its plateau. A speed that falls below 90 % again while held was only
-            passed through: the last reaching counts. Worst over the strokes that reach it.
-        run_on_s: from the release to the tip speed falling below 5 % of full speed and staying
-            there for the rest. Worst over the strokes of this axis alone; a rest that ends
-            before counts with the time it lasted (a lower bound).
+            Swing left from before the press counts too.
+        cross_residual_deg: largest |sway| of the other planes in the same windows, degrees.
+        time_to_95_s: time from the press until the tip speed reaches 95 % of the demanded speed,
+            while the joystick is held at its plateau. If the speed falls below 90 % again while
+            held, the last time counts. Longest over the strokes that reach 95 %.
+        run_on_s: time from the release until the tip speed stays below 5 % of full speed for the
+            rest. Longest over the strokes of this axis alone; a rest that ends earlier counts with
+            its length (a lower bound).
         run_on_travel: integral of the speed in the direction of the stroke from the release to the
             end of the rest, full speed x s. Largest over the strokes of this axis alone.
         dip: largest fall of the sent command below its running maximum since the press, while the
-            joystick is held at its plateau, less what the joystick itself fell by; fraction of full
+            joystick is held at its plateau, less the fall of the joystick itself; fraction of full
             command.
         re_rise: largest rise of |sent| above its running minimum since the release, within the
             rest, fraction of full command.
 
-    A measure is None where the drive holds nothing it could be taken from.
+    A measure is None if the drive has no stroke or signal to take it from.
     """
 
     still_s: float | None
@@ -89,10 +89,10 @@ class AxisMetrics:
 
 @dataclass(frozen=True)
 class AxisComparison:
-    """One axis in both drives; reductions are 100 (1 - shaped / raw) percent.
+    """Measures of one axis in both drives; reductions are 100 (1 - shaped / raw) percent.
 
-    A reduction is None for an axis without sway, where either measure is None, and where the raw
-    swing stays below ``MIN_RAW_DEG``. It is negative where shaping made the swing larger.
+    A reduction is None for an axis without sway, if either measure is None, and if the raw swing
+    stays below ``MIN_RAW_DEG``. It is negative if shaping made the swing larger.
     """
 
     raw: AxisMetrics
@@ -104,7 +104,7 @@ class AxisComparison:
 
 
 def axis_metrics(recording: Recording, axis: str, still_deg: float = STILL_DEG) -> AxisMetrics:
-    """Measure one axis of a drive; below a swing of ``still_deg`` it counts as still.
+    """Measure one axis of a drive; a grapple that swings less than ``still_deg`` counts as still.
 
     Raises:
         KeyError: the drive has no such axis.
@@ -114,7 +114,7 @@ def axis_metrics(recording: Recording, axis: str, still_deg: float = STILL_DEG) 
 
 
 def compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
-    """Measure both drives of one operator script, axis by axis, over the span both cover.
+    """Measure both drives of one operator script, axis by axis, over their common time span.
 
     Raises:
         ValueError: the drives have different axes, no samples, or are malformed.
@@ -133,21 +133,21 @@ def report_dict(
 ) -> dict[str, Any]:
     """Return the comparison as a dictionary ready for JSON.
 
-    Of the crane (None where nothing says where the tip is) and per axis: the reductions, and all
-    measures of both drives under ``raw`` and ``shaped``; per axis ``time_to_95_s`` and ``run_on_s``
-    of the shaped drive too. Degrees and seconds are rounded to 0.01, percent to 0.1, metres and
-    fractions to 0.001. What does not exist or is not finite is None.
+    ``crane`` (None for a drive without the place of the tip) and each axis have the reductions, and
+    all measures of both drives under ``raw`` and ``shaped``; each axis also has ``time_to_95_s``
+    and ``run_on_s`` of the shaped drive. Degrees and seconds are rounded to 0.01, percent to 0.1,
+    metres and fractions to 0.001. A value that is missing or not finite is None.
 
     Args:
         raw: drive with the filters off.
         shaped: the same operator script with the filters on.
-        transport: the bus the drives went over.
-        missed_deadlines: ticks of the control loop that came late; None when not counted.
+        transport: the bus of the drives.
+        missed_deadlines: number of late ticks of the control loop; None if not counted.
         still_deg: swing below which a grapple counts as still.
-        facts: anything else for the top of the report (JSON types).
+        facts: further entries for the top of the report (JSON types).
 
     Raises:
-        ValueError: as ``compare``, or a fact has the name of an entry of the report.
+        ValueError: as for ``compare``, or a fact has the name of an entry of the report.
     """
     raw, shaped = aligned(raw, shaped)
     report: dict[str, Any] = {
@@ -221,7 +221,7 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def swings_over(recording: Recording) -> bool:
-    """Whether its grapple swings above the horizontal; a real one falls into its rotator there."""
+    """Return whether the grapple swings above the horizontal, where a real one falls over."""
     if recording.crane:
         return (crane_metrics(recording, recording.crane).peak_deg or 0.0) > HORIZONTAL_DEG
     swings = (sway for trace in recording.axes.values() for sway in trace.sway_deg or ())
@@ -229,7 +229,7 @@ def swings_over(recording: Recording) -> bool:
 
 
 def _reduction_of(raw: Recording) -> Callable[[float | None, float | None], float | None]:
-    """How a reduction against this drive is computed: of one that swings over there is none."""
+    """Return the function that computes a reduction against this drive: None if it swings over."""
     return (lambda _raw, _shaped: None) if swings_over(raw) else _reduction_pct
 
 

@@ -1,4 +1,4 @@
-"""The comparison of filters as a picture: how soon the crane stops against what swing is left."""
+"""The comparison of filters as a picture: time until the crane stops against residual swing."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _ASIDE_PX = tuple(float(sign * px) for px in (24, 90, 170, 260) for sign in (1, 
 
 @dataclass(frozen=True)
 class Point:
-    """A filter: seconds to stop after release, seconds to 95 % speed, degrees left at worst."""
+    """A filter: time to stop after release, time to 95 % speed, and its worst residual swing."""
 
     name: str
     ours: bool
@@ -34,12 +34,12 @@ class Point:
 
 @dataclass(frozen=True)
 class Limits:
-    """Computed limits.
+    """Computed limits of the filters.
 
     Attributes:
-        curve: (stop in s, least worst residual in degrees) of any non-negative impulse response
-            within the valve's rate, on an axis by itself.
-        time_optimal_s: no command whatever stops the swing sooner.
+        curve: (time to stop in s, least worst residual in degrees) of any non-negative impulse
+            response within the valve's rate, on one axis alone.
+        time_optimal_s: shortest time in which any command can stop the swing.
     """
 
     curve: Sequence[tuple[float, float]]
@@ -47,7 +47,7 @@ class Limits:
 
 
 def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
-    """The picture: run-on above, rise below; direct labels."""
+    """Return the picture: run-on above, rise time below, with the names next to the dots."""
     drawn = style.new_figure(
         style.WIDTH_PX, _HEIGHT_PX, dpi=style.PRINT_DPI, layout=ConstrainedLayoutEngine(rect=_RECT)
     )
@@ -87,7 +87,7 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
 
 
 def _limits(axes: Axes, limits: Limits) -> None:
-    """The computed limits as lines with their names."""
+    """Draw the computed limits as lines with their names."""
     if limits.curve:
         x, y = zip(*limits.curve, strict=True)
         axes.plot(x, y, color=LIMIT_COLOUR, linestyle="--", linewidth=1.2)
@@ -117,7 +117,7 @@ def _limits(axes: Axes, limits: Limits) -> None:
 
 
 def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> None:
-    """Dots with names; no name covers a dot, another name or a line to a name, nor its line one."""
+    """Draw dots with names; a name covers no dot, line or other name, and its line crosses none."""
     spots = [(s, p.worst_deg) for s, p in zip(seconds, points, strict=True)]
     places = [tuple(axes.transData.transform(spot)) for spot in spots]
     half = 0.5 * _DOT_PX
@@ -156,13 +156,13 @@ def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> No
 
 
 def _line(colour: str, dx: float) -> dict[str, object]:
-    """A line from the near end of a name to its dot."""
+    """Return the style of a line from the near end of a name to its dot."""
     near = (0.0 if dx > 0 else 1.0, 0.5)
     return {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "relpos": near}
 
 
 class _Try:
-    """A place for a name: its box, and its line to the dot in small pieces where it is far."""
+    """A possible place of a name: its box, and the pieces of its line to a dot that is far."""
 
     def __init__(self, x: float, y: float, dx: float, dy: float, name: str) -> None:
         self.dx, self.dy = dx, dy
@@ -174,7 +174,7 @@ class _Try:
         self.line = [Bbox.from_bounds(x + dx * k / 20, y + dy * k / 20, 3.0, 3.0) for k in parts]
 
     def is_free(self, used: list[Bbox], others: list[Bbox], lines: list[Bbox]) -> bool:
-        """Whether the name covers nothing, and its line none of the others."""
+        """Return whether the name covers no used box or line, and its line crosses no other box."""
         if any(self.box.overlaps(one) for one in (*used, *lines)):
             return False
         return not any(piece.overlaps(one) for piece in self.line for one in others)

@@ -1,7 +1,7 @@
-"""The picture of a raw and a shaped drive: what was asked, what was sent, how the grapple swung.
+"""The picture of a raw and a shaped drive: joystick, command to the valve, swing of the grapple.
 
-The only modules of the report that need matplotlib are this one and what it draws with; it draws
-through the object API, so no display and no global state is involved.
+Of the report only this module and those it draws with need matplotlib. It uses matplotlib's object
+API: no display and no global state.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,10 +30,10 @@ _TIME_RIGHT, _VIEW_LEFT = 0.612, 0.668  # where there are views from above
 
 
 def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figure:
-    """The picture of two drives.
+    """Return the picture of two drives.
 
-    Per axis with sway a block of command above sway, all on one time; next to them the paths of
-    tip and grapple from above, where the drives know them.
+    Each axis with sway has a block of command above sway, all with one time axis; next to them
+    stand the paths of tip and grapple from above, if the drives have them.
 
     Args:
         raw: drive with the filters off.
@@ -73,7 +73,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
 def _draw_blocks(
     fig: Figure, grid: GridSpec, raw: Recording, shaped: Recording, titles: Mapping[str, str]
 ) -> None:
-    """Draw command above sway of each axis that has a title."""
+    """Draw a panel of command above a panel of sway for each axis that has a title."""
     strokes, windows = find_strokes(raw), _windows(raw)
     swings = [abs(v) for drive in (raw, shaped) for name in titles for v in _sway(drive, name)]
     largest = max(*swings, 0.1)  # a scale of 0.1 degrees where nothing swings
@@ -100,9 +100,9 @@ def _draw_blocks(
 
 
 def finding(name: str, axis: Mapping[str, Any]) -> str:
-    """Say what the drives show of one axis: "Near-far: residual swing 15.9° → 0.4° (−97 %)".
+    """Return the result for one axis as text: "Near-far: residual swing 15.9° → 0.4° (−97 %)".
 
-    Swing in the other plane is added where there is some; without a residual the peak is shown.
+    Without a residual the text has the peak. Swing in the other plane is added if there is any.
     """
     measure = "residual" if axis["raw"]["residual_deg"] is not None else "peak"
     words = {"residual": "residual swing", "peak": "largest swing"}
@@ -122,13 +122,13 @@ def _change(measures: Mapping[str, Any], measure: str) -> str:
 
 
 def _windows(drive: Recording) -> list[range]:
-    """Where residual swing shows, whatever axes were moved before."""
+    """Return the windows in which residual swing shows, whatever axes moved before."""
     every = (residual_window(drive.t_s, rest, drive.dwell_s) for rest in rests(drive))
     return [window for window in every if window]
 
 
 def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
-    """Write the headline, which is at the same time the key to the curves, and gain and price."""
+    """Write the headline, also the key to the curves, with gain and price of the filters."""
     words = (
         ("The same operator script with", style.TEXT_COLOUR),
         ("filters off (dashed)", style.RAW_COLOUR),
@@ -142,7 +142,7 @@ def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
 
 
 def gain_and_price(crane: Mapping[str, Any]) -> str:
-    """Return gain and price of the filters, whatever axes were moved: swing left, and run-on."""
+    """Return gain (swing left) and price (run-on) of the filters, whatever axes moved."""
     off, on = crane["raw"], crane["shaped"]
     measure, words = "residual", "residual swing"
     if off["residual_deg"] is None:
@@ -205,7 +205,7 @@ def _draw_pair(
     values: Callable[[Recording], list[float]],
     **options: Any,
 ) -> None:
-    """Draw a curve of both drives: raw thin and dashed, shaped solid, so that grey is enough."""
+    """Draw a curve of both drives: raw thin and dashed, shaped solid, distinct also in grey."""
     looks = (
         (raw, style.RAW_COLOUR, 1.0, style.DASHED),
         (shaped, style.SHAPED_COLOUR, 1.7, "solid"),
@@ -219,10 +219,10 @@ def _draw_pair(
 def _mark_residual(
     panel: Axes, raw: Recording, shaped: Recording, name: str, height_deg: float
 ) -> None:
-    """Mark the swing the title speaks of on both curves, and name the curves there.
+    """Mark the swing given in the title on both curves, and name the curves there.
 
-    The names stand above and below all curves, at ``height_deg``: the raw one on the side of its
-    extreme, the shaped one on the other.
+    The names stand above and below all curves, at ``height_deg``: that of the raw curve on the side
+    of its extreme, that of the shaped curve on the other side.
     """
     at_raw = _worst(raw, name)
     side = 1.0 if _sway(raw, name)[at_raw] > 0 else -1.0
@@ -254,7 +254,7 @@ def _mark_residual(
 
 
 def _worst(drive: Recording, name: str) -> int:
-    """Sample of the residual of a drive; of its peak where it has no residual window."""
+    """Return the sample of a drive's residual, or of its peak if it has no residual window."""
     windows = residual_windows(drive, find_strokes(drive)[name])
     seen = [k for window in windows for k in window] or range(len(drive.t_s))
     return max(seen, key=lambda k: abs(_sway(drive, name)[k]))

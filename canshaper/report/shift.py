@@ -1,4 +1,4 @@
-"""Work of a crane in numbers, counted tick by tick; ``FIGURES`` says what each number is."""
+"""Work of a crane in numbers, counted tick by tick; ``FIGURES`` defines each number."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ FIGURES = {
 
 @dataclass
 class Figures:
-    """Sums over a part of the work, see ``FIGURES``."""
+    """Sums over a part of the work; ``FIGURES`` defines each number."""
 
     logged_s: float = 0.0
     driven_s: float = 0.0
@@ -51,7 +51,7 @@ class Figures:
     measured_s: float = 0.0
 
     def columns(self) -> dict[str, float | None]:
-        """Values by column; None where there is nothing to take them from."""
+        """Return the cells of a row by column; None where nothing was measured."""
         peaks, driven_s = self.cycle_peaks_deg, self.driven_s
         return {
             **{name: value for name, value in vars(self).items() if name in FIGURES},
@@ -61,10 +61,10 @@ class Figures:
 
 
 class WorkCounter:
-    """Counts the work of one crane, in a few numbers however long the log is.
+    """Counts the work of one crane in a few numbers, whatever the length of the log.
 
     Args:
-        cycle_axis: the axis whose way makes cycles; empty for none.
+        cycle_axis: the axis whose ways there and back count as cycles; empty for none.
         still_deg: swing below which the grapple counts as still.
     """
 
@@ -85,10 +85,10 @@ class WorkCounter:
         moving: bool,
         measured: bool,
     ) -> None:
-        """Add a tick of some seconds to the figures of its row.
+        """Add a tick of ``seconds`` to the figures of its row.
 
-        Joysticks are 0 within their neutral band; speeds are those of the tip by each axis with
-        sway. ``moving``: a valve has a command; ``measured``: a sensor shows the swing.
+        Each joystick value is 0 within its neutral band; each speed is that of the tip by one axis
+        with sway. ``moving``: a valve has a command; ``measured``: a sensor measures the swing.
         """
         self._now_s += seconds
         deflected = any(joysticks.values())
@@ -115,21 +115,21 @@ class WorkCounter:
             self._cycle_peak_deg = sway_deg
 
     def end(self) -> None:
-        """End the pause: what was waited in it counts."""
+        """End a pause and add its waiting time to its figures."""
         if self._pause:
             self._pause.waiting_s += self._swung_s
         self._pause, self._pause_s, self._swung_s = None, 0.0, 0.0
 
 
 class _Legs:
-    """Ways one way and back of at least ``LEG_M``."""
+    """Counter of ways there and back, each of at least ``LEG_M``."""
 
     def __init__(self) -> None:
         self._count = self._direction = 0
         self._at_m = self._low_m = self._high_m = 0.0  # low and high since the last turn
 
     def step(self, way_m: float) -> bool:
-        """Go on by so much; whether a way back is that long now."""
+        """Add a way in m; return True when it completes a way back."""
         at_m = self._at_m = self._at_m + way_m
         self._low_m, self._high_m = min(self._low_m, at_m), max(self._high_m, at_m)
         up = self._direction <= 0 and at_m - self._low_m >= LEG_M
@@ -142,14 +142,14 @@ class _Legs:
 
 
 class _Strokes:
-    """Deflections of one joystick."""
+    """Counter of the taps and reversals of one joystick."""
 
     def __init__(self) -> None:
         self._side = self._last = 0
         self._since_s = self._ended_s = 0.0
 
     def step(self, figures: Figures, joystick: float, now_s: float) -> None:
-        """Take its deflection of a tick, 0 in neutral."""
+        """Take the joystick's deflection in a tick, 0 in neutral."""
         side = (joystick > 0.0) - (joystick < 0.0)
         if side == self._side:
             return

@@ -1,4 +1,4 @@
-"""Figures of one stroke of the joystick and of the crane: rise, run-on, dip, swing."""
+"""Measures of one stroke of the joystick and of the whole crane: rise, run-on, dip, swing."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,7 +14,7 @@ STILL_DEG = 2.0  # a grapple of 1.2 m then moves by 4 cm: it can be placed
 
 
 def rms(t_s: list[float], values: list[float]) -> float | None:
-    """Root of the mean square over the time; None without an interval."""
+    """Return the root mean square over time; None for fewer than two samples."""
     if len(t_s) < 2:
         return None
     area = integral(t_s, [value * value for value in values])
@@ -22,19 +22,19 @@ def rms(t_s: list[float], values: list[float]) -> float | None:
 
 
 def integral(t_s: list[float], values: list[float], window: range | None = None) -> float:
-    """Integrate over the samples of the window, or over all, by trapezoids."""
+    """Return the integral over the samples of the window, or over all, by trapezoids."""
     window = range(len(t_s)) if window is None else window
     return math.fsum(0.5 * (values[k] + values[k + 1]) * (t_s[k + 1] - t_s[k]) for k in window[:-1])
 
 
 def _crossing_s(t_s: list[float], values: Mapping[int, float], k: int, level: float) -> float:
-    """Time at which the straight line from sample k to k + 1 passes the level."""
+    """Return the time when the straight line from sample k to k + 1 passes the level."""
     share = (level - values[k]) / (values[k + 1] - values[k])
     return t_s[k] + share * (t_s[k + 1] - t_s[k])
 
 
 def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | None:
-    """Seconds from the press to the speed that was asked, less 5 %; None where it never comes."""
+    """Return the time in s from the press to 95 % of the demanded speed; None if never reached."""
     held = range(stroke.press, stroke.plateau[1] + 1)
     speed = {k: stroke.direction * trace.speed[k] for k in held}
     lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
@@ -49,24 +49,24 @@ def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | 
 
 
 def run_on_s(t_s: list[float], speed: Sequence[float], rest: range) -> float:
-    """Seconds from the first sample of a rest until what moves at this |speed| stands."""
+    """Return the time in s from the start of a rest until |speed| stays below 5 % of full speed."""
     return _until_below_s(t_s, speed, rest, STOPPED)
 
 
 def still_after(
     t_s: list[float], sway_deg: Sequence[float], rests: Iterable[range], still_deg: float
 ) -> tuple[float | None, bool | None]:
-    """Longest time from a release until the swing stays below a bound.
+    """Return the longest time from a release until the swing stays below a bound.
 
     Args:
         t_s: times of the samples.
-        sway_deg: swing, degrees; its size counts.
-        rests: samples of each rest, the first one that of the release.
+        sway_deg: swing, degrees; the bound applies to its absolute value.
+        rests: samples of each rest, from the release on.
         still_deg: the bound.
 
     Returns:
-        The time in s, and whether it is a lower bound: that rest ended with more swing, or too soon
-        after it to know. None without a rest.
+        The time in s, and whether it is a lower bound: the rest ended with more swing, or too soon
+        after it to tell. (None, None) without a rest.
     """
     times = []
     for rest in rests:
@@ -77,7 +77,7 @@ def still_after(
 
 
 def _until_below_s(t_s: list[float], values: Sequence[float], rest: range, level: float) -> float:
-    """Seconds from the first sample of a rest until |values| stay below, or to its end."""
+    """Return the time in s from the start of a rest until |values| stay below, or to its end."""
     release, last = rest[0], rest[-1]
     above = next((k for k in reversed(rest) if abs(values[k]) >= level), None)
     if above is None:
@@ -89,12 +89,12 @@ def _until_below_s(t_s: list[float], values: Sequence[float], rest: range, level
 
 
 def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
-    """Travel after the release, in seconds of full speed."""
+    """Return the travel after the release, in seconds of full speed."""
     return stroke.direction * integral(t_s, trace.speed, stroke.rest)
 
 
 def dip(trace: AxisTrace, stroke: Stroke) -> float:
-    """How far the output fell back while the joystick was held, in parts of full command."""
+    """Return the fall of the output while the joystick is held, fraction of full command."""
     first, last = stroke.plateau
     sent_max, command_max, dip = -math.inf, 0.0, 0.0
     for k in range(stroke.press, last + 1):
@@ -106,7 +106,7 @@ def dip(trace: AxisTrace, stroke: Stroke) -> float:
 
 
 def re_rise(trace: AxisTrace, stroke: Stroke) -> float:
-    """How far the output rose again after the release, in parts of full command."""
+    """Return the rise of the output after the release, fraction of full command."""
     lowest, rise = math.inf, 0.0
     for k in stroke.rest:
         sent = abs(trace.sent[k])
@@ -117,23 +117,23 @@ def re_rise(trace: AxisTrace, stroke: Stroke) -> float:
 
 @dataclass(frozen=True)
 class CraneMetrics:
-    """Measures of the whole crane over one drive, whatever axes were moved together.
+    """Measures of the whole crane over one drive, whatever axes moved together.
 
-    A rest is the time from the release of the last joystick until any is pressed.
+    A rest is the time from the release of the last joystick until any joystick is pressed.
 
     Attributes:
-        still_s: from the release until the total swing stays below the bound of a still grapple.
-            The longest.
-        swings_on: whether that is a lower bound: the rest ended with more swing.
+        still_s: longest time from a release until the total swing stays below the bound of a still
+            grapple.
+        swings_on: ``still_s`` is a lower bound: the rest ended with more swing.
         peak_deg: largest total swing of the grapple over the whole drive, degrees.
-        rms_deg: square root of the time mean of its square, degrees.
-        residual_deg: largest total swing of the rests, later than ``dwell_s`` after the
-            release.
-        run_on_s: from the release until every axis stays below 5 % of its full speed. The longest;
-            a rest that ends before counts with the time it lasted (a lower bound).
-        run_on_m: farthest that the tip gets in a rest from where it was at the release, m.
+        rms_deg: root mean square over time of the total swing, degrees.
+        residual_deg: largest total swing in the rests, later than ``dwell_s`` after the release,
+            degrees.
+        run_on_s: longest time from a release until every axis stays below 5 % of its full speed; a
+            rest that ends earlier counts with its length (a lower bound).
+        run_on_m: largest distance of the tip in a rest from its place at the release, m.
 
-    A measure is None where the drive holds nothing it could be taken from.
+    A measure is None if the drive has no rest or signal to take it from.
     """
 
     still_s: float | None
@@ -148,7 +148,7 @@ class CraneMetrics:
 def crane_metrics(
     recording: Recording, crane: CraneTrace, still_deg: float = STILL_DEG
 ) -> CraneMetrics:
-    """Measure a drive whose crane is ``crane``; below a swing of ``still_deg`` it counts as still.
+    """Measure the crane of a drive; a grapple that swings less than ``still_deg`` counts as still.
 
     Raises:
         ValueError: the recording is malformed (see ``find_strokes``).

@@ -1,4 +1,4 @@
-"""Strokes of the joystick in a recorded drive, and the rests after them that show the swing."""
+"""Strokes of the joystick in a recorded drive, and the rests after them, which show the swing."""
 
 import math
 import statistics
@@ -23,13 +23,13 @@ class Stroke:
         axis: name of the axis.
         direction: +1.0 or -1.0.
         press: first sample outside the neutral band.
-        release: first sample back in neutral or on the other side; None when the drive ends first.
-        level: asked speed, median of |joystick| over the plateau, fraction of full speed.
+        release: first sample back in neutral or on the other side; None if the drive ends first.
+        level: demanded speed, median of |joystick| over the plateau, fraction of full speed.
         plateau: first and last sample of the longest run of |joystick| above ``PLATEAU`` of the
             largest deflection of the stroke.
         alone: no other joystick left neutral between press and release.
-        rest: samples from the release until any joystick is pressed, or another one released;
-            empty for a reversal and for a stroke without release.
+        rest: samples from the release until any joystick is pressed, or another joystick is
+            released; empty for a reversal and for a stroke without release.
     """
 
     axis: str
@@ -46,7 +46,7 @@ def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
     """Segment every joystick of the drive into strokes, in order of time.
 
     Raises:
-        ValueError: lists of different length, time not increasing, or a value that is no number.
+        ValueError: the lists differ in length, time does not increase, or a value is no number.
     """
     _check(recording)
     spans = {name: _spans(trace.joystick) for name, trace in recording.axes.items()}
@@ -56,10 +56,10 @@ def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
 
 
 def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]:
-    """Rests in which the residual swing of these strokes (of one axis) shows.
+    """Return the windows that show the residual swing of these strokes of one axis.
 
-    A window holds the samples from ``dwell_s`` after the release until a joystick moves.
-    Strokes during which another axis was moved have none, nor have rests that leave less than
+    A window holds the samples from ``dwell_s`` after the release until a joystick moves. A stroke
+    during which another axis moved has no window, nor has a rest that leaves less than
     ``RESIDUAL_WINDOW_MIN_S``.
     """
     t_s, dwell_s = recording.t_s, recording.dwell_s
@@ -68,7 +68,7 @@ def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]
 
 
 def residual_window(t_s: list[float], rest: range, dwell_s: float) -> range:
-    """The part of a rest in which residual swing shows; empty where too little is left of it."""
+    """Return the part of a rest that shows residual swing; empty if the rest is too short."""
     begin_s = t_s[rest.start] + dwell_s - _ROUNDING_S
     start = next((k for k in rest if t_s[k] >= begin_s), rest.stop)
     window = range(start, rest.stop)
@@ -78,7 +78,7 @@ def residual_window(t_s: list[float], rest: range, dwell_s: float) -> range:
 
 
 def rests(recording: Recording) -> list[range]:
-    """Samples from the release of the last joystick until any is pressed, or to the end."""
+    """Return the samples from each release of the last joystick to the next press, or the end."""
     strokes = [one for own in find_strokes(recording).values() for one in own]
 
     def moved(k: int) -> bool:
@@ -90,10 +90,10 @@ def rests(recording: Recording) -> list[range]:
 
 
 def aligned(raw: Recording, shaped: Recording) -> tuple[Recording, Recording]:
-    """Cut two drives of the same script to the span both cover, and give them one time base.
+    """Cut two drives of the same script to their common time span, and give them one time base.
 
-    The first press of any joystick is put at the same time in both (good to one sample); without a
-    press in both, the starts are. A longer recording is thus not measured over more rest.
+    The first press of any joystick gets the same time in both drives (to one sample); if a drive
+    has no press, the starts do. So a longer recording is not measured over a longer rest.
 
     Raises:
         ValueError: the drives have different axes or no samples, or one is malformed.
@@ -135,7 +135,7 @@ def _side(joystick: float) -> int:
 
 
 def _spans(joystick: list[float]) -> list[tuple[int, int]]:
-    """Return runs of samples on one side of neutral, as (first, one past the last)."""
+    """Return the runs of samples on one side of neutral, as (first, one past the last)."""
     spans, start = [], 0
     for side, run in groupby(map(_side, joystick)):
         end = start + len([*run])

@@ -1,4 +1,4 @@
-"""Common style of all pictures: colours, figures, panels, and a crane seen from above."""
+"""Common style of all pictures: colours, figures, panels, and the crane from above."""
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -35,7 +35,7 @@ DASHED: Final = (0, (3.5, 1.5))
 
 
 def new_figure(width_px: float, height_px: float, *, dpi: float = DPI, **options: Any) -> Figure:
-    """A white figure that can be drawn without a display."""
+    """Return a white figure that needs no display; size in pixels at this dpi."""
     size = (width_px / dpi, height_px / dpi)
     fig = Figure(figsize=size, dpi=dpi, facecolor="white", **options)
     FigureCanvasAgg(fig)
@@ -43,7 +43,7 @@ def new_figure(width_px: float, height_px: float, *, dpi: float = DPI, **options
 
 
 def print_figure(height_px: float) -> Figure:
-    """A white figure as wide as a page."""
+    """Return a white figure as wide as a page, of this height in pixels."""
     return new_figure(WIDTH_PX, height_px, dpi=PRINT_DPI)
 
 
@@ -53,13 +53,13 @@ def save(fig: Figure, path: Path) -> None:
 
 
 def stamp(fig: Figure, text: str) -> None:
-    """Put where a picture comes from into its lower right corner, 8 points in print."""
+    """Write the origin of a picture into its lower right corner, 8 points in print."""
     points = TEXT_PT * float(fig.get_size_inches()[0]) / (170.0 / 25.4)
     fig.text(0.996, 0.004, text, ha="right", va="bottom", fontsize=points, color="#666666")
 
 
 def plain(panel: Axes, *, size: float = 10) -> None:
-    """Light grid, two spines, grey ticks with figures of this size."""
+    """Give a panel a light grid, two spines, and grey ticks with figures of this size in points."""
     panel.grid(visible=True, which="both", color="#E6E6E6", linewidth=0.8)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
@@ -68,29 +68,29 @@ def plain(panel: Axes, *, size: float = 10) -> None:
 
 
 def titled(panel: Axes, text: str, size: float) -> None:
-    """A bold title at the left."""
+    """Give a panel a bold title at the left; size in points."""
     panel.set_title(text, loc="left", fontsize=size, weight="bold", color=TEXT_COLOUR, pad=5)
 
 
 def label(panel: Axes, x: str = "", y: str = "") -> None:
-    """Name the axes of a panel."""
+    """Write the names of a panel's x and y axis."""
     for text, put in ((x, panel.set_xlabel), (y, panel.set_ylabel)):
         if text:
             put(text, fontsize=TEXT_PT, color=TEXT_COLOUR)
 
 
 def headline(fig: Figure, text: str) -> None:
-    """A bold title over all panels, at the left."""
+    """Write a bold title over all panels, at the left."""
     fig.suptitle(text, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
 
 
 def zero_line(panel: Axes) -> None:
-    """A thin grey line at zero, behind the curves."""
+    """Draw a thin grey line at zero, behind the curves."""
     panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
 
 
 def command_scale(panel: Axes, limit: float) -> None:
-    """An axis of commands: -100 to 100 %, with room up to ``limit`` of full command."""
+    """Scale the y axis for commands: -100 to 100 %, with room up to ``limit`` of full command."""
     panel.set_ylim(-limit, limit)
     panel.set_yticks([-1.0, 0.0, 1.0], [f"{MINUS}100", "0", "100"])
 
@@ -98,7 +98,7 @@ def command_scale(panel: Axes, limit: float) -> None:
 def coloured_words(
     fig: Figure, words: Sequence[tuple[str, str]], at: tuple[float, float], *, size: float, sep: int
 ) -> None:
-    """A line of (text, colour), its upper left corner at a place of the figure: names curves."""
+    """Write a line of (text, colour) as the key to curves, with its upper left corner at ``at``."""
     parts: list[Artist] = [
         TextArea(text, textprops={"color": colour, "fontsize": size, "weight": "bold"})
         for text, colour in words
@@ -127,14 +127,14 @@ def draw_top_views(
     *,
     sizes: tuple[float, float],
 ) -> None:
-    """Draw two views, raw above shaped, on one scale.
+    """Draw the paths of tip and grapple from above in two views, raw above shaped, on one scale.
 
     Args:
-        fig: where.
-        drives: of raw and shaped the crane, and the rests: samples in which no joystick is moved
-            and the tip runs on.
-        box: left, bottom, right and top, fractions of the figure.
-        sizes: of letters and of titles, points.
+        fig: the figure to draw into.
+        drives: (crane, rests) of the raw and of the shaped drive; a rest is the samples in which no
+            joystick is moved and the tip runs on.
+        box: left, bottom, right and top of both views, fractions of the figure.
+        sizes: sizes of letters and of titles, points.
     """
     left, bottom, right, top = box
     grid = fig.add_gridspec(2, 1, left=left, bottom=bottom, right=right, top=top, hspace=0.24)
@@ -175,7 +175,7 @@ def _columns(points: Sequence[Point]) -> tuple[list[float], list[float]]:
 
 
 def _square(points: Sequence[Point]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Limits of x and y of a square that holds all points."""
+    """Return the limits of x and y of a square that holds all points."""
     columns = _columns(points)
     low, high = [min(c) for c in columns], [max(c) for c in columns]
     half = (0.5 + _MARGIN) * max(b - a for a, b in zip(low, high, strict=True))
@@ -192,12 +192,12 @@ def draw(figure: Callable[[], Figure], path: Path, deployment: Deployment) -> li
     """Draw, stamp and write a picture.
 
     Args:
-        figure: draws it.
-        path: without its suffix.
-        deployment: what it is of.
+        figure: returns the picture.
+        path: path of the picture without its suffix.
+        deployment: the machine in the picture, named in the stamp.
 
     Returns:
-        The picture (PNG), and where that is small the drawing (SVG).
+        The picture (PNG), and the drawing (SVG) if it is small.
     """
     drawn = figure()
     date = f"{datetime.now().astimezone():%Y-%m-%d}"
@@ -212,7 +212,7 @@ def draw(figure: Callable[[], Figure], path: Path, deployment: Deployment) -> li
 
 
 def embedded(path: Path) -> str:
-    """A picture inside the report: a drawing as it is, dots with fewer colours."""
+    """Return a picture as HTML for a report: an SVG as it is, a PNG with fewer colours."""
     if path.suffix == ".svg":
         return html.picture(path.read_bytes(), "svg+xml", path.stem)
     file = BytesIO()

@@ -1,9 +1,8 @@
-"""Who may see the page, and who may open its connection. Pure: headers in, a fault out.
+"""Rules for who may see the page, and who may open its connection. Pure: headers in, a fault out.
 
-A browser lets any page of the web send requests to this machine, so being on loopback is not
-enough: the name that was asked for (Host) has to be one of ours, or else another name could be made
-to point here, and a connection has to come from our own page (Origin). From other machines a token
-is needed too.
+A browser lets any web page send requests to this machine, so being on loopback is not enough. The
+requested name (Host) must be one of ours, or else another name could be made to point here. A
+connection must come from our own page (Origin). Other machines also need a token.
 """
 
 import io
@@ -18,12 +17,12 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 @dataclass(frozen=True)
 class Access:
-    """The rules.
+    """The rules of access to one server.
 
     Args:
-        port: of the server.
-        names: host names besides loopback and, with a token, any IP address.
-        token: the secret that a page has to show; None on loopback.
+        port: port of the server.
+        names: allowed host names besides loopback; with a token any IP address is allowed too.
+        token: the secret that a page must send; None on loopback.
     """
 
     port: int
@@ -36,7 +35,7 @@ class Access:
         return f"canshaper-studio-{self.port}"
 
     def host_fault(self, host: str) -> str | None:
-        """Why a request for this host is refused, or None."""
+        """Return why a request for this host is refused, or None."""
         name, colon, port = host.rpartition(":")
         if not colon or port.endswith("]"):
             name, port = host, "80"
@@ -46,14 +45,14 @@ class Access:
         return None
 
     def origin_fault(self, host: str, origin: str | None) -> str | None:
-        """Why a connection from this origin is refused, or None."""
+        """Return why a connection from this origin is refused, or None."""
         if origin != f"http://{host}":
             got = f"the origin {origin[:60]!r}" if origin else "no origin"
             return f"expected the page of this studio, got {got}"
         return None
 
     def token_fault(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> str | None:
-        """Why a request without the right token is refused, or None."""
+        """Return why a request without the right token is refused, or None."""
         if self.token is None:
             return None
         for shown in (query.get("token"), cookies.get(self.cookie)):
@@ -77,9 +76,10 @@ ANY = {"0.0.0.0": "192.0.2.1", "::": "2001:db8::1"}
 
 
 def reachable(host: str) -> str:
-    """The host to open from elsewhere: where all addresses are served, that of the default route.
+    """Return the host name with which another machine opens the page.
 
-    Nothing is sent. Without a route it is the name of this machine.
+    If ``host`` means all addresses, it is that of the default route, or without a route the name of
+    this machine. The function sends nothing.
     """
     if host not in ANY:
         return host
@@ -93,7 +93,7 @@ def reachable(host: str) -> str:
 
 
 def qr_code(url: str) -> str | None:
-    """An address as a QR code for a terminal; None where the package segno is not installed."""
+    """Return an address as a QR code for a terminal; None if the package segno is not installed."""
     try:
         import segno  # noqa: PLC0415  (an extra)
     except ImportError:

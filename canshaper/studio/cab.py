@@ -1,9 +1,9 @@
-"""The driver's seat: which page drives, and what its joysticks count for. No clock, no sockets.
+"""The driver's seat: it decides which page drives and when its joysticks count. No clock or socket.
 
-Nothing moves by accident: a page that falls silent, sends nonsense or is replaced by another one
-has its joysticks put in neutral, and they count again only after they were in neutral. Enable is
-released when the run-on of the axes is over, so that they come to rest through the filter; only a
-page that was silent and comes back in time, with its joysticks in neutral, keeps it.
+Nothing moves by accident: if a page falls silent, sends nonsense or is replaced by another page,
+the seat sets its joysticks to neutral; they count again only after they were in neutral. The seat
+releases enable when the run-on of the axes is over, so that they come to rest through the filter.
+Only a page that was silent and comes back in time, with its joysticks in neutral, keeps enable.
 """
 
 import math
@@ -32,7 +32,7 @@ Report = Callable[[str], None]
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Whether a value of a JSON message is a number."""
+    """Return whether a value of a JSON message is a number."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -40,8 +40,8 @@ class Cab:
     """The seat of one driver.
 
     Args:
-        axes: axes that have a joystick.
-        report: called with what the driver does.
+        axes: names of the axes with a joystick.
+        report: called with a text on each action of the driver.
     """
 
     def __init__(self, axes: Iterable[str], report: Report) -> None:
@@ -59,7 +59,7 @@ class Cab:
         self._presses_s = deque([-math.inf], maxlen=MOST_PRESSES)  # when each begins
 
     def take(self, page: int, now_s: float) -> None:
-        """Let a page drive; a driver that is there loses the joysticks, and enable is released."""
+        """Let a page drive; a present driver loses the joysticks, and enable is released later."""
         if page == self.driver:
             return
         if self.driver is not None:
@@ -70,17 +70,17 @@ class Cab:
         self._centred = False
 
     def leave(self, page: int, now_s: float) -> None:
-        """Give up the seat of a page that has gone, or has to let go."""
+        """Free the seat of a page that has gone or must let go."""
         if page == self.driver:
             self._report(said("leaves", page=page))
             self._let_go(now_s)
             self.driver = None
 
     def joysticks(self, page: int, joysticks: Mapping[str, Any], now_s: float) -> None:
-        """Take the positions of all joysticks; those of a page that does not drive do not count.
+        """Take the positions of all joysticks; ignore those of a page that does not drive.
 
         Raises:
-            PageMessageError: they are no positions.
+            PageMessageError: an axis is unknown or its value is no position.
         """
         for name, value in joysticks.items():
             if name not in self._axes:
@@ -100,12 +100,12 @@ class Cab:
         self._joysticks = {n: float(v) for n, v in joysticks.items()} if self._centred else {}
 
     def nonsense(self, page: int, now_s: float) -> None:
-        """Take the joysticks from a page that sent nonsense, until they are in neutral."""
+        """Ignore the joysticks of a page that sent nonsense, until they are in neutral."""
         if page == self.driver:
             self._let_go(now_s)
 
     def press_enable(self, page: int, on: bool, now_s: float) -> None:
-        """Press or release the enable switch; released, everything stops at once."""
+        """Press or release the enable switch; its release stops everything at once."""
         if page != self.driver:
             return
         if not on:
@@ -127,20 +127,20 @@ class Cab:
                 self._presses_s.append(begin_s)
 
     def switch_anti_sway(self, page: int, on: bool) -> None:
-        """Move the anti-sway switch."""
+        """Switch anti-sway on or off."""
         if page == self.driver and on is not self.anti_sway:
             self.anti_sway = on
             self._report(said("on" if on else "off"))
 
     def held(self, now_s: float) -> Held:
-        """Return what the hand holds now."""
+        """Return the present state of the hand."""
         self._watch(now_s)
         reset = now_s < self._reset_until_s
         pressed = any(0.0 <= now_s - begin_s < PRESS_S for begin_s in self._presses_s)
         return Held(dict(self._joysticks), self.enable, reset, self.anti_sway, pressed)
 
     def _watch(self, now_s: float) -> None:
-        """Let go when the driver is silent; release enable when it is time."""
+        """Let go if the driver is silent; release enable when its run-on time is over."""
         silent = self.driver is not None and now_s - self._last_message_s > SILENT_S
         if silent and self.enable and self._release_at_s is None:
             self._report(said("silent", page=self.driver))

@@ -1,4 +1,4 @@
-"""One open page: what it sends, checked, and what it is shown, thirty times a second."""
+"""One open page: check its messages, and send it the state thirty times a second."""
 
 import asyncio
 import json
@@ -20,11 +20,11 @@ MOST_NAME = 40
 
 
 class NumbersChannel:
-    """One page's way to the numbers; the daemon's answers may take long, pictures go on meanwhile.
+    """Queue of one page's requests for numbers; while the daemon answers slowly, pictures go on.
 
     Args:
-        numbers: of the machine.
-        page: number of the page, who names no one.
+        numbers: numbers of the machine.
+        page: number of the page, its name in changes if the person gives none.
     """
 
     def __init__(self, numbers: LiveNumbers, page: int) -> None:
@@ -38,7 +38,7 @@ class NumbersChannel:
         """Take a message of the page.
 
         Raises:
-            PageMessageError: it is none, or too many wait.
+            PageMessageError: the message is no request, or too many requests wait.
         """
         request, numbers = message["numbers"], self._numbers
         name = message.get("who")
@@ -68,10 +68,10 @@ class NumbersChannel:
         self._difference = self._numbers.difference()
 
     async def run(self, refuse: Callable[[str], None]) -> None:
-        """Do what was asked for, one after the other.
+        """Do the requests, one after the other.
 
         Args:
-            refuse: called with why something was not done.
+            refuse: called with the reason if a request fails.
         """
         while True:
             action = await self._waiting.get()
@@ -81,7 +81,7 @@ class NumbersChannel:
                 refuse(str(error))
 
     def news(self) -> dict[str, Any]:
-        """Return what the page was not shown yet."""
+        """Return the entries that the page has not shown yet."""
         news: dict[str, Any] = {}
         if self._version != self._numbers.version:
             self._version = self._numbers.version
@@ -120,9 +120,9 @@ class Client:
 
     Args:
         socket: the connection, accepted.
-        stage: what it drives and watches.
-        number: tells pages apart.
-        hello: the first message to it.
+        stage: the cranes that the page drives and watches.
+        number: unique number of the page.
+        hello: the first message to the page.
     """
 
     def __init__(self, socket: WebSocket, stage: Stage, number: int, hello: dict[str, Any]) -> None:
@@ -180,7 +180,7 @@ class Client:
                     return
 
     def _too_fast(self) -> str | None:
-        """Why a page that has just sent a message is closed, or None."""
+        """Return why a page that has just sent a message is closed, or None."""
         now_s = time.monotonic()
         self._allowance = min(BURST, self._allowance + MOST_PER_S * (now_s - self._filled_s))
         self._filled_s = now_s
@@ -188,10 +188,10 @@ class Client:
         return f"expected {MOST_PER_S} messages a second at most" if self._allowance < 0 else None
 
     def _take(self, text: str | None) -> None:
-        """Do what a message asks for.
+        """Execute a message.
 
         Raises:
-            PageMessageError: it is none.
+            PageMessageError: the message is not a known one.
         """
         message = parsed(text)
         number = self._number
@@ -216,7 +216,7 @@ class Client:
             self._slid.set()
 
     async def _slide(self) -> None:
-        """Pass on where the sliders are, the last position only; a daemon takes its time."""
+        """Pass on the last position of each slider; a daemon answers slowly."""
         while True:
             await self._slid.wait()
             self._slid.clear()
@@ -234,7 +234,7 @@ class Client:
     # -- to the page ---------------------------------------------------------------------------
 
     async def _show(self) -> None:
-        """Send what there is to see; a page that is slow gets fewer pictures, never old ones."""
+        """Send the present state; a slow page gets fewer pictures, never old ones."""
         await self._send({"hello": {**self._hello, "page": self._number}})
         last = 0
         while True:
@@ -265,10 +265,10 @@ class Client:
 
 
 def parsed(text: str | None) -> dict[str, Any]:
-    """A message of a page.
+    """Return a message of a page as an object.
 
     Raises:
-        PageMessageError: it is no JSON object.
+        PageMessageError: the text is no JSON object.
     """
     if text is None:
         raise PageMessageError("expected JSON, got bytes")

@@ -1,8 +1,8 @@
-"""The commissioning of the file on a page: the same steps and the same state as in the terminal.
+"""Commissioning of the file on a page: the same steps and the same state as on the terminal.
 
-A rehearsal is run in a process of its own, so that the cranes of the live page do not wait for it.
-The page of a real machine only shows how far it has come: what moves its valves stands at the
-terminal in front of them.
+A rehearsal runs in a process of its own, so that the cranes of the live page do not wait for it.
+The page of a real machine only shows the progress: a person moves its valves from the terminal in
+front of them.
 """
 
 import asyncio
@@ -25,9 +25,9 @@ class Commission:
     """The commissioning of one deployment file.
 
     Args:
-        path: the file; None for a shipped one, which has none.
+        path: the file; None for a shipped file, which has no commissioning.
         changes: parameters of the simulated crane, NAME=VALUE.
-        machine: whether that of the machine is shown; else its rehearsal.
+        machine: show the commissioning of the machine; else its rehearsal.
     """
 
     def __init__(self, path: Path | None, changes: list[str], *, machine: bool) -> None:
@@ -37,7 +37,7 @@ class Commission:
         self._process: subprocess.Popen[str] | None = None
 
     def routes(self) -> list[BaseRoute]:
-        """Return the routes that the server answers."""
+        """Return the routes of these pages for the server."""
         return [
             Route("/commission", self._page),
             Route("/commission/state", self._state),
@@ -46,7 +46,7 @@ class Commission:
         ]
 
     def close(self) -> None:
-        """End its process, whatever it does."""
+        """End the process, whatever it does."""
         if self._process:
             with self._process as process:  # which closes its pipes
                 process.terminate()
@@ -61,7 +61,7 @@ class Commission:
         return await self._answer("show", "", "")
 
     async def _do(self, request: Request) -> Response:
-        """Run a step, accept what it proposes, or leave it out."""
+        """Answer a request to run a step, to accept its proposal, or to skip it."""
         what, step = request.path_params["what"], request.path_params["step"]
         if what not in ("run", "accept", "skip"):
             return PlainTextResponse("no such page\n", NOT_FOUND)
@@ -73,7 +73,7 @@ class Commission:
         return await self._answer(what, step, request.query_params.get("answer", ""))
 
     async def _file(self, request: Request) -> Response:
-        """A picture of a step, or the report."""
+        """Answer with a picture of a step, or with the report."""
         name = request.path_params["name"]
         known = [p for step in self._shown["steps"] for p in step["pictures"]]
         if name not in known and name != (self._shown.get("report") or None):
@@ -81,7 +81,7 @@ class Commission:
         return FileResponse(Path(self._shown["folder"]) / name)
 
     async def _answer(self, what: str, step: str, answer: str) -> Response:
-        """Do what was asked, and return what the page shows; while busy, return what it showed."""
+        """Do the request and answer with the state of the page; while busy, with the last state."""
         if self._path and not self._busy:
             self._busy = step or "reading"
             try:
@@ -94,7 +94,7 @@ class Commission:
         return JSONResponse({**self._shown, **about})
 
     def _work(self, what: str, step: str, answer: str) -> dict[str, Any]:
-        """Let the process do it; one that has ended is started again."""
+        """Let the process do the request; start it again if it has ended."""
         if self._process and self._process.poll() is not None:
             self.close()
         if self._process is None:

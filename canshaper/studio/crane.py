@@ -1,4 +1,4 @@
-"""One simulated crane behind a real daemon: the processes, their bus, and what they report."""
+"""One simulated crane behind a real daemon: the processes, their bus, and their reports."""
 
 import contextlib
 import json
@@ -38,11 +38,11 @@ CANSHAPER = tuple(canshaper_command())
 
 
 def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
-    """A copy of a deployment file whose numbers the sliders may change.
+    """Return path and deployment of a copy of a file whose numbers the sliders may change.
 
     Args:
         path: the file.
-        directory: where the copy is written.
+        directory: folder for the copy.
 
     Raises:
         ConfigError: the file is not valid.
@@ -63,7 +63,7 @@ def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
 
 @dataclass
 class Child:
-    """A process, or when it starts again."""
+    """A process, or the time of its next start."""
 
     command: list[str]
     log: Path
@@ -72,20 +72,20 @@ class Child:
 
 
 class Crane:
-    """``canshaper sim`` and ``canshaper run`` on a bus of their own, started again when they end.
+    """``canshaper sim`` and ``canshaper run`` on a bus of their own, restarted when they end.
 
     Args:
-        name: of the crane, for logs and sockets.
+        name: name of the crane, for logs and sockets.
         file: the deployment file.
         transport: the bus.
-        directory: for logs and sockets; it has to outlive this object.
-        report: called with what happens to the processes.
+        directory: folder for logs and sockets; it must outlive this object.
+        report: called with each event of the processes.
         changes: parameters of the crane, NAME=VALUE.
-        program: how the daemon is started; a benchmark puts its own around it.
+        program: command that starts the daemon; a benchmark gives a wrapper.
 
     Attributes:
         control: control socket of the daemon.
-        starts: how often the daemon was started.
+        starts: number of starts of the daemon.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Crane:
         self._status.bind(str(self._status_path))
 
     def check(self, now_s: float) -> None:
-        """Start what does not run and is due; report what has ended."""
+        """Report processes that have ended; start those that are due."""
         for verb, child in self._children.items():
             if child.process is None:
                 if now_s >= child.start_at_s and not self._stopping:
@@ -151,12 +151,12 @@ class Crane:
             os.sched_setscheduler(child.process.pid, os.SCHED_FIFO, os.sched_param(priority))
 
     def reload(self) -> None:
-        """Let the daemon read its file again, as its service manager does."""
+        """Make the daemon read its file again, as its service manager does."""
         if (process := self._children["run"].process) is not None:
             process.send_signal(signal.SIGHUP)
 
     def late_us(self) -> int | None:
-        """Largest lateness of a tick in the last second, when the daemon has reported one."""
+        """Return the largest lateness of a tick in the last second, us; None without a report."""
         late = None
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -166,7 +166,7 @@ class Crane:
         return late
 
     def stop(self) -> None:
-        """End both; the daemon goes first and leaves the valves neutral."""
+        """End both processes, the daemon first: it leaves the valves neutral."""
         self._stopping = True
         for verb in ("run", "sim"):
             if (process := self._children[verb].process) is not None:
@@ -180,7 +180,7 @@ def _last_line(log: Path) -> str:
 
 
 def groups(count: int) -> list[Transport]:
-    """Multicast groups of this process alone: two studios on one machine do not meet."""
+    """Return multicast groups of this process alone: two studios on a machine do not meet."""
     pid = os.getpid()  # at most 2 ** 22
     first = 100 + count * (pid // 65536) % 128
     names = [f"239.{first + i}.{pid // 256 % 256}.{pid % 256}" for i in range(count)]
@@ -188,13 +188,13 @@ def groups(count: int) -> list[Transport]:
 
 
 class SimulatedPose:
-    """Pose and sway where the buses have none: what the simulated crane does with the valve frames.
+    """Pose and sway for buses without them, from a simulated crane behind the valve frames.
 
-    It stands in its start pose at first, wherever the machine stood.
+    The simulated crane begins in its start pose, wherever the machine stood.
 
     Args:
-        view: its valve frames are read from here, pose and sway are written into it.
-        deployment: whose axes they are.
+        view: gives the valve commands, and gets pose and sway.
+        deployment: the machine of the axes.
         parameters: the crane.
     """
 
@@ -208,14 +208,14 @@ class SimulatedPose:
 
     @staticmethod
     def fits(deployment: Deployment) -> bool:
-        """Whether the simulated crane has the axes of a deployment, and its views can show it."""
+        """Return whether the simulated crane has a deployment's axes and its view can show it."""
         moves = deployment.coordinates
         axes = {moves.get(name, name) for name in deployment.axes.keys() - {ROTATOR}}
         kind = machine_for(moves.values())
         return kind not in ON_ROPE and axes <= {*AXES_OF[kind]}
 
     def advance(self, dt_s: float, now_s: float) -> None:
-        """Hold the last valve commands for so long."""
+        """Hold the last valve commands for dt_s seconds."""
         view, crane = self._view, self._machine.crane
         self._machine.step(
             dt_s, {moved: view.axes[name].opening for moved, name in self._axes.items()}
@@ -232,7 +232,7 @@ class SimulatedPose:
 
 @dataclass
 class CraneSession:
-    """A crane that is listened to; ``hand`` where the page drives it, ``here`` in this process."""
+    """A crane that the page shows; ``hand`` is set if the page drives it, ``here`` if it runs here."""
 
     view: CraneView
     ports: Mapping[str, Port]
@@ -242,7 +242,7 @@ class CraneSession:
     here: "InProcessCrane | None" = None
 
     def exchange(self, time_ms: int, held: Held, now_s: float, passed_ms: int) -> None:
-        """Take what waits on the buses; where the page drives it, move its joysticks."""
+        """Take the waiting frames; move the joysticks if the page drives the crane."""
         frames: list[Frame] = []
         for port in self.ports.values():
             frames += port.frames()
@@ -254,7 +254,7 @@ class CraneSession:
         self.view.check(now_s)
 
     def move_joysticks(self, time_ms: int, held: Held) -> list[Frame]:
-        """Send the frames of the joysticks that are due, where the page drives it; those frames."""
+        """Send the due joystick frames if the page drives the crane; return these frames."""
         frames = list(self.hand.frames(time_ms, held)) if self.hand else []
         for frame in frames:
             self.ports[frame.bus].send(frame)

@@ -1,7 +1,7 @@
-"""A simulated crane with its controller in this process: where processes share no bus.
+"""A simulated crane with its controller in this process, for systems without a shared bus.
 
-As on systems other than Linux, and for deployments with several buses. The frames are those of a
-bus; the controller is the daemon's, behind its gate and in its I/O cycle.
+These are systems other than Linux, and deployments with several buses. The frames are those of a
+bus; the controller is that of the daemon, behind its gate and in its I/O cycle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,17 +26,17 @@ MOST_MS = 500
 
 
 class InProcessCrane:
-    """Joysticks, controller and crane, in step.
+    """Joysticks, controller and crane, tick by tick.
 
     Args:
         deployment: the machine; its buses are not opened.
         changes: parameters of the crane, NAME=VALUE.
-        crane: which one it is, where the deployment has several; the others' joysticks stand still.
-        report: called with the error of a filter: a status frame carries only its reason.
-        joysticks: others than those that ``frames`` holds.
+        crane: name of the crane, if the deployment has several; the others' joysticks stand still.
+        report: called with the text of a filter error; a status frame carries only its reason.
+        joysticks: source of joystick frames; by default a hand that ``frames`` moves.
 
     Attributes:
-        cycle_ms: of the joysticks.
+        cycle_ms: cycle of the joysticks.
 
     Raises:
         DriveError: no simulated crane fits the deployment.
@@ -75,7 +75,7 @@ class InProcessCrane:
         self._due_ms = 0
 
     def frames(self, held: Held, passed_ms: int) -> list[Frame]:
-        """Let time pass with the joysticks held so; every frame that was on a bus in it."""
+        """Let time pass with these joysticks; return every frame that was on a bus meanwhile."""
         self._hand.held = held
         self._due_ms += min(passed_ms, MOST_MS)
         while self._lock_step.time_ms < self._due_ms:
@@ -93,12 +93,12 @@ class InProcessCrane:
         """Change numbers of the controller.
 
         Raises:
-            ValueError: it does not allow that.
+            ValueError: the controller does not allow the change.
         """
         self._adjuster.change(values)
 
     def reload(self, deployment: Deployment) -> None:
-        """Go on with other filters, as after a reload: once every axis is neutral."""
+        """Use other filters, as after a reload, once every axis is neutral."""
         self._next = deployment
 
     def _use(self, deployment: Deployment) -> None:
@@ -112,13 +112,13 @@ class InProcessCrane:
 
 
 class HeldHand:
-    """Joysticks as the page holds them."""
+    """A source of joystick frames, from the state of the page's hand."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.hand, self.held = Hand(deployment), Held()
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
-        """Frames that came since the last tick."""
+        """Return the frames since the last tick."""
         due = self.hand.due(time_ms, tick_ms)
         return [frame for ms in due for frame in self.hand.frames(ms, self.held)]
 
@@ -131,20 +131,20 @@ LIVE_ONLY = frozenset(("sources", "late_us"))
 
 
 class CraneFilm:
-    """Pictures of a crane, one for each ``PICTURE_S`` of the drive.
+    """Pictures of a crane, one every ``PICTURE_S`` seconds of the drive.
 
     Args:
-        name: of the crane, for the page.
+        name: name of the crane on the page.
         deployment: names the messages.
-        begin_s: from where pictures are kept.
-        end_s: up to where; None for the end.
+        begin_s: time of the first picture to keep, s.
+        end_s: time of the last picture to keep, s; None for the end of the drive.
 
     Attributes:
-        view: what is known of the crane now.
-        numbers: of each picture: its time is ``number * PICTURE_S``.
-        pictures: what a live page would have shown.
-        events: (time in s, name, text, level) of what happened.
-        full: whether there was more than is kept.
+        view: present state of the crane.
+        numbers: number of each picture; its time is ``number * PICTURE_S``.
+        pictures: the values that a live page would have shown.
+        events: (time in s, name, text, level) of each event.
+        full: the drive had more than ``MOST_PICTURES``; the rest was dropped.
     """
 
     def __init__(
@@ -161,12 +161,12 @@ class CraneFilm:
         self._next = 0
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame of its buses."""
+        """Take a frame from the buses of the crane."""
         self._now_s = now_s
         self.view.receive(frame, now_s)
 
     def advance(self, now_s: float) -> None:
-        """Take the pictures that are due up to a time."""
+        """Take the pictures that are due up to now_s."""
         last = int(now_s / PICTURE_S + 1e-6)
         while self._next <= last:
             self._now_s = self._next * PICTURE_S
@@ -176,7 +176,7 @@ class CraneFilm:
             self._next += 1
 
     def leap(self, now_s: float) -> None:
-        """Take no pictures up to a time: nothing happened until then."""
+        """Skip the pictures up to now_s: nothing happened until then."""
         self._next = max(self._next, int(now_s / PICTURE_S))
 
     def _within(self) -> bool:

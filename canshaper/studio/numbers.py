@@ -1,4 +1,4 @@
-"""Numbers of a running machine, from the page: what is in force, who changed it, the way back."""
+"""Numbers of a running machine, changed from the page: present values, who changed them, undo."""
 
 import threading
 import time
@@ -26,8 +26,8 @@ class Change(NamedTuple):
 
     Attributes:
         time_s: time of day, seconds of the epoch.
-        who: by whom.
-        numbers: by key what it was, and what it became.
+        who: name of the person or program that changed them.
+        numbers: key -> (value before, value after).
     """
 
     time_s: float
@@ -36,15 +36,15 @@ class Change(NamedTuple):
 
 
 class LiveNumbers:
-    """The numbers of one daemon that its file lets be changed. Any thread may call.
+    """The adjustable numbers of one daemon. Any thread may call.
 
     Args:
         file: the deployment file.
         control: control socket of the daemon.
-        report: called with what was changed.
+        report: called with a text on each change.
 
     Attributes:
-        version: another one whenever there is something else to show.
+        version: grows whenever there is something new to show.
     """
 
     def __init__(self, file: Path, control: Path, report: Callable[[str], None]) -> None:
@@ -60,17 +60,17 @@ class LiveNumbers:
         self._thread = threading.Thread(target=self._watch, name="numbers")
 
     def start(self) -> None:
-        """Begin to look what others change."""
+        """Begin to watch for changes by others."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End that."""
+        """End the watch."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
 
     def shown(self) -> dict[str, Any]:
-        """Everything for the page."""
+        """Return everything that the page shows."""
         with self._lock:
             return {
                 "table": self._table,
@@ -81,7 +81,7 @@ class LiveNumbers:
             }
 
     def in_force(self) -> dict[str, float]:
-        """Every number as it is now, by key."""
+        """Return the present value of every number, by key."""
         with self._lock:
             return self._now()
 
@@ -89,12 +89,12 @@ class LiveNumbers:
         """Change numbers, all or none.
 
         Args:
-            values: by key.
-            seen: what the page showed of them: who comes second gets an error.
-            who: for the list of changes.
+            values: new values by key.
+            seen: values that the page showed, by key; a value changed since refuses all.
+            who: name for the list of changes.
 
         Raises:
-            ControlError: the daemon refuses or does not answer, or another page was first.
+            ControlError: the daemon refuses or does not answer, or someone else was first.
         """
         with self._lock:
             self._look()
@@ -108,10 +108,10 @@ class LiveNumbers:
             self._before.append({key: before[key] for key in values})
 
     def undo(self, who: str) -> None:
-        """Take back the last change that was made here.
+        """Undo the last change that was made here.
 
         Raises:
-            ControlError: there is none, or the daemon refuses.
+            ControlError: there is no such change, or the daemon refuses.
         """
         with self._lock:
             self._look()
@@ -121,10 +121,10 @@ class LiveNumbers:
             self._before.pop()
 
     def swap(self, who: str) -> None:
-        """Go to the last numbers that were in force before these, and next time back.
+        """Swap the present numbers with those before the last change (A/B).
 
         Raises:
-            ControlError: there are none, or the daemon refuses.
+            ControlError: there are no earlier numbers, or the daemon refuses.
         """
         with self._lock:
             self._look()
@@ -136,11 +136,7 @@ class LiveNumbers:
             self._before.append({key: now[key] for key in values})
 
     def difference(self) -> dict[str, str]:
-        """Return what ``write`` would change in the file, and the file's hash.
-
-        Raises:
-            CanshaperError: the file cannot be read or changed.
-        """
+        """Return the difference that ``write`` would make in the file, and the file's hash."""
         with self._lock:
             self._look()
             before = self._file.read_text(encoding="utf-8")
@@ -154,14 +150,14 @@ class LiveNumbers:
             return {"text": "\n".join(lines), "hash": _hash(before)}
 
     def write(self, file_hash: str, who: str) -> None:
-        """Write the numbers that are in force into the file.
+        """Write the present numbers into the file.
 
         Args:
-            file_hash: of the file whose difference was looked at.
-            who: for the list of events.
+            file_hash: hash of the file that the person saw in ``difference``.
+            who: name for the list of events.
 
         Raises:
-            CanshaperError: the file is another one by now, or cannot be changed.
+            CanshaperError: the file has changed since, or cannot be changed.
         """
         with self._lock:
             self._look()
@@ -174,7 +170,7 @@ class LiveNumbers:
             self.version += 1
 
     def _unwritten(self) -> dict[str, float]:
-        """Numbers in force that are not those of the file as it is on the disk."""
+        """Return the present numbers that differ from the file on the disk."""
         axes = load_config(self._file)[0].axes
         values = {}
         for text, now in self._now().items():
@@ -192,7 +188,7 @@ class LiveNumbers:
         self._look(who)
 
     def _look(self, who: str = OTHERS) -> None:
-        """Read the table of the daemon; what is another number by now was changed by ``who``."""
+        """Read the table of the daemon; note every changed number as a change by ``who``."""
         before = self._now()
         self._table = client.table(self._control)
         now = self._now()

@@ -1,4 +1,4 @@
-"""A drive that is over, for the page: a log or black box replayed, or a drive of a campaign."""
+"""A finished drive for the page: a replayed log or black box, or a drive of a campaign."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Named:
-    """A deployment and what the page calls it."""
+    """A deployment and its name on the page."""
 
     name: str
     deployment: Deployment
@@ -38,14 +38,14 @@ class Named:
 
 @dataclass
 class Playback:
-    """A drive that is over.
+    """A finished drive.
 
     Attributes:
-        title: of the drive.
-        axes: of its cranes.
-        parameters: the crane that is drawn.
-        films: its cranes.
-        notes: what is to be known before it is believed.
+        title: title of the drive.
+        axes: names of the axes of its cranes.
+        parameters: the crane to draw.
+        films: one film for each of its cranes.
+        notes: notes to read before relying on the drive.
     """
 
     title: str
@@ -55,7 +55,7 @@ class Playback:
     notes: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
-        """Pictures and events of all cranes, for JSON."""
+        """Return the pictures and events of all cranes for JSON."""
         events = sorted(event for film in self.films for event in film.events)
         return {
             "title": self.title,
@@ -80,14 +80,14 @@ def play_log(
     Args:
         path: the log, or a black box.
         deployments: at least one; all have the axes of the first one.
-        own: whether the first one came with the log.
-        channels: channels by bus.
-        window: what is kept of it.
+        own: the first deployment came with the log.
+        channels: channel by bus from the command line.
+        window: begin and end of the pictures to keep.
         parameters: the simulated crane behind the valve frames of each replay.
         progress: see ``Progress``.
 
     Raises:
-        LogError: the log cannot be used with one of them.
+        LogError: the log does not fit one of the deployments.
     """
     first = deployments[0].deployment
     playback = Playback(path.name, list(first.axes), parameters)
@@ -117,7 +117,7 @@ def _replayed(
     *,
     progress: Progress,
 ) -> int | None:
-    """Replay a log; the time of its first tick, which is ``start_ns`` where that is given."""
+    """Replay a log into a film; return the time of its first tick, or ``start_ns`` if given."""
     replay = Replay(deployment, drive)
     pose = None
     if SimulatedPose.fits(deployment):
@@ -151,7 +151,7 @@ def _replayed(
 
 
 def _recorded(film: CraneFilm, drive: Drive, deployment: Deployment, start_ns: int) -> None:
-    """Show what the frames of a log say by themselves."""
+    """Fill a film from the frames of a log alone."""
     before_s = 0.0
     for now_s, frame in _frames(drive, start_ns):
         if now_s >= 0.0:
@@ -165,7 +165,7 @@ def _recorded(film: CraneFilm, drive: Drive, deployment: Deployment, start_ns: i
 
 
 def _frames(drive: Drive, start_ns: int) -> Iterator[tuple[float, Frame]]:
-    """Frames of the buses of a log that is no black box, with their times."""
+    """Yield (time in s, frame) for the buses of a log that is no black box."""
     try:
         for time_ns, channel, can_id, extended, data in LogFile(drive.path):
             if bus := drive.channels.get(channel):
@@ -177,12 +177,12 @@ def _frames(drive: Drive, start_ns: int) -> Iterator[tuple[float, Frame]]:
 def play_seed(
     deployments: Sequence[Named], seed: int, nominal: CraneParameters, progress: Progress
 ) -> Playback:
-    """Drive a drive of a campaign, raw and with each deployment.
+    """Repeat a drive of a campaign, raw and with each deployment.
 
     Args:
         deployments: at least one; the drive is drawn from the ranges of the first.
-        seed: of the drive.
-        nominal: the crane that the ranges are about.
+        seed: seed of the drive.
+        nominal: the nominal crane of the ranges.
         progress: see ``Progress``.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The web side of the page for drives that are over: a list of them, and each as JSON."""
+"""The web side of the page for finished drives: a list of the drives, and each drive as JSON."""
 
 import json
 import threading
@@ -27,8 +27,8 @@ class Choice:
     """A drive that can be opened.
 
     Attributes:
-        title: for the list.
-        load: makes it.
+        title: title in the list.
+        load: returns the drive.
     """
 
     title: str
@@ -36,12 +36,12 @@ class Choice:
 
 
 def playback_app(file: str, choices: Sequence[Choice], access: Access) -> ASGIApp:
-    """The page for drives that are over.
+    """Return the page for finished drives.
 
     Args:
-        file: what was opened, for people.
-        choices: at least one; each is made when it is asked for, the last one is kept.
-        access: who may.
+        file: name of the opened file, for people.
+        choices: at least one; each drive is made on request, the last one is kept.
+        access: rules for who may see the page.
     """
     kept = _Kept(file, choices)
 
@@ -62,7 +62,7 @@ def playback_app(file: str, choices: Sequence[Choice], access: Access) -> ASGIAp
 
 
 class _Kept:
-    """The drive that was asked for last; one at a time is made."""
+    """The last requested drive; only one drive is made at a time."""
 
     def __init__(self, file: str, choices: Sequence[Choice]) -> None:
         self._file, self._choices = file, choices
@@ -71,7 +71,7 @@ class _Kept:
         self._content = b""
 
     def drive(self, number: int) -> bytes:
-        """A drive as JSON."""
+        """Return a drive as JSON."""
         with self._lock:
             if number != self._number:
                 playback = self._choices[number].load()

@@ -1,10 +1,10 @@
-"""The slider from quicker to calmer: settings of each filter that has several, and what they do.
+"""The slider from quicker to calmer: settings of each filter that has several, with their measures.
 
-Of G_FF they are those along the front of ``tune --preference``, of a robust shaper responses of
-other lengths, all through the limits and within the stopping distance of the file. They end where a
-response is shorter than half a swing, where the filter is useless, and where the grapple would hang
-still earlier without it. ``python -m canshaper.studio.preference FILE`` prints them as JSON, which
-takes seconds of a processor: the cranes of the page do not wait for it.
+For G_FF the settings lie along the front of ``tune --preference``; for a robust shaper they are
+responses of other lengths; all through the limits and within the stopping distance of the file. The
+range ends where a response is shorter than half a swing, where the filter is useless, and where the
+grapple would hang still earlier without it. ``python -m canshaper.studio.preference FILE`` prints
+the settings as JSON, which takes seconds: so it runs apart from the cranes of the page.
 """
 
 import json
@@ -42,7 +42,7 @@ the length), run-on in m and s until the grapple hangs still after full speed; N
 
 
 def offered(config: DeploymentConfig) -> list[str]:
-    """Axes whose filter has such settings."""
+    """Return the axes whose filter has such settings."""
     return [name for name, axis in config.axes.items() if _has_settings(axis)]
 
 
@@ -54,9 +54,9 @@ def _has_settings(axis: AxisSection) -> bool:
 
 
 def settings(deployment: Deployment, axis: str) -> dict[str, Any]:
-    """The setting of the ``file``, and those to ``choose`` from, quickest first.
+    """Return the setting of the ``file``, and those to ``choose`` from, quickest first.
 
-    A longer response that leaves more than a shorter one, as ``stop_distance_m`` cuts it, is none.
+    A longer response is left out if it leaves more, since ``stop_distance_m`` cuts it off.
     """
     config = deployment.axes[axis].config
     made = _front if config.filter.kind == "gff" else _responses
@@ -101,7 +101,7 @@ def _responses(deployment: Deployment, axis: str) -> Iterator[tuple[Filter, floa
 
 
 def _fitting(deployment: Deployment, axis: str, chosen: Filter, tail_s: float) -> Setting | None:
-    """The setting, where it is within the ends of the slider."""
+    """Return the setting if it is within the range of the slider, else None."""
     config = deployment.axes[axis].config
     assert config.sway is not None
     setting, run_on_s, raw_s = _measured(deployment, axis, chosen, tail_s)
@@ -115,7 +115,7 @@ def _fitting(deployment: Deployment, axis: str, chosen: Filter, tail_s: float) -
 def _measured(
     deployment: Deployment, axis: str, chosen: Filter, tail_s: float
 ) -> tuple[Setting, float, float]:
-    """The setting, its run-on to 5 % in s, and time until the grapple hangs still without it."""
+    """Return the setting, its run-on to 5 % in s, and the still time in s without the filter."""
     sway = deployment.axes[axis].config.sway
     assert sway is not None
     setup = on_axis(deployment, axis, chosen, tail_s=tail_s)
@@ -124,7 +124,7 @@ def _measured(
     swing_deg = math.degrees(sway.full_speed_m_s * mode.angle_per_speed_rad / mode.omega_rad_s)
 
     def still_s(part: float) -> float:
-        """Time until a part of the raw swing has decayed to stillness."""
+        """Return the time in s until this part of the raw swing has decayed to stillness."""
         times = part * swing_deg / deployment.config.still_deg
         decay_per_s = -mode.pole.real
         if times <= 1.0:
@@ -146,7 +146,7 @@ def _measured(
 
 
 class Preference:
-    """The slider of a page.
+    """The slider of a page from quicker to calmer.
 
     Args:
         path: the copy of the deployment file that the page drives, in JSON.
@@ -161,7 +161,7 @@ class Preference:
         self._found: dict[str, Any] | None = None
 
     def found(self) -> dict[str, Any]:
-        """Settings of each axis, see ``settings``; the first call waits for their computation."""
+        """Return the ``settings`` of each axis; the first call waits for their computation."""
         with self._lock:
             if self._found is None:
                 command = [sys.executable, "-m", "canshaper.studio.preference", str(self._path)]
@@ -174,25 +174,25 @@ class Preference:
             return self._found
 
     def ready(self) -> dict[str, Any] | None:
-        """Settings of each axis; None while they are computed. Nobody waits for them here."""
+        """Return the settings of each axis; None while they are computed, without waiting."""
         if not self._started:
             self._started = True
             threading.Thread(target=self.found, daemon=True).start()
         return self._found
 
     def stop(self) -> None:
-        """End the process, where it still runs."""
+        """End the process if it still runs."""
         self._stopped = True
         if self._process:
             self._process.kill()
             self._process.wait()
 
     def write(self, position: float) -> Deployment:
-        """Write the settings at a position of the slider into the copy.
+        """Write the settings at a position of the slider into the copy, and load it.
 
         Raises:
-            ValueError: it is none.
-            ConfigError: they make no good deployment; the copy is as it was.
+            ValueError: the position is not on the slider.
+            ConfigError: the settings make no valid deployment; the copy is unchanged.
         """
         if not (position == AS_IN_FILE or 0.0 <= position <= 1.0):
             raise ValueError(f"slider {PREFERENCE}: expected 0 to 1, got {str(position)[:20]}")

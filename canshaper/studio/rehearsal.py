@@ -1,6 +1,6 @@
-"""The steps of the commissioning, for the page: a process of its own.
+"""The steps of the commissioning for the page, in a process of its own.
 
-A line of JSON asks, with the arguments of ``work``; a line answers.
+A line of JSON on stdin is a request with the arguments of ``work``; a line on stdout answers.
 """
 
 import json
@@ -28,25 +28,25 @@ _CHOICE = ("offered", "recommended", "chosen")  # numbers of a step that asks fo
 
 
 class Reader:
-    """The person in front of the page, who sees no bar.
+    """The person in front of the page, who sees no progress bar.
 
     Args:
-        word: their answer to the question that allows it.
+        word: the person's answer to the question that allows it.
     """
 
     def __init__(self, word: str = "") -> None:
         self._word = word
 
     def ready(self, words: str) -> None:
-        """Wait for nothing: this is the desk."""
+        """Return at once: at the desk nobody has to get ready."""
 
     def answer(self, _question: str, default: str, allowed: Sequence[str] = ()) -> str:
-        """Their word where it is allowed, else the default."""
+        """Return the person's answer if the question allows it, else the default."""
         return self._word if self._word in allowed else default
 
     @contextmanager
     def progress(self, _what: str) -> Iterator[OnProgress]:
-        """None is shown."""
+        """Give a function that shows no progress."""
 
         def unseen(done: float, what: str | None = None) -> None:
             pass
@@ -57,18 +57,18 @@ class Reader:
 def work(
     what: str, path: Path, changes: list[str], step: str, *, machine: bool, answer: str = ""
 ) -> dict[str, Any]:
-    """Do what the page asks for.
+    """Do a request of the page.
 
     Args:
         what: ``show``, ``run``, ``accept`` or ``skip``.
         path: the deployment file.
         changes: parameters of the simulated crane, NAME=VALUE.
         step: name of the step; empty to show.
-        machine: whether that of the machine is shown; else its rehearsal.
-        answer: to a question of the step.
+        machine: show the commissioning of the machine; else its rehearsal.
+        answer: answer to a question of the step.
 
     Returns:
-        What the page shows, and under ``error`` why something was not done.
+        The state for the page; ``error`` says why a request was not done.
     """
     error, news = "", ""
     try:
@@ -87,7 +87,7 @@ def work(
 
 @contextmanager
 def _procedure(path: Path, changes: list[str], answer: str) -> Iterator[Procedure]:
-    """The rehearsal of a file, while no other process works on it."""
+    """Open the rehearsal of a file, locked against other processes."""
     check_rehearsal(load_deployment(path))  # what is wrong in it is named by its own name
     files = Files(copy_for_rehearsal(path))
     with files.locked():
@@ -110,7 +110,7 @@ def _do(procedure: Procedure, path: Path, what: str, name: str) -> None:
 
 
 def _shown(path: Path, changes: list[str], *, machine: bool) -> dict[str, Any]:
-    """How far it has come, and what the last run proposes."""
+    """Return the progress of the commissioning, and the proposal of the last run."""
     files = Files(path if machine else rehearsal_of(path))
     state = read_state(files.state) or State(changes=changes)
     deployment = load_deployment(path)
@@ -147,7 +147,7 @@ def _shown(path: Path, changes: list[str], *, machine: bool) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Answer until no one asks any more; Ctrl-C is for the server, which ends it."""
+    """Answer requests until stdin ends; ignore Ctrl-C, on which the server ends this process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICE)
     answers, sys.stdout = sys.stdout, sys.stderr

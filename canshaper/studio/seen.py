@@ -1,4 +1,4 @@
-"""State of each axis, source and swing by the frames on the buses, for the page. No clock."""
+"""State of each axis, rate of each source, and swing, from the frames on the buses. No clock."""
 
 import math
 from collections import deque
@@ -22,9 +22,9 @@ MOST_FRAMES = 2000
 
 @dataclass
 class AxisView:
-    """State of an axis; fractions of full, degrees.
+    """State of an axis on the page: fractions of full, degrees.
 
-    ``opening`` is what the valve frame says, ``valve`` the speed that it means.
+    ``opening`` is the value of the valve frame, ``valve`` the speed it stands for.
     """
 
     joystick: float | None = None
@@ -36,7 +36,7 @@ class AxisView:
     profile: str | None = None
 
     def values(self) -> dict[str, Any]:
-        """Everything for the page."""
+        """Return everything that the page shows."""
         return {
             "joystick": rounded(self.joystick),
             "valve": rounded(self.valve),
@@ -49,12 +49,12 @@ class AxisView:
 
 
 def rounded(value: float | None, digits: int = 4) -> float | None:
-    """A number as short as the page needs it."""
+    """Return a number rounded for the page."""
     return None if value is None else round(value, digits)
 
 
 class Sources:
-    """When the frames of each source came.
+    """Times of the frames of each source.
 
     Args:
         names: the sources, in the order of the page.
@@ -68,12 +68,12 @@ class Sources:
         self._times_s[name].append(now_s)
 
     def age_s(self, name: str, now_s: float) -> float | None:
-        """Age of the last frame; None before there is any."""
+        """Return the age of a source's last frame, s; None before the first."""
         times_s = self._times_s[name]
         return now_s - times_s[-1] if times_s else None
 
     def values(self, now_s: float) -> dict[str, Any]:
-        """Frames of the last second, and the age of the last frame in seconds, for the page."""
+        """Return, by source, the frames in the last second and the age of the last frame, s."""
         values = {}
         for name, times_s in self._times_s.items():
             age_s = self.age_s(name, now_s)
@@ -102,15 +102,15 @@ LEAST_SWING_S = 1.0
 
 
 def sway_of(coordinates: Mapping[str, str]) -> dict[str, str]:
-    """Which swing an axis excites, by its name: across boom or bridge, or along it."""
+    """Return the swing that each axis excites, by axis: across boom or bridge, or along it."""
     return {axis: _SWAY_OF[moved] for axis, moved in coordinates.items() if moved in _SWAY_OF}
 
 
 class Swing:
-    """Sway in any direction over one full swing, and how long it lasts after a release.
+    """Largest sway in any direction over one full swing, and its duration after a release.
 
     Args:
-        models: sway models of the deployment, the longest period counts.
+        models: sway models of the deployment; the longest period counts.
         still_deg: swing below which the grapple counts as still.
     """
 
@@ -124,14 +124,14 @@ class Swing:
         self._released_s: float | None = None
 
     def add(self, sway_deg: tuple[float, float], now_s: float) -> None:
-        """Take a sway, across and along the boom."""
+        """Take a sway (across, along the boom), degrees."""
         sway = math.hypot(*sway_deg)
         self._sways.append((now_s, sway))
         if sway >= self._still_deg:
             self._over_s = now_s
 
     def move(self, now_s: float, *, moved: bool, drives: bool) -> None:
-        """Take whether any joystick is deflected, and whether any valve is open."""
+        """Take the present state; ``moved``: a joystick is deflected, ``drives``: a valve open."""
         if moved:
             self._released_s = None
             self._drove = drives or (self._moved and self._drove)
@@ -140,23 +140,23 @@ class Swing:
         self._moved = moved
 
     def still_s(self, now_s: float) -> tuple[float | None, bool]:
-        """Time from the release until the last sway that was no stillness, and whether it swings.
+        """Return the time in s from release to the last sway above the bound, and if it goes on.
 
-        There is none before a release, while a joystick is deflected, and after a press that opened
-        no valve. A swing is over when
-        there has been no such sway for as long as a full swing.
+        The time is None before a release, while a joystick is deflected, and after a press that
+        opened no valve. The swing is over when no sway above the bound came for as long as a full
+        swing.
         """
         if self._released_s is None:
             return None, False
         return max(self._over_s - self._released_s, 0.0), now_s - self._over_s < self._lasts_s
 
     def invalidate(self) -> None:
-        """Begin again."""
+        """Forget all sway and releases."""
         self._sways.clear()
         self._over_s, self._released_s, self._moved = -math.inf, None, False
 
     def largest_deg(self, now_s: float) -> float | None:
-        """The largest one of the last full swing; None before there is any."""
+        """Return the largest sway within the last full swing, degrees; None before the first."""
         while self._sways and self._sways[0][0] < now_s - self._lasts_s:
             self._sways.popleft()
         return max((sway for _, sway in self._sways), default=None)
@@ -168,15 +168,15 @@ LENGTHS_PCT = tuple(range(-50, 101, 5))
 
 
 def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """Return the residuals by axis; axes without sway data, or with several filters, have none.
+    """Return the residuals by axis, without axes that have no sway data or several filters.
 
     Args:
         deployment: the machine.
         values: numbers in force that may differ from the file, by key.
 
     Returns:
-        By axis ``lengths_m`` of a simple pendulum of the same period, ``left`` as a fraction of the
-        swing without a filter, the length that the filter ``believes``, and that of the ``file``.
+        By axis: ``lengths_m`` of a simple pendulum of the same period; ``left``, the fraction of
+        the swing without a filter; the length that the filter ``believes``; that of the ``file``.
     """
     by_axis: dict[str, dict[Key, float]] = {}
     for text, number in values.items():

@@ -1,4 +1,4 @@
-"""The web server of the page: files, and one connection a page. No internet at run time."""
+"""The web server of the page: files, and one connection for each page. It needs no internet."""
 
 import asyncio
 import itertools
@@ -44,27 +44,27 @@ MOST_CONNECTIONS = 100
 
 
 class BoundedHttp(H11Protocol):
-    """uvicorn's protocol, which itself waits for the rest of a request without end."""
+    """uvicorn's protocol with a time limit: uvicorn itself waits forever for a whole request."""
 
     _overdue: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin a connection, and wait for its first request."""
+        """Begin a connection and wait for its first request."""
         super().connection_made(transport)
         self._watch()
 
     def data_received(self, data: bytes) -> None:
-        """Take a piece of a request, perhaps its end."""
+        """Take a part of a request, perhaps its last."""
         super().data_received(data)
         self._watch()
 
     def on_response_complete(self) -> None:
-        """End an answer, and wait for the next request."""
+        """End an answer and wait for the next request."""
         super().on_response_complete()
         self._watch()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        """Begin a page: from now on pings watch it."""
+        """Begin a page's connection: from now on pings watch it."""
         self._cancel()
         super().handle_websocket_upgrade(event)
         self._cancel()
@@ -75,7 +75,7 @@ class BoundedHttp(H11Protocol):
         super().connection_lost(exc)
 
     def _watch(self) -> None:
-        """Count the time as long as nothing is being answered."""
+        """Let the time limit run while no request is being answered."""
         answering = self.cycle is not None and not self.cycle.response_complete
         if answering or self.transport.is_closing() or self.transport.get_protocol() is not self:
             self._cancel()
@@ -104,13 +104,13 @@ HEADERS = {
 def build_app(
     stage: Stage, access: Access, parameters: CraneParameters, commission: Commission
 ) -> ASGIApp:
-    """The page of a stage.
+    """Return the page of a stage.
 
     Args:
-        stage: what is driven or watched.
-        access: who may.
-        parameters: the crane that is drawn.
-        commission: of its file.
+        stage: the cranes that the page drives or watches.
+        access: rules for who may see the page.
+        parameters: the crane to draw.
+        commission: commissioning of the stage's file.
     """
 
     def left(_request: HTTPConnection) -> Response:
@@ -122,7 +122,7 @@ def build_app(
 
 
 def pages_of(stage: Stage, hello: dict[str, Any]) -> BaseRoute:
-    """Return the route of the pages of a stage; each page first gets what there is."""
+    """Return the route for the pages of a stage; ``hello`` is the first message to each page."""
     numbers = itertools.count(1)
     open_pages: set[int] = set()
 
@@ -142,12 +142,12 @@ def pages_of(stage: Stage, hello: dict[str, Any]) -> BaseRoute:
 
 
 def page_app(routes: Sequence[BaseRoute], script: str, access: Access) -> ASGIApp:
-    """The page with a script behind it.
+    """Return the page with this script.
 
     Args:
-        routes: what the script asks for.
-        script: its file.
-        access: who may.
+        routes: routes for the requests of the script.
+        script: name of its file.
+        access: rules for who may see the page.
     """
 
     async def page(_request: HTTPConnection) -> Response:
@@ -162,7 +162,7 @@ def page_app(routes: Sequence[BaseRoute], script: str, access: Access) -> ASGIAp
 
 
 class Guard:
-    """Lets in only who may, and puts the headers of every answer."""
+    """Refuses requests against the rules of access, and adds the headers to every answer."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
@@ -208,7 +208,7 @@ def _with_headers(send: Send) -> Send:
 
 
 def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
-    """The first message to a page: what there is, and how long the links are."""
+    """Return the first message to a page: cranes, controls, and the lengths of the links."""
     return {
         "version": __version__,
         "file": stage.deployment.path.name,
@@ -229,11 +229,11 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
 
 
 def drawn_of(parameters: CraneParameters, deployment: Deployment) -> dict[str, Any]:
-    """Return what a page draws: how long the links are, which swing each axis excites.
+    """Return the data for a page's drawing: lengths of links, and the swing that each axis excites.
 
-    Of an overhead crane ``hall`` says how long runway, bridge, rope and sling are; of others it is
-    None. A multicopter keeps its rope, and its place in the picture.
-    The boom of another crane with a rope is ``straight``; that of a tower crane is its jib.
+    For an overhead crane ``hall`` has the lengths of runway, bridge, rope and sling; for others it
+    is None. The picture of a multicopter (``drawn``) is scaled by its rope.
+    The boom of another crane with a rope is ``straight``; for a tower crane it is the jib.
     """
     coordinates, section = deployment.coordinates, deployment.config.crane
     drawn: str | None = getattr(section, "drawn", None)
@@ -258,7 +258,7 @@ def drawn_of(parameters: CraneParameters, deployment: Deployment) -> dict[str, A
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """A socket that the server listens on.
+    """Return a socket on which the server listens.
 
     Raises:
         OSError: the address cannot be used.
@@ -268,14 +268,14 @@ def listening(host: str, port: int) -> socket.socket:
 
 
 def address(host: str, port: int, token: str | None) -> str:
-    """Return the address to open in the browser."""
+    """Return the address to open in a browser."""
     name = f"[{host}]" if ":" in host else host
     query = f"?token={token}" if token else ""
     return str(URL(f"http://{name}:{port}/{query}"))
 
 
 def server(app: ASGIApp) -> uvicorn.Server:
-    """The server; ``run(sockets=[...])`` serves until it is stopped."""
+    """Return the server; its ``run(sockets=[...])`` serves until it is stopped."""
     config = uvicorn.Config(
         app,
         log_level="error",

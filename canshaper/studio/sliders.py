@@ -1,6 +1,6 @@
-"""The slider of the page that says how long the filter believes the pendulum to be.
+"""The slider of the page that sets the pendulum length assumed by the filter.
 
-It is a factor on numbers of the deployment file, which change together, through the daemon's
+The slider is a factor on numbers of the deployment file; they change together, through the daemon's
 control socket. (Settings of the filters: ``preference``.)
 """
 
@@ -16,12 +16,12 @@ RANGES = {LENGTH: (0.5, 2.0)}
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the file, and with which power of the slider's factor it goes.
+    """A number of the file, and the power of the slider's factor that scales it.
 
     Attributes:
         key: dotted path in the deployment file.
-        value: what the file says.
-        power: the value is that of the file times factor ** power.
+        value: value in the file.
+        power: the scaled number is value * factor ** power.
     """
 
     key: str
@@ -29,15 +29,15 @@ class Number:
     power: float
 
     def at(self, factor: float) -> float:
-        """The number at a factor."""
+        """Return the number scaled by this factor of the slider."""
         return self.value * math.pow(factor, self.power)
 
 
 def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
-    """The numbers of each slider; none where no filter of the deployment has any.
+    """Return the numbers of each slider; empty if no filter of the deployment has such a number.
 
-    An axis with a gain schedule, profiles or a measured rope is left out: what is in force there
-    changes with the machine; and one whose filter covers a second mode, which would not go along.
+    The function leaves out an axis with a gain schedule, profiles or a measured rope, whose numbers
+    the machine changes, and one whose filter covers a second mode, which the slider cannot scale.
     """
     numbers: list[Number] = []
     for name, axis in config.axes.items():
@@ -52,7 +52,7 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
 
 
 def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:
-    """The control section's ``adjustable``: the range of every number that a slider changes."""
+    """Return ``adjustable`` of the section control: the range of every number of a slider."""
     ranges = {}
     for name, numbers in by_slider.items():
         for number in numbers:
@@ -63,10 +63,10 @@ def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:
 
 
 def values(numbers: dict[str, list[Number]], name: str, factor: float) -> dict[str, float]:
-    """Return the numbers of a slider at a factor.
+    """Return the numbers of a slider at this factor, by key.
 
     Raises:
-        ValueError: no such slider, or a factor that is not allowed.
+        ValueError: there is no such slider, or the factor is not allowed.
     """
     if name not in numbers:
         there = ", ".join(numbers) or "none"

@@ -1,4 +1,4 @@
-"""The loop behind the page: joysticks out, frames in, every 20 ms in a thread of its own."""
+"""The loop behind the page: every 20 ms it sends joysticks and reads frames, in its own thread."""
 
 import contextlib
 import threading
@@ -32,7 +32,7 @@ MS = 1_000_000
 
 
 class Stage:
-    """Everything behind the page of a machine, and its events."""
+    """The cranes behind the page of a machine, their driver's seat and sliders, and the events."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
@@ -57,10 +57,10 @@ class Stage:
         self._resets: list[threading.Thread] = []
 
     def watch(self, control: Path | None = None) -> None:
-        """Listen to the buses of the deployment; nothing is ever sent there.
+        """Listen to the buses of the deployment; never send on them.
 
         Args:
-            control: socket of the daemon whose numbers the page may change; None for none.
+            control: control socket of a daemon whose numbers the page may change, or None.
 
         Raises:
             BusError: a bus cannot be opened.
@@ -77,13 +77,13 @@ class Stage:
         changes: Sequence[str] = (),
         program: Sequence[str] = CANSHAPER,
     ) -> None:
-        """Put a simulated crane on each transport, the first one shaped, the second one raw.
+        """Put a simulated crane on each transport: the first shaped, the second raw.
 
         Args:
             transports: one or two buses.
-            directory: for logs and sockets.
+            directory: folder for logs and sockets.
             changes: parameters of the cranes, NAME=VALUE.
-            program: how the shaped crane's daemon is started; see ``Crane``.
+            program: command that starts the shaped crane's daemon; see ``Crane``.
 
         Raises:
             BusError: a bus cannot be opened.
@@ -108,15 +108,15 @@ class Stage:
                 self._control = crane.control
 
     def drive_here(self, changes: Sequence[str] = (), crane: str | None = None) -> None:
-        """Put both simulated cranes into this process: where there are no buses to share.
+        """Run both simulated cranes in this process, for systems without a shared bus.
 
         Args:
             changes: parameters of the cranes, NAME=VALUE.
-            crane: which one is driven, where the deployment has several. Then without sliders:
-                they change the numbers of all.
+            crane: name of the crane to drive, if the deployment has several. There are no sliders
+                then: they would change the numbers of all cranes.
 
         Raises:
-            DriveError: no simulated crane fits the deployment, or there is none of that name.
+            DriveError: no simulated crane fits the deployment, or none has that name.
         """
         whole = self.deployment
         self.deployment = driven_part(whole, crane)
@@ -129,7 +129,7 @@ class Stage:
             self.cranes[name] = CraneSession(self._view(name), {}, shaped=name == SHAPED, here=here)
 
     def _seat(self) -> None:
-        """A driver's seat, and the sliders."""
+        """Make a driver's seat and the sliders."""
         self.cab = Cab(self.deployment.axes, lambda text: self.events.add("page", text))
         self.sliders = sliders(self.deployment.config) if self.deployment.config.control else {}
         self.positions = dict.fromkeys(self.sliders, 1.0)
@@ -138,10 +138,10 @@ class Stage:
             self.positions[PREFERENCE] = AS_IN_FILE
 
     def start(self, failed: Callable[[], None]) -> None:
-        """Begin.
+        """Start the loop.
 
         Args:
-            failed: called when the loop has ended by itself, which only an error of ours does.
+            failed: called if an error ends the loop.
         """
         self._failed = failed
         self._thread.start()
@@ -149,10 +149,10 @@ class Stage:
             self.numbers.start()
 
     def stop(self) -> None:
-        """End: joysticks in neutral, then daemons, cranes and buses.
+        """End the loop: set the joysticks to neutral, then end daemons, cranes and buses.
 
         Raises:
-            Exception: the error that has ended the loop.
+            Exception: the error that ended the loop.
         """
         self._stop.set()
         if self._thread.is_alive():
@@ -167,21 +167,21 @@ class Stage:
     # -- for the pages: any thread -------------------------------------------------------------
 
     def with_cab(self, action: Callable[[Cab, float], None]) -> None:
-        """Do something with the driver's seat; nothing where there is none."""
+        """Call ``action`` with the driver's seat and the time; do nothing if there is no seat."""
         if self.cab is not None:
             with self._lock:
                 action(self.cab, time.monotonic())
 
     def other(self, page: int, message: Mapping[str, Any]) -> bool:
-        """Take what only pages of some stages send; whether it was such a message."""
+        """Take a message that only pages of some stages send; return whether it was one."""
         return False
 
     def slide(self, name: str, factor: float) -> None:
-        """Move a slider: change the numbers of the shaped crane's daemon. Waits for its answer.
+        """Move a slider: change the numbers of the shaped crane's daemon, and wait for its answer.
 
         Raises:
-            ValueError: no such slider, or a factor that is not allowed.
-            ControlError: the daemon refuses, or there is none.
+            ValueError: there is no such slider, or the factor is not allowed.
+            ControlError: the daemon refuses or does not run.
         """
         if name == PREFERENCE and self.preference:
             self._prefer(self.preference, factor)
@@ -199,7 +199,7 @@ class Stage:
         self.events.add(SHAPED, ", ".join(f"{key} = {v:.4g}" for key, v in changed.items()))
 
     def _prefer(self, preference: Preference, position: float) -> None:
-        """Let the daemon read its file again with other filters, which it takes at rest."""
+        """Write other filters into the daemon's file and let it reload; it takes them at rest."""
         shaped = self.cranes[SHAPED]
         with self._control_lock:
             self.deployment = preference.write(position)
@@ -212,7 +212,7 @@ class Stage:
         self.events.add(SHAPED, said("filters"))
 
     def in_force(self) -> dict[str, float]:
-        """Numbers that may be others than those of the file, by key."""
+        """Return the numbers that may differ from the file, by key."""
         if self.numbers:
             return self.numbers.in_force()
         values_by_key: dict[str, float] = {}
@@ -221,7 +221,7 @@ class Stage:
         return values_by_key
 
     def _reset_sliders(self) -> None:
-        """Put back what the driver has moved: the next one finds what the file says."""
+        """Reset the sliders that the driver has moved: the next driver finds the file's numbers."""
         for name, factor in list(self.positions.items()):
             rest = AS_IN_FILE if name == PREFERENCE else 1.0
             if factor != rest:

@@ -1,7 +1,7 @@
 """A study with people: its key and its tables, and the placements in their order. No clock.
 
 A placement begins with the first motion of the crane and ends with the driver's grip, hit or miss,
-as in ISO 9241-411. One that is broken off is not done; it comes again at the end of its part.
+as in ISO 9241-411. An aborted placement is not done; it comes again at the end of its part.
 """
 
 import csv
@@ -28,20 +28,20 @@ COLUMNS = HEAD.split(",")
 
 
 class Key:
-    """Which letter is which setting, in base64: no one who opens the folder reads it by chance.
+    """The setting of each letter, in base64 so that nobody reads it by chance.
 
     Args:
-        path: of the file; it is made where there is none.
-        settings: hash of the file of each setting, by its name.
-        task: what everyone does.
+        path: the key file; it is made if it does not exist.
+        settings: hash of the file of each setting, by name of the setting.
+        task: parameters of the task that everyone does.
 
     Attributes:
         letters: name of the setting of each letter.
-        seed: of the order of placements.
-        mark: begin of the hash of the file, which stands in each row.
+        seed: seed of the order of placements.
+        mark: first 8 digits of the hash of the key file, repeated in each row of a table.
 
     Raises:
-        UsageError: it is the key of another study.
+        UsageError: the file is the key of another study.
     """
 
     def __init__(self, path: Path, settings: Mapping[str, str], task: Mapping[str, Any]) -> None:
@@ -65,7 +65,7 @@ def read_key(path: Path) -> dict[str, Any]:
     """Read the settings of a study from its key.
 
     Raises:
-        UsageError: it is none.
+        UsageError: the file is no key of a study.
     """
     try:
         found: dict[str, Any] = json.loads(b64decode(path.read_bytes()))
@@ -75,22 +75,22 @@ def read_key(path: Path) -> dict[str, Any]:
 
 
 def mark_of(path: Path) -> str:
-    """Begin of the hash of a key."""
+    """Return the first 8 digits of the hash of a key."""
     return sha256(path.read_bytes()).hexdigest()[:8]
 
 
 class Table:
-    """Rows of a person, one a placement; each is on the disk before the next placement begins.
+    """Rows of a person, one per placement; each is on the disk before the next placement begins.
 
     Args:
-        path: the file; a row that was cut off is taken away.
-        common: columns that are the same in all rows.
+        path: the file; a last row that was cut off is removed.
+        common: values of the columns that are equal in all rows.
 
     Attributes:
-        rows: those that are written, as text.
+        rows: the written rows, as text by column.
 
     Raises:
-        UsageError: there is a file that is no such table, or of another study.
+        UsageError: the file is no such table, or belongs to another study.
     """
 
     def __init__(self, path: Path, common: dict[str, str]) -> None:
@@ -100,7 +100,7 @@ class Table:
         self.rows = rows_of(path, common["study"])
 
     def add(self, **values: object) -> None:
-        """Write a row."""
+        """Write a row to the disk."""
         row = {**dict.fromkeys(COLUMNS, ""), **self.common}
         row |= {k: f"{v:.3f}" if isinstance(v, float) else str(v) for k, v in values.items()}
         self.rows.append(row)
@@ -111,10 +111,10 @@ class Table:
 
 
 def rows_of(path: Path, study: str) -> list[dict[str, str]]:
-    """Rows of a table.
+    """Return the rows of a table.
 
     Raises:
-        UsageError: it is none of this study.
+        UsageError: the file is no table of this study.
     """
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file)
@@ -134,7 +134,7 @@ LIMIT_S, HELD_UP_S = 60.0, 0.3  # longest placement, and standstill of this prog
 
 
 class Placement(NamedTuple):
-    """A target; parts and numbers are counted from 1, the practice of a part comes first."""
+    """A target to reach; parts and numbers count from 1, and each part begins with its practice."""
 
     part: int
     setting: str
@@ -147,14 +147,14 @@ class Placement(NamedTuple):
 def plan(
     counts: tuple[int, int], start_m: float, order: str, seed: str
 ) -> dict[Placement, tuple[float, float]]:
-    """Every placement of a person and its place, in m ahead of the pillar and to its left.
+    """Return the place of every placement of a person: m ahead of the pillar and to its left.
 
     Args:
-        counts: of practice, and of placements that count, of each setting: rounds of all nine
-            targets, each in random order.
-        start_m: of the grapple from the pillar.
-        order: letters of the settings.
-        seed: of the order.
+        counts: numbers of practice placements and of counted placements for each setting: rounds
+            of all nine targets, each in random order.
+        start_m: start of the grapple, m from the pillar.
+        order: letters of the settings, in the order of the parts.
+        seed: seed of the random order.
     """
     planned = {}
     for part, letter in enumerate(order, 1):
@@ -171,7 +171,7 @@ def plan(
 
 
 def _place(source: random.Random, start_m: float, distance_m: float) -> tuple[float, float]:
-    """Somewhere in reach and in the picture, so far from the start."""
+    """Return a random place in reach and in the picture, at this distance from the start."""
     while True:
         angle = source.uniform(-math.pi, math.pi)
         x, y = start_m + distance_m * math.cos(angle), distance_m * math.sin(angle)
@@ -183,13 +183,13 @@ class Session:
     """A person at work.
 
     Args:
-        planned: every placement and its place.
-        break_s: between two parts, at least.
-        table: where each is written; those that stand there are done.
-        fresh: called with a setting: puts a crane that has it at the start.
+        planned: every placement with its place.
+        break_s: least break between two parts, s.
+        table: the table that takes each placement; placements in it are done.
+        fresh: called with a setting; puts a crane with this setting at the start.
 
     Attributes:
-        phase: pause, ready, moving, shown or done.
+        phase: present phase: pause, ready, moving, shown or done.
     """
 
     def __init__(
@@ -211,7 +211,7 @@ class Session:
         self._swing_deg = 0.0
 
     def begin(self, now_s: float) -> None:
-        """End a pause, where it has lasted long enough."""
+        """End a pause that has lasted long enough."""
         if self.phase == "pause" and now_s >= self._until_s:
             self._next(now_s)
 
@@ -222,7 +222,7 @@ class Session:
     def see(
         self, level: str, place: tuple[float, float] | None, swing_deg: float | None, now_s: float
     ) -> None:
-        """See the level of its axes as a page has it, and the grapple, each tick."""
+        """Take the page's level of the axes, and the grapple's place and swing, each tick."""
         held_up, self._seen_s = now_s - self._seen_s > HELD_UP_S, now_s
         self._place, self._swing_deg, lasts_s = place, swing_deg or 0.0, now_s - self._since_s
         if self.phase == "ready" and level == "move":
@@ -239,7 +239,7 @@ class Session:
             self.break_off("held" if held_up else "long", now_s)
 
     def grip(self, by: str, now_s: float) -> None:
-        """Close the grapple where it is: that ends the placement."""
+        """Close the grapple at its present place, which ends the placement."""
         if self.phase != "moving" or self._place is None:
             return
         one = self._last = self._todo.pop(0)
@@ -252,7 +252,7 @@ class Session:
         self.phase, self._since_s = "shown", now_s
 
     def break_off(self, why: str, now_s: float) -> None:
-        """Count a placement under way as not done; a pause follows."""
+        """Abort the present placement; it counts as not done, and a pause follows."""
         if self.phase == "moving":
             one, seconds = self._todo.pop(0), now_s - self._since_s
             self._table.add(**one._asdict(), seconds=seconds, outcome=BROKEN, why=why)
@@ -260,7 +260,7 @@ class Session:
             self.phase, self._why, self._until_s = "pause", why, now_s
 
     def shown(self, now_s: float) -> dict[str, Any]:
-        """Return the state that the page shows; it does not name the setting."""
+        """Return the state that the page shows, without the name of the setting."""
         over = self.phase in ("shown", "done")
         one = self._last if over else self._todo[0]
         numbers, left = (

@@ -1,4 +1,4 @@
-"""Figures of a study, from its placements: of each person, and of all persons in pairs.
+"""Figures of a study from its placements: for each person, and by pairs of settings.
 
 Seconds are compared as logarithms: a setting shortens a placement by a percentage.
 """
@@ -39,7 +39,7 @@ PAIRS_NOTE = (
 
 
 def counted(rows: Rows, letter: str) -> list[Mapping[str, str]]:
-    """Rows of a setting that count: no practice, not broken off."""
+    """Return the rows of a setting that count: no practice, not aborted."""
     return [
         row
         for row in rows
@@ -48,17 +48,17 @@ def counted(rows: Rows, letter: str) -> list[Mapping[str, str]]:
 
 
 def bits(row: Mapping[str, str]) -> float:
-    """Index of difficulty (ISO 9241-411)."""
+    """Return the index of difficulty of a placement, bits (ISO 9241-411)."""
     return math.log2(float(row["distance_m"]) / float(row["width_m"]) + 1.0)
 
 
 def log_s(rows: Rows) -> float:
-    """Mean logarithm of the seconds."""
+    """Return the mean logarithm of the seconds."""
     return fmean(math.log(float(row["seconds"])) for row in rows)
 
 
 def person_table(rows: Rows) -> Table:
-    """A row for each setting of a person, by its letter."""
+    """Return a table with a row for each setting of a person, by letter."""
     heads = ("placed", "hit\n%", "seconds\ngeom. mean", "s a bit", "off\ncm", "swing\ndeg")
     drawn = new_table("setting", *heads, "practice", "broken off")
     for letter in LETTERS:
@@ -79,7 +79,7 @@ def person_table(rows: Rows) -> Table:
 
 
 def person_page(person: str, rows: Rows) -> str:
-    """The result of a person as an HTML file; it has no room for a name."""
+    """Return the result of a person as an HTML file, without room for a name."""
     first = rows[0] if rows else {"study": "-", "order": "-"}
     facts = [("person", person), ("study", first["study"]), ("order", first["order"])]
     facts.append(("gripped by", ", ".join(sorted({r["input"] for r in rows if r["input"]}))))
@@ -89,15 +89,15 @@ def person_page(person: str, rows: Rows) -> str:
 
 
 def hits(rows: Rows) -> float:
-    """Part that was hit."""
+    """Return the fraction of placements that hit."""
     return fmean(row["outcome"] == HIT for row in rows)
 
 
 def complete(folder: Path, study: str, placements: int) -> tuple[dict[str, Rows], list[str]]:
-    """Rows of each person who has done everything, and codes of the others.
+    """Return the rows of each person who has done everything, and the codes of the others.
 
     Raises:
-        UsageError: a table is none of this study.
+        UsageError: a table does not belong to this study.
     """
     whole: dict[str, Rows] = {}
     others = []
@@ -111,22 +111,22 @@ def complete(folder: Path, study: str, placements: int) -> tuple[dict[str, Rows]
 
 
 def changes(persons: Mapping[str, Rows], pair: tuple[str, str]) -> list[float]:
-    """Change of the mean logarithm of each person, from one setting to the other."""
+    """Return each person's change of the mean logarithm, from the first setting to the second."""
     logs = ([log_s(counted(rows, letter)) for letter in pair] for rows in persons.values())
     return [after - before for before, after in logs]
 
 
 def spreads(persons: Mapping[str, Rows]) -> list[float]:
-    """Spread of the changes over the persons, of each pair of settings; never none."""
+    """Return the standard deviation over persons of the changes, for each pair; at least 0.001."""
     return [max(0.001, stdev(changes(persons, pair))) for pair in PAIRS]
 
 
 def pairs_table(persons: Mapping[str, Rows], names: Mapping[str, str]) -> Table:
-    """A row for each pair of settings: changes within persons, by the bootstrap over persons.
+    """Return a table with a row for each pair of settings: changes within persons, by bootstrap.
 
     Args:
-        persons: at least three.
-        names: of the settings, by letter.
+        persons: rows of each person; at least three persons.
+        names: names of the settings, by letter.
     """
     level = f"{100 * CONFIDENCE:.0f} %"
     drawn = new_table("from, to", "seconds, %", level, "hits, points", level, "spread of logs")
@@ -145,7 +145,7 @@ def pairs_table(persons: Mapping[str, Rows], names: Mapping[str, str]) -> Table:
 
 
 def _bounds(values: Sequence[float]) -> tuple[float, float, float]:
-    """Mean of the differences within persons, and its bounds by the bootstrap."""
+    """Return the mean of the differences within persons, and its bounds by the bootstrap."""
     options: dict[str, Any] = {"method": "percentile", "random_state": np.random.default_rng(0)}
     result = stats.bootstrap((values,), np.mean, confidence_level=CONFIDENCE, **options)
     bounds = result.confidence_interval
@@ -153,7 +153,7 @@ def _bounds(values: Sequence[float]) -> tuple[float, float, float]:
 
 
 def power(persons: int, change_pct: float, spread: float) -> float:
-    """Chance that so many persons show a change, by the paired t test at 5 %, both sides."""
+    """Return the chance that so many persons show a change: two-sided paired t test at 5 %."""
     free = persons - 1
     shift = abs(math.log1p(-change_pct / 100.0)) / spread * math.sqrt(persons)
     limit = stats.t.ppf(0.5 + CONFIDENCE / 2.0, free)
@@ -161,7 +161,7 @@ def power(persons: int, change_pct: float, spread: float) -> float:
 
 
 def power_table(spread: float) -> Table:
-    """Chance that a number of persons shows a change of the seconds, for several changes."""
+    """Return a table of the chance to show a change, by number of persons and size of change."""
     heads = (f"{change} %" for change in CHANGES_PCT)
     drawn = new_table("persons", *heads, title=f"power, %, if quicker by; spread {spread:.3f}")
     for persons in PERSONS:

@@ -1,4 +1,4 @@
-"""The crane of a study behind the page: one, of which nothing says how it is set."""
+"""The crane of a study behind the page: one crane; the page does not show its setting."""
 
 import cmath
 import json
@@ -41,15 +41,15 @@ _OF_FILTERS = ("gain_schedule", "profiles", "sway_sensor")
 
 
 def setting(path: Path, folder: Path, *, raw: bool = False) -> Deployment:
-    """A deployment for a study: without what a joystick could switch, raw without its filters.
+    """Return a deployment for a study: without switches for anti-sway or profiles.
 
     Args:
         path: the file.
-        folder: where a copy is written.
-        raw: without anti-sway.
+        folder: folder for a copy of the file.
+        raw: also without filters, for a drive without anti-sway.
 
     Raises:
-        ConfigError: the file is not valid, or its copy is not.
+        ConfigError: the file or its copy is not valid.
     """
     config, source = load_config(path)
     data = json.loads(json.dumps(source.data))
@@ -70,15 +70,15 @@ def setting(path: Path, folder: Path, *, raw: bool = False) -> Deployment:
 
 
 class RealJoysticks(HeldHand):
-    """Joysticks of a machine in the place of those of the page; nothing is ever sent.
+    """Joysticks of a real machine in place of those of the page; nothing is ever sent to it.
 
     Args:
-        deployment: whose buses and joysticks they are.
-        grip: message and signal of the button that grips, MESSAGE.SIGNAL; None for the page's.
+        deployment: the machine of the buses and joysticks.
+        grip: button that grips, as MESSAGE.SIGNAL; None for that of the page.
 
     Raises:
         BusError: a bus cannot be opened.
-        UsageError: there is no such signal.
+        UsageError: the DBC files have no such signal.
     """
 
     def __init__(self, deployment: Deployment, grip: str | None) -> None:
@@ -92,7 +92,7 @@ class RealJoysticks(HeldHand):
         self.ports = open_ports(deployment)
 
     def frames_of_tick(self, time_ms: int, _tick_ms: int) -> list[Frame]:
-        """Frames of joysticks and switches that wait; a grip is noted."""
+        """Return the waiting frames of joysticks and switches; note a press of the grip button."""
         waiting = [frame for port in self.ports.values() for frame in port.frames()]
         for frame in waiting:
             self._watch(frame)
@@ -124,17 +124,17 @@ def _button(deployment: Deployment, grip: str) -> tuple[Any, str]:
 
 
 class StudyStage(Stage):
-    """A person, and the crane of a study.
+    """A person and the crane of a study.
 
     Args:
         settings: deployment of each letter.
-        planned: placements and their places.
-        break_s: between two parts.
-        table: where they are written.
+        planned: every placement with its place.
+        break_s: least break between two parts, s.
+        table: the table that takes the placements.
         parameters: the crane.
-        changes: the same, NAME=VALUE.
-        joysticks: those of a machine; None for those of the page.
-        done: called when everything is.
+        changes: the changes that give ``parameters``, NAME=VALUE.
+        joysticks: joysticks of a machine; None for those of the page.
+        done: called when all placements are done.
 
     Raises:
         DriveError: no simulated crane fits the deployments.
@@ -160,7 +160,7 @@ class StudyStage(Stage):
         self._put(next(iter(planned)).setting)
 
     def _put(self, letter: str) -> None:
-        """Put a crane with a setting at the start."""
+        """Put a crane with this setting at the start."""
         deployment = self._settings[letter]
         # What its daemon says would name the setting.
         view = CraneView(deployment, lambda _text, _level: None)
@@ -169,7 +169,7 @@ class StudyStage(Stage):
         self.cranes = {CRANE: CraneSession(view, {}, here=here)}
 
     def other(self, page: int, message: Mapping[str, Any]) -> bool:
-        """Take what a page of a study sends."""
+        """Take a message that only the page of a study sends; return whether it was one."""
         word, by, why = (message.get(name) for name in ("study", "by", "why"))
         known = {"begin": True, "grip": by in INPUTS, "broken": why in WHY}
         if not isinstance(word, str) or not known.get(word):
@@ -189,7 +189,7 @@ class StudyStage(Stage):
         return True
 
     def snapshot(self) -> dict[str, Any]:
-        """Return what the page shows: of the axes nothing but their joysticks."""
+        """Return the values for the page; of the axes it shows only the joysticks."""
         shown = super().snapshot()
         crane = shown["cranes"][CRANE]
         level, why = _urgent(crane["axes"])
@@ -227,7 +227,7 @@ class StudyStage(Stage):
 
 
 def _urgent(axes: Mapping[str, Mapping[str, Any]]) -> tuple[str, str]:
-    """Level of the axis that matters most, and why it stands; nothing of one that may move."""
+    """Return the most urgent level of all axes, and its reason; no reason if the axis may move."""
     by_level = {one["level"]: one["reason"] for one in axes.values()}
     for level in ("bad", "stop", "move", "wait"):
         if level in by_level:
@@ -238,7 +238,7 @@ def _urgent(axes: Mapping[str, Mapping[str, Any]]) -> tuple[str, str]:
 def study_app(
     stage: StudyStage, parameters: CraneParameters, result: Path, access: Access
 ) -> ASGIApp:
-    """The page of a study; ``result`` is that of what the person did, once it is written."""
+    """Return the page of a study; ``result`` is the page with the person's result, once written."""
 
     async def shown(_request: HTTPConnection) -> Response:
         return FileResponse(result) if result.exists() else PlainTextResponse("not yet\n", 404)

@@ -33,11 +33,11 @@ Report = Callable[[str, str], None]
 
 
 class CraneView:
-    """Takes every frame of a bus and keeps the last value of everything.
+    """Takes every frame of a bus and keeps the last value of each quantity.
 
     Args:
         deployment: names the messages.
-        report: called with what is an event.
+        report: called with text and level of each event.
     """
 
     def __init__(self, deployment: Deployment, report: Report) -> None:
@@ -107,7 +107,7 @@ class CraneView:
         self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame, one that the page's joysticks sent too; what is none of ours is passed."""
+        """Take a frame, also one that the page's joysticks sent; ignore unknown frames."""
         entries = self._handlers.get(frame[:3])
         if joystick := self._joysticks.find(frame, round(now_s * 1e9)):
             entries = [*(entries or ()), (self._joystick, joystick, _source_of(joystick))]
@@ -130,19 +130,19 @@ class CraneView:
         sway_deg: tuple[float, float],
         now_s: float,
     ) -> None:
-        """Take pose and sway from a simulated crane that is on no bus: no one measured them."""
+        """Take pose and sway from a simulated crane that is on no bus: they are not measured."""
         self.simulated = True
         self.pose, self.joints = pose, joints
         self._sway_at(sway_deg, now_s)
 
     def report_lateness(self, late_us: int) -> None:
-        """Take the lateness of the daemon in the last second, as its service manager gets it."""
+        """Take the daemon's lateness in the last second, us, as its service manager gets it."""
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:
-        """Report when the daemon or the crane falls silent, and when it is back.
+        """Report that the daemon or the crane has fallen silent or is back.
 
-        A joystick position that is old is shown no more.
+        Forget joystick positions that are too old.
         """
         for joystick in self.deployment.joysticks.values():
             age_s = self.sources.age_s(_source_of(joystick), now_s)
@@ -167,19 +167,19 @@ class CraneView:
 
     @property
     def received_any(self) -> bool:
-        """Whether the daemon or the crane ever sent a frame."""
+        """True if the daemon or the crane has ever sent a frame."""
         return max(self._daemon_s, self._crane_s) > -math.inf
 
     def daemon_there(self, now_s: float) -> bool:
-        """Whether the daemon has sent a frame lately."""
+        """Return whether the daemon has sent a frame lately."""
         return now_s - self._daemon_s < SILENT_S
 
     def crane_there(self, now_s: float) -> bool:
-        """Whether the crane's own messages have sent a frame lately."""
+        """Return whether the crane itself has sent a frame lately."""
         return now_s - self._crane_s < SILENT_S
 
     def values(self, now_s: float) -> dict[str, Any]:
-        """Everything for the page."""
+        """Return everything that the page shows."""
         still_s, swings = self._swing.still_s(now_s)
         return {
             "daemon": self.daemon_there(now_s),
@@ -204,7 +204,7 @@ class CraneView:
         }
 
     def _predicted(self) -> tuple[float, float] | None:
-        """Sway that the daemon predicts, where none is measured."""
+        """Return the sway that the daemon predicts, for a page without measured sway."""
         predicted = {ACROSS: 0.0, ALONG: 0.0}
         known = False
         for name, axis in self.axes.items():
@@ -225,7 +225,7 @@ class CraneView:
         self._swing.move(now_s, moved=moved, drives=any(a.valve for a in self.axes.values()))
 
     def _joystick_at(self, joystick: str, commands: Mapping[str, float | Reason]) -> None:
-        """Keep the commands of a joystick by signal; one that is invalid or missing is unknown."""
+        """Keep the demand of a joystick by axis; an invalid or missing one becomes None."""
         for name, axis in self.deployment.axes.items():
             if axis.config.command.joystick == joystick:
                 command = commands.get(axis.config.command.signal)

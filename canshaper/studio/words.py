@@ -1,4 +1,4 @@
-"""States, reasons and faults by their numbers in words for people; what the studio says to them."""
+"""Words for people: texts of states, reasons and faults by number, and messages of the studio."""
 
 import json
 import threading
@@ -28,22 +28,22 @@ def _texts() -> dict[str, str]:
 
 
 def said(what: str, **values: object) -> str:
-    """Return a text of the studio in English; the page has it in the language of its reader.
+    """Return a message of the studio in English; the page shows it in the reader's language.
 
     Args:
-        what: key of the text behind "said." in the tables of the page.
-        values: what stands in it.
+        what: key of the text in the tables of the page, without its prefix "said.".
+        values: values that the text shows, by name.
     """
     return _texts()[f"said.{what}"].format(**values)
 
 
 def state_words(number: int) -> str:
-    """A state by its number."""
+    """Return the words for a state number."""
     return STATE_TEXTS[State(number)].words if number in _STATES else f"state {number}"
 
 
 def state_level(state: int | None) -> str:
-    """How a state is shown: off, wait, ready, move, stop or bad."""
+    """Return the level that shows a state: off, wait, ready, move, stop or bad."""
     if state == State.TRIPPED:
         return "bad"
     if state == State.STOPPING:
@@ -54,12 +54,12 @@ def state_level(state: int | None) -> str:
 
 
 def reason_words(number: int) -> str:
-    """A reason by its number."""
+    """Return the words for a reason number."""
     return REASON_TEXTS[Reason(number)].words if number in _REASONS else f"reason {number}"
 
 
 def fault_words(number: int) -> str:
-    """A fault by its number; nothing for none."""
+    """Return the words for a fault number; an empty text for no fault."""
     return FAULTS[FrameFault(number)] if number in _FAULTS else f"fault {number}"
 
 
@@ -71,15 +71,15 @@ MOST = 500
 
 
 class Event(NamedTuple):
-    """One line of the list.
+    """One line in the list of events.
 
     Attributes:
-        number: counted from 1.
+        number: number of the event, from 1.
         time_s: time of day, seconds of the epoch.
-        source: a crane, or "page".
-        text: what happened.
+        source: name of a crane, or "page".
+        text: description of the event.
         level: "info", "warn" or "bad".
-        clock_s: monotonic time, that of the charts.
+        clock_s: monotonic time, as in the charts.
     """
 
     number: int
@@ -91,7 +91,7 @@ class Event(NamedTuple):
 
 
 class Events:
-    """The last events; any thread may add and read."""
+    """The last ``MOST`` events; any thread may add and read."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -99,7 +99,7 @@ class Events:
         self._count = 0
 
     def add(self, source: str, text: str, level: str = "info") -> None:
-        """Add one."""
+        """Add an event."""
         clock_s = time.monotonic()
         with self._lock:
             self._count += 1

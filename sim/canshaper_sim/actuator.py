@@ -1,4 +1,4 @@
-"""One coordinate of the crane moved by a valve between two end stops: of the tip, or a joint."""
+"""One coordinate of the crane (tip or joint), moved by a valve between two end stops."""
 
 import math
 from dataclasses import dataclass
@@ -12,12 +12,13 @@ _ALLOWED = {"cushion_s": (0.0, 2.0), "creep": (0.02, 1.0)}
 
 @dataclass(frozen=True, slots=True)
 class EndParameters:
-    """End stops of every axis: hard by default, or with a cushion ahead of them.
+    """End stops of every axis: hard by default, or with a cushion ahead of each stop.
 
-    A cushion throttles the oil over the last part of the stroke. One that is profiled brakes with a
-    constant deceleration, the least peak pressure: the speed is bounded by the root of the way that
-    is left. On the way back a check valve bypasses it. Cylinders have 20 to 50 mm of it, which
-    crane speeds go through in 0.1 to 0.3 s (catalogues; Hydraulic Trainer, Rexroth).
+    A cushion throttles the oil over the last part of the stroke. A profiled cushion brakes with a
+    constant deceleration, which gives the least peak pressure: it bounds the speed by the square
+    root of the way left to the stop. On the way back a check valve bypasses the cushion. Cylinders
+    have 20 to 50 mm of cushion, which a crane at full speed passes in 0.1 to 0.3 s (catalogues;
+    Hydraulic Trainer, Rexroth).
     """
 
     cushion_s: float = 0.0  # its length, in s of full speed; 0: none
@@ -30,12 +31,12 @@ class EndParameters:
 class Actuator:
     """A valve times a full speed, between two end stops.
 
-    `advance` gives position and speed at the middle and the end of a step and the acceleration at
+    `advance` computes position and speed at the middle and the end of a step and acceleration at
     start, middle and end. At a stop the oil goes over the relief valve: the valve runs on, the
-    coordinate stands. A cushion before it bounds the speed. The middle acceleration is chosen so
-    that Simpson's rule gives the true change of speed; a stop, or a spool that arrives within the
-    step, thus gives the grapple its exact impulse instead of a spike that depends on where the
-    stages fall.
+    coordinate stands still. A cushion before the stop bounds the speed. The middle acceleration is
+    chosen so that Simpson's rule gives the true change of speed; a stop, or a spool that arrives
+    within the step, thus gives the grapple its exact impulse instead of a spike that depends on
+    where the stages fall.
 
     Units are those of the coordinate: rad or m, per second.
     """
@@ -82,7 +83,7 @@ class Actuator:
 
     @property
     def room_s(self) -> float:
-        """How long it moves at full speed until its upper end."""
+        """Time in seconds that the coordinate needs at full speed to its upper end stop."""
         return (self._high - self.position) / self._full_speed
 
     def advance(self, step_s: float) -> None:
@@ -136,7 +137,7 @@ class Actuator:
     def _most_speeds(
         self, cushion: EndParameters, towards: float, step_s: float
     ) -> tuple[float, float]:
-        """Largest speeds in the middle and at the end of a step in this direction."""
+        """Return the largest speeds in the middle and at the end of a step in this direction."""
         full_speed = self._full_speed
         room = self._high - self.position if towards > 0.0 else self.position - self._low
         # sqrt(room) falls in a straight line, and so does the speed.

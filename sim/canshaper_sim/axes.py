@@ -1,8 +1,8 @@
-"""Names of the axes a simulated machine can have, and what their positive direction is.
+"""Names of the axes that a simulated machine can have, each with its positive direction.
 
 A crane with tip control is commanded in cylindrical coordinates of its tip, a conventional one
 joint by joint. Slewing is the same axis in both. An overhead crane moves a trolley and a rope. A
-deployment may call its axes otherwise: its ``coordinates`` say which is which.
+deployment may name its axes differently: its ``coordinates`` map its names to these.
 """
 
 from collections.abc import Iterable
@@ -38,11 +38,12 @@ ON_ROPE: Final = (OVERHEAD, TOWER, LUFFING)
 
 
 def kind_of(axes: Iterable[str]) -> str:
-    """Return what axes that move these coordinates drive.
+    """Return the kind of crane whose axes move these coordinates.
 
-    One with a joint of the boom is driven joint by joint, or is a luffing crane where it has a
-    hoist; one that slews or goes out and has a hoist is a tower crane; any other with a bridge,
-    trolley or hoist is an overhead crane. Every other moves the tip.
+    A crane with a boom joint other than slew is driven joint by joint, or is a luffing crane if it
+    also has a hoist. A crane that slews or moves its tip outwards and has a hoist is a tower crane.
+    Any other crane with a bridge, trolley or hoist is an overhead crane. Every other crane moves
+    its tip.
     """
     moved = {*axes}
     if moved & {*JOINT_AXES} - {SLEW}:

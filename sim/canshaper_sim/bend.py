@@ -1,10 +1,10 @@
-"""A boom that bends: tip and joints are tied by a spring in each coordinate of the tip.
+"""A boom that bends: a spring in each coordinate of the tip ties the tip to the stiff boom.
 
-Of slew angle, radius and height alike, u being what the tip is ahead of the stiff boom:
-
+The same equation holds for slew angle, radius and height; u is the lead of the tip over the
+stiff boom:
     u'' + 2 zeta omega u' + omega^2 u = -(acceleration of the stiff boom)
 
-The grapple's pull on the boom is left out.
+The pull of the grapple on the boom is left out.
 """
 
 import math
@@ -19,7 +19,7 @@ _ALLOWED = {"frequency_hz": (0.0, 10.0), "damping_ratio": (0.0, 1.0)}
 
 @dataclass(frozen=True, slots=True)
 class BendParameters:
-    """How the boom bends; by default it is stiff."""
+    """Frequency and damping with which the boom bends; by default the boom is stiff."""
 
     frequency_hz: float = 0.0  # 0: stiff; 2 to 3 is usual with the telescope out
     damping_ratio: float = 0.05
@@ -32,10 +32,10 @@ class Bend:
     """The bent boom in motion.
 
     Args:
-        parameters: of a boom that is not stiff.
+        parameters: frequency and damping of the boom; the frequency is not 0.
 
     Attributes:
-        slew, radius, height: (u, u') of each, rad or m, per second.
+        slew, radius, height: (u, u') of this coordinate, in rad and rad/s or m and m/s.
     """
 
     __slots__ = ("_damping", "_stiffness", "height", "radius", "slew")
@@ -48,7 +48,7 @@ class Bend:
     def advance(
         self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion]
     ) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Bend on for step_s seconds: motion of the tip from that of the stiff boom."""
+        """Let step_s seconds pass; return the motion of the tip, given that of the stiff boom."""
         slew = self._points(self.slew, [tip.slew_acceleration_rad_s2 for tip in tips], step_s)
         radius = self._points(self.radius, [tip.radius_acceleration_m_s2 for tip in tips], step_s)
         height = self._points(self.height, [tip.height_acceleration_m_s2 for tip in tips], step_s)
@@ -72,9 +72,9 @@ class Bend:
     def _points(
         self, state: tuple[float, float], drive: list[float], step_s: float
     ) -> list[tuple[float, float, float]]:
-        """(u, u', u'') at start, middle and end: two Runge-Kutta steps.
+        """Return (u, u', u'') at start, middle and end of a step, by two Runge-Kutta steps.
 
-        The acceleration of the stiff boom is a parabola through the three that are given.
+        The acceleration of the stiff boom is taken as the parabola through its three given values.
         """
         start, middle, end = drive
         quarter = (3.0 * start + 6.0 * middle - end) / 8.0

@@ -1,4 +1,4 @@
-"""The other nodes of a CANopen bus: heartbeats, and the state machines of valves of CiA 408."""
+"""The other nodes of a CANopen bus: their heartbeats, and the state machines of CiA 408 valves."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +14,7 @@ STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIV
 
 
 class _Node:
-    """A node that boots, and works when it is started, or at once where there is no master."""
+    """A node that boots and becomes operational on a start command, or at once without a master."""
 
     def __init__(self, bus: str, number: int, timeout_ms: int, *, waits: bool) -> None:
         self._key = bus, HEARTBEAT + number
@@ -31,7 +31,7 @@ class _Node:
 
 
 class _ValveStates:
-    """A valve that goes one step up, or any number down, to the state that it is commanded."""
+    """A valve that steps up one state at a time, or down any number, to the commanded state."""
 
     def __init__(self, axis: BoundAxis, node: _Node | None) -> None:
         assert axis.status_word
@@ -55,7 +55,7 @@ class _ValveStates:
 
     @property
     def active(self) -> bool:
-        """Whether it follows its set point."""
+        """True while the valve follows its setpoint."""
         return self._operational and STEPS[self._step] is ValveState.ACTIVE
 
     def receive(self, data: bytes) -> None:
@@ -74,10 +74,10 @@ class _ValveStates:
 
 
 class CanopenSide:
-    """Every node that the deployment watches, and every valve of CiA 408.
+    """Every CANopen node that the deployment watches, and every CiA 408 valve.
 
     Attributes:
-        present: whether there is any.
+        present: True if there is such a node or valve.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -100,16 +100,16 @@ class CanopenSide:
         return self._nodes[valve.bus, name] if name else None
 
     def works(self, bus: str, node: str | None) -> bool:
-        """Whether a node of that name sends its PDOs; without a name no one watches it."""
+        """Return whether this node sends its PDOs; always True for None, a node nobody watches."""
         return node is None or self._nodes[bus, node].state is NodeState.OPERATIONAL
 
     def closed(self, axis: str) -> bool:
-        """Whether the valve of an axis does not follow its set point."""
+        """Return whether the valve of an axis ignores its setpoint in its present state."""
         valve = self._valves.get(axis)
         return valve is not None and not valve.active
 
     def receive(self, frame: Frame) -> None:
-        """Take a control word, or a command to start."""
+        """Take a frame: a valve reads its control word from it, a node its start command."""
         for valve in self._valves.values():
             if valve.key == frame[:3]:
                 valve.receive(frame.data)
@@ -119,7 +119,7 @@ class CanopenSide:
                     node.state = NodeState.OPERATIONAL
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
-        """Frames that are due after so much more time."""
+        """Yield the frames that are due once passed_s more seconds have passed."""
         parts: list[_Node | _ValveStates] = [*self._nodes.values(), *self._valves.values()]
         for part in parts:
             yield from part.frames(passed_s)

@@ -1,14 +1,15 @@
 """The carrier under the crane: on a slope, and rocking on its tyres.
 
-Everything of the crane is measured against its carrier. Seen from there gravity tilts, and turns
+Every coordinate of the crane is relative to its carrier. Seen from there gravity tilts, and turns
 as the boom slews: the joints of the grapple do not rest at 0, and their rest angles change with the
 slew angle. A forwarder works on slopes up to 15 degrees (27 %), along and across.
 
-The tyres are a spring and a damper about each horizontal axis on the ground. What hangs from the
-tip pulls there with its tension, and the boom, a mass halfway to the tip, with its weight and its
-acceleration. Vehicles on large tyres without suspension roll and pitch at 1 to 2 Hz with a tenth to
-a fifth of the critical damping (Pazooki et al., Mech. Syst. Signal Process. 28, 2012). Rates of the
-rocking are too small to matter to the swing; its angles and accelerations are not.
+The tyres are a spring and a damper about each horizontal axis on the ground. Two loads lean the
+carrier: the grapple pulls at the tip with its tension, and the boom, a mass halfway to the tip,
+acts by its weight and its acceleration. Vehicles on large tyres without suspension roll and pitch
+at 1 to 2 Hz with a tenth to a fifth of the critical damping (Pazooki et al., Mech. Syst. Signal
+Process. 28, 2012). Rates of the rocking are too small to matter to the swing; its angles and
+accelerations are not.
 """
 
 import math
@@ -33,7 +34,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class CarrierParameters:
-    """How the carrier stands and rocks; by default it is level and stiff. One of 15 t."""
+    """Slope and rocking of the carrier, a vehicle of 15 t; by default it is level and stiff."""
 
     pitch_deg: float = 0.0  # slope along it: positive is down ahead, where the slew angle is 0
     roll_deg: float = 0.0  # across it: positive is down to the right
@@ -48,7 +49,7 @@ class CarrierParameters:
 
     @property
     def level(self) -> bool:
-        """Whether nothing ever tilts."""
+        """True if the carrier never tilts: it stands level and does not rock."""
         return not (self.pitch_deg or self.roll_deg or self.rock_hz)
 
 
@@ -56,11 +57,11 @@ class Carrier:
     """The carrier in motion.
 
     Args:
-        parameters: how it stands and rocks.
-        gravity_m_s2: of the crane.
+        parameters: slope and rocking of the carrier.
+        gravity_m_s2: gravity at the crane.
 
     Attributes:
-        roll, pitch: (angle, rate) by the rocking, rad and rad/s.
+        roll, pitch: (angle, rate) of the rocking, without the slope; rad and rad/s.
     """
 
     __slots__ = ("_bends", "_gravity_m_s2", "_omega", "_parameters", "_slope", "pitch", "roll")
@@ -74,13 +75,13 @@ class Carrier:
         self._bends = (0.0, 0.0, 0.0)  # roll'', pitch'', height of what hangs
 
     def settle(self, grapple: Grapple, sway: Sway, tip: TipMotion) -> None:
-        """Lean as much as what hangs there and the boom make it."""
+        """Lean the carrier to its equilibrium under the grapple and the boom."""
         if self._omega:
             roll, pitch = self._leans(grapple, sway, tip)
             self.roll, self.pitch = (roll, 0.0), (pitch, 0.0)
 
     def advance(self, step_s: float, grapple: Grapple, sway: Sway, tip: TipMotion) -> None:
-        """Rock on for step_s seconds under this pull."""
+        """Rock for step_s seconds under the pull of this grapple and the boom."""
         if not self._omega:
             return
         omega, ratio = self._omega, self._parameters.rock_damping
@@ -92,7 +93,7 @@ class Carrier:
         self._bends = *turned, tip.height_m - grapple.l1_m - grapple.l2_m
 
     def push(self, slew_rad: float, radius_m: float) -> Push:
-        """Return the force on a mass that hangs there, less that on a level carrier at rest."""
+        """Return the force on a mass at the tip in N/kg, less that on a level carrier at rest."""
         gravity = self._gravity_m_s2
         roll, pitch = self._slope[0] + self.roll[0], self._slope[1] + self.pitch[0]
         fall = math.cos(pitch)
@@ -104,7 +105,7 @@ class Carrier:
         return ahead * c + left * s, left * c - ahead * s, up
 
     def _leans(self, grapple: Grapple, sway: Sway, tip: TipMotion) -> tuple[float, float]:
-        """(roll, pitch) that this pull would hold."""
+        """Return (roll, pitch) in rad at which the tyres balance the pull of grapple and boom."""
         p, gravity = self._parameters, self._gravity_m_s2
         s5, c5 = math.sin(sway.theta5_rad), math.cos(sway.theta5_rad)
         s6, c6 = math.sin(sway.theta6_rad), math.cos(sway.theta6_rad)

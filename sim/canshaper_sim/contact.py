@@ -1,8 +1,8 @@
-"""Ground and pile under the grapple: what they push it back with, and what rubs.
+"""Contact of the grapple with ground and pile: normal force and friction.
 
-The surface is level but for a pile, a cone. Where the grapple's end is below it, a spring with a
-damper pushes along the normal and dry friction acts against the slip, both on the end; the boom,
-which its valves hold, does not give way.
+The ground is level; a pile on it is a cone. Where the lower end of the grapple is below the
+surface, a spring with a damper pushes that end along the normal, and dry friction acts against its
+slip. The boom does not give way: its valves hold it.
 """
 
 import math
@@ -47,7 +47,7 @@ class ContactParameters:
     def accelerations(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """What it adds to (theta5'', theta6''), rad/s^2; see `grapple.accelerations`."""
+        """Return the contact's part of (theta5'', theta6''), rad/s^2; see `accelerations`."""
         theta5, theta6, rate5, rate6 = sway
         s5, c5, s6, c6 = math.sin(theta5), math.cos(theta5), math.sin(theta6), math.cos(theta6)
         below = grapple.l2_m + self.reach_m
@@ -81,7 +81,7 @@ class ContactParameters:
     def _surface(
         self, outwards: float, across: float, slew_rad: float
     ) -> tuple[tuple[float, float], float]:
-        """Slope outwards and in slew direction, and height, where the end is."""
+        """Return slope outwards and in slew direction, and height in m, of the surface there."""
         if not self.pile_height_m:
             return (0.0, 0.0), self.ground_m
         # The middle of the pile, seen from the boom.
@@ -98,7 +98,7 @@ class ContactParameters:
     def _force(
         self, depth: float, slope: tuple[float, float], speed: tuple[float, float, float]
     ) -> tuple[float, float, float]:
-        """On the end, N: outwards, in slew direction, upwards."""
+        """Return the force on the grapple's end, N: outwards, in slew direction, upwards."""
         long = math.hypot(slope[0], slope[1], 1.0)
         normal = (-slope[0] / long, -slope[1] / long, 1.0 / long)
         away = _dot(speed, normal)

@@ -1,10 +1,10 @@
 """The simulated crane: valves move the boom tip, the grapple hangs from it and swings.
 
-Three booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
+There are four booms. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
 (slew angle theta1, radius x, height z), one valve a coordinate; `JointBoom` moves the joints, and
-the tip by their kinematics; `OverheadBoom` moves a trolley and a rope, `RopedBoom` a boom with a
-rope at its tip. All follow their valves exactly. By default the pump delivers what all valves ask
-for and no boom bends, as in the paper.
+the tip by their kinematics; `OverheadBoom` moves a trolley and a rope; `RopedBoom` moves a boom
+with a rope at its tip. All booms follow their valves exactly. By default the pump delivers all the
+oil that the valves demand and no boom bends, as in the paper.
 """
 
 import math
@@ -95,11 +95,10 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class CraneParameters:
-    """Grapple, valves, full speeds, end stops, start pose and sway sensors of one crane.
+    """Grapple, valves, full speeds, end stops, start pose and surroundings of one crane.
 
-    And how the boom bends, what the grapple meets, what it grips, and what the pump delivers.
-
-    Full speed is the speed of the tip (slew: of theta1) when the valve lets full flow through.
+    Also its sway sensors, its pump, how its boom bends, and which log the grapple grips. Full speed
+    is the speed of the tip (slew: the rate of theta1) when the valve lets full flow through.
     """
 
     grapple: Grapple = field(default_factory=Grapple)
@@ -144,13 +143,13 @@ class CraneParameters:
         check_ranges("crane", self, _ALLOWED | start)
 
     def full_speeds(self, kind: str) -> dict[str, float]:
-        """Full speed of every axis that a crane of this kind may have, rad/s or m/s."""
+        """Return axis -> full speed, rad/s or m/s, for all axes a crane of this kind may have."""
         owners = (getattr(self, kind),) if kind in ON_ROPE else (self, self.joints)
         named = [(axis, name, one) for axis, name in FULL_SPEEDS.items() for one in owners]
         return {axis: getattr(one, name) for axis, name, one in named if hasattr(one, name)}
 
     def tip_boom(self) -> TipBoom:
-        """The boom whose tip is moved directly, in the start pose."""
+        """Return the boom whose tip the valves move directly, in the start pose."""
         reach_m = self.radius_min_m, self.radius_max_m
         height_m = self.height_min_m, self.height_max_m
         slew_rad_s, near_far_m_s = self.slew_full_speed_rad_s, self.near_far_full_speed_m_s
@@ -164,7 +163,7 @@ class CraneParameters:
 
 
 class CraneState(NamedTuple):
-    """Pose, tip speeds and sway at one instant; angles in rad, lengths in m, per second."""
+    """Pose, tip speeds and sway at one instant; rad, m, and their rates per second."""
 
     time_s: float
     theta1_rad: float
@@ -180,7 +179,7 @@ class CraneState(NamedTuple):
 
 
 class Crane:
-    """Crane and grapple in motion: `step` with the values in the valve frames, read `state`."""
+    """Crane and grapple in motion: call `step` with the valve frames' values, read `state`."""
 
     __slots__ = (
         "_accelerations",
@@ -209,7 +208,7 @@ class Crane:
         Args:
             parameters: the crane (default: the nominal one).
             sway: the initial sway (default: none).
-            boom: what carries the grapple (default: a `TipBoom` of the parameters).
+            boom: the boom that carries the grapple (default: a `TipBoom` of the parameters).
         """
         p = self.parameters = parameters or CraneParameters()
         self.boom = boom or p.tip_boom()
@@ -260,38 +259,38 @@ class Crane:
 
     @property
     def rest_rad(self) -> tuple[float, float]:
-        """(theta5, theta6) at which the grapple would hang still: here, in the present wind."""
+        """(theta5, theta6) at which the grapple would hang still in the present pose and wind."""
         if self.around.none:
             return 0.0, 0.0
         return self.around.rest(self.parameters.grapple, *self.boom.pose[:2])
 
     @property
     def axes_at_stop(self) -> tuple[str, ...]:
-        """The axes that are held by an end stop just now."""
+        """The axes that an end stop holds at present."""
         return tuple(name for name, axis in self._axes.items() if axis.at_stop)
 
     @property
     def gripped_kg(self) -> float:
-        """Mass of what the grapple holds just now."""
+        """Mass in kg of the load that the grapple holds at present."""
         return self.parameters.grapple.m2_kg - self._empty_kg
 
     def speed(self, axis: str) -> float:
-        """Speed of an axis that it has, rad/s or m/s."""
+        """Return the speed of an axis of this crane, rad/s or m/s."""
         return self._axes[axis].speed
 
     def opening(self, axis: str) -> float:
-        """How far the valve of an axis is open, -1 .. 1; 0 for an axis that has none."""
+        """Return the opening of the valve of an axis, -1 .. 1; 0 for an axis without one."""
         moved = self._axes.get(axis)
         return moved.valve.speed if moved else 0.0
 
     def pick_up(self, loaded: Grapple) -> None:
-        """From now on this hangs from the tip, at the angles of before: the grapple with a load."""
+        """Replace the grapple by this one, which includes its load; the sway angles stay."""
         self.parameters = replace(self.parameters, grapple=loaded)
 
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
         """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.
 
-        An axis that is not in `commands` keeps its last one, as a valve between two frames does.
+        An axis not in `commands` keeps its last command, as a valve between two frames does.
         Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
         """
         if not 0.0 < dt_s < math.inf:
@@ -313,13 +312,13 @@ class Crane:
             self.swung_over = True
 
     def _axis(self, name: str) -> Actuator:
-        """An axis that takes commands; raises ValueError for a name of none."""
+        """Return an axis that takes commands; raise ValueError for an unknown name."""
         if axis := self._axes.get(name):
             return axis
         raise ValueError(f"crane: axis: expected one of {', '.join(self._axes)}, got {name!r}")
 
     def _advance(self, step_s: float) -> None:
-        """One internal step."""
+        """Advance the crane by one internal step."""
         grapple = self.parameters.grapple
         for valve in self._uncompensated:
             valve.meet(valve.parameters.against(self.gripped_kg))
@@ -335,7 +334,7 @@ class Crane:
         self._sway = advance(grapple, self._sway, step_s, tips, self._accelerations)
 
     def _grip(self, log: LogParameters) -> None:
-        """Grip it, once."""
+        """Grip this log; a crane grips once."""
         grapple = self.parameters.grapple
         if log.second_period_s:
             self._second = SecondSwing(log, grapple.g_m_s2, self._sway)
@@ -346,9 +345,10 @@ class Crane:
 
 
 def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:
-    """A crane driven joint by joint, with the tip at the same start as the other.
+    """Return a crane driven joint by joint, with its tip at the start of a tip-driven crane.
 
     Raises:
+        DesignError: a joint would start outside its range.
         ValueError: the joints do not reach the start pose.
     """
     p = parameters or CraneParameters()
@@ -357,9 +357,10 @@ def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = N
 
 
 class RopeCrane(Crane):
-    """A load on a rope: of an overhead crane, see `OverheadBoom`, or another one, see `RopedBoom`.
+    """A crane whose load hangs from a rope: an `OverheadBoom`, or a `RopedBoom` by its kind.
 
-    It stands level and without wind: of the parameters its own, ends and sway sensor count.
+    It stands level and without wind: only the parameters of its kind, the end stops and the sway
+    sensor apply.
     """
 
     __slots__ = ("_rope",)

@@ -1,8 +1,8 @@
-"""Several cranes in one deployment: the part of it that is one of them.
+"""Several cranes in one deployment: take out the part that belongs to one crane.
 
-The crane of an axis is the first part of its name, where what follows is the name of an axis:
-``front_slew`` and ``rear_slew`` are the slew axes of the cranes ``front`` and ``rear``. A file that
-says what its axes move (``crane``) has one crane.
+The name of such an axis is the name of its crane, an underscore, and the name of a simulated axis:
+``front_slew`` and ``rear_slew`` are the slew axes of the cranes ``front`` and ``rear``. A file with
+a section ``crane``, which says what its axes move, has one crane.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from canshaper_sim.axes import ALL_AXES, ROTATOR
 
 
 def cranes(deployment: Deployment) -> list[str]:
-    """Names of the cranes of a deployment; none where its axes are those of one."""
+    """Return the names of the cranes of a deployment; empty if its axes form a single crane."""
     names: dict[str, None] = {}
     for name in deployment.axes if deployment.config.crane is None else ():
         for axis in (*ALL_AXES, ROTATOR):
@@ -24,10 +24,10 @@ def cranes(deployment: Deployment) -> list[str]:
 
 
 def one_crane(deployment: Deployment, crane: str) -> Deployment:
-    """The same deployment with one crane's axes, under their own names, its joysticks and buses.
+    """Return the deployment with one crane's axes under their own names, its joysticks and buses.
 
     Raises:
-        DesignError: no such crane.
+        DesignError: the deployment has no such crane.
     """
     names = cranes(deployment)
     if crane not in names:

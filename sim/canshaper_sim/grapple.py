@@ -25,7 +25,7 @@ new_tuple = tuple.__new__
 
 
 class TipMotion(NamedTuple):
-    """How the boom tip moves at one instant, in cylindrical coordinates about the pillar."""
+    """Motion of the boom tip at one instant, in cylindrical coordinates about the pillar."""
 
     radius_m: float
     radius_rate_m_s: float
@@ -93,7 +93,7 @@ class Grapple:
         check_ranges("grapple", self, _ALLOWED)
 
     def longer(self, percent: float) -> Self:
-        """The same with so much more, or less, from the joint of theta6 to the centre of mass."""
+        """Return a copy with l2_m longer by this percentage; a negative one makes it shorter."""
         return replace(self, l2_m=self.l2_m * (1.0 + percent / 100.0))
 
     @property
@@ -113,12 +113,12 @@ class Grapple:
         return SwayMode(omega, self.c6_n_m_s_rad / (2.0 * omega * inertia), 1.0 / self.l2_m)
 
     def offset_m(self, theta5_rad: float, theta6_rad: float) -> tuple[float, float]:
-        """How far from the tip it hangs, seen from above: outwards, and in slew direction, m."""
+        """Return the horizontal offset of the grapple from the tip, m: outwards, slew direction."""
         return offset_m(self.l1_m, self.l2_m, theta5_rad, theta6_rad)
 
 
 def offset_m(l1_m: float, l2_m: float, theta5_rad: float, theta6_rad: float) -> tuple[float, float]:
-    """How far from the tip it hangs, seen from above; a rope is all l2."""
+    """Return the horizontal offset of the load from the tip, m; a rope has l1_m 0."""
     l3_m = l1_m + l2_m * math.cos(theta6_rad)
     return -l2_m * math.sin(theta6_rad), l3_m * math.sin(theta5_rad)
 
@@ -126,7 +126,7 @@ def offset_m(l1_m: float, l2_m: float, theta5_rad: float, theta6_rad: float) -> 
 def accelerations(
     grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
 ) -> tuple[float, float]:
-    """(theta5'', theta6'') in rad/s^2 at a Sway under a tip motion (paper Eq. 7-9, corrected)."""
+    """Return (theta5'', theta6'') in rad/s^2 for this sway and tip motion (Eq. 7-9, corrected)."""
     theta5, theta6, rate5, rate6 = sway
     radius, radius_rate, radius_acc, slew_rate, slew_acc, height_acc, _, _, _ = tip
     l1 = grapple.l1_m
@@ -171,7 +171,7 @@ Push = tuple[float, float, float]
 def pushed(
     grapple: Grapple, sway: tuple[float, float, float, float], link: Push, load: Push
 ) -> tuple[float, float]:
-    """Return what forces on link and grapple add to `accelerations`, by virtual work."""
+    """Return what forces on link and grapple add to `accelerations`, by virtual work; rad/s^2."""
     s5, c5, s6, c6 = math.sin(sway[0]), math.cos(sway[0]), math.sin(sway[1]), math.cos(sway[1])
     l1, l2 = grapple.l1_m, grapple.l2_m
     l3 = l1 + l2 * c6
@@ -183,7 +183,7 @@ def pushed(
 
 
 def rest(grapple: Grapple, link: Push, load: Push) -> tuple[float, float]:
-    """(theta5, theta6) in rad at which nothing swings under these forces on link and grapple."""
+    """Return (theta5, theta6) in rad at which the grapple hangs still under these forces."""
     theta5 = theta6 = 0.0
     g, of_link = grapple.g_m_s2, grapple.m1_kg * grapple.l1_m
     for _ in range(8):  # theta6 shortens what theta5 moves, by less each time
@@ -208,10 +208,11 @@ def advance(
     tips: tuple[TipMotion, TipMotion, TipMotion],
     accelerations: Accelerations = accelerations,
 ) -> Sway:
-    """One classical Runge-Kutta step of step_s seconds; tip motion at its start, middle and end.
+    """Advance the sway by one classical Runge-Kutta step of step_s seconds.
 
-    The stages weigh the tip acceleration as Simpson's rule does: if (start + 4 middle + end)/6 is
-    its mean over the step, a speed that jumps within the step still gives its exact impulse.
+    `tips` is the tip motion at start, middle and end of the step. The stages weigh the tip
+    acceleration as Simpson's rule does: if (start + 4 middle + end)/6 is its mean over the step, a
+    speed that jumps within the step still gives its exact impulse.
     """
     tip_start, tip_middle, tip_end = tips
     h = step_s

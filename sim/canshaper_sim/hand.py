@@ -1,4 +1,4 @@
-"""The joysticks of a deployment as they are held: joystick positions in, joystick frames out."""
+"""The operator's hand on all joysticks of a deployment: positions in, joystick frames out."""
 
 import math
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ JOYSTICK_ADDRESS = 0x33
 
 @dataclass(frozen=True)
 class Held:
-    """State of a hand on the joysticks; it does not change, another one takes its place.
+    """What a hand holds at one instant: joystick positions and switches. Immutable.
 
     Attributes:
-        joysticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.
-        enable: the enable switch.
-        reset: the reset switch.
-        anti_sway: the anti-sway switch.
-        next_profile: the button for the next profile, of the first joystick that has one.
+        joysticks: position by axis, -1 .. 1; an axis that is not a key is in neutral.
+        enable: the enable switch is held.
+        reset: the reset switch is held.
+        anti_sway: the anti-sway switch is on.
+        next_profile: the next-profile button, of the first joystick that has one, is held.
     """
 
     joysticks: Mapping[str, float] = field(default_factory=dict)
@@ -36,14 +36,14 @@ class Held:
 
 
 class Hand:
-    """All joysticks of a deployment, what enables them, and its emergency stop, never pressed.
+    """All joysticks of a deployment, their enabling switches, and its unpressed emergency stop.
 
     Args:
         deployment: names the joystick messages and their switches.
 
     Attributes:
-        cycle_ms: frames are due at multiples of it only.
-        cycles_ms: of each joystick.
+        cycle_ms: greatest common divisor of all cycles; frames are due only at its multiples.
+        cycles_ms: cycle of each joystick message.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -58,17 +58,17 @@ class Hand:
         self.cycle_ms = math.gcd(*(message.cycle_ms for message in self._messages))
 
     def due(self, time_ms: int, tick_ms: int) -> range:
-        """When frames came since the last tick, ms."""
+        """Return the times in ms, after the last tick up to time_ms, at which frames were due."""
         first_ms = (time_ms - tick_ms) // self.cycle_ms * self.cycle_ms + self.cycle_ms
         return range(max(0, first_ms), time_ms + 1, self.cycle_ms)
 
     def frames(self, time_ms: int, held: Held) -> list[Frame]:
-        """Frames that are due at this time."""
+        """Return the frames that are due at this time in ms."""
         return [one.frame(held) for one in self._messages if time_ms % one.cycle_ms == 0]
 
 
 class _Message:
-    """A message with its protection."""
+    """One message of the hand, with its protection."""
 
     def __init__(self, bound: BoundInput) -> None:
         self.cycle_ms = bound.message.cycle_time or 20
@@ -80,18 +80,18 @@ class _Message:
         self._values: dict[str, int] = {}
 
     def frame(self, held: Held) -> Frame:
-        """The next frame."""
+        """Return the next frame for this state of the hand."""
         if held is not self._held:
             self._held, self._values = held, self._raw(held)
         return self._sender.frame(self._values)
 
     def _raw(self, held: Held) -> dict[str, int]:
-        """Raw values of the signals that a hand moves."""
+        """Return the raw values of the signals that the hand moves."""
         raise NotImplementedError
 
 
 class _Joystick(_Message):
-    """One joystick message."""
+    """One joystick message: the axes and switches of one joystick."""
 
     def __init__(self, joystick: BoundJoystick, deployment: Deployment) -> None:
         super().__init__(joystick)
@@ -147,7 +147,7 @@ class _Joystick(_Message):
 
 
 class _Switches(_Message):
-    """Switches that enable joysticks: one that is pressed is held with enable, the others agree."""
+    """Switches that enable joysticks: those to press follow ``enable``, the rest are always on."""
 
     def __init__(self, bound: BoundSwitches, deployment: Deployment) -> None:
         super().__init__(bound)

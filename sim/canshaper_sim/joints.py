@@ -1,8 +1,8 @@
 """The boom joint by joint: four valves drive slew, lift, knuckle and extension between end stops.
 
-The rate of a joint is its valve's opening times a full speed, wherever the joint stands: the lever
-arms of the cylinders, which change by some tens of percent over the stroke, are left out, as in the
-paper, whose inputs are joint speeds too. The tip follows from the kinematics of Eq. 1-3.
+The rate of a joint is its valve's opening times a full speed in every position of the joint: the
+lever arms of the cylinders, which change by some tens of percent over the stroke, are left out, as
+in the paper, whose inputs are joint speeds too. The tip follows from the kinematics of Eq. 1-3.
 """
 
 import math
@@ -40,11 +40,12 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class JointParameters:
-    """Lengths, joint ranges, joint speeds and valves of a boom; a medium forwarder crane.
+    """Lengths, joint ranges, speeds and valves of a boom; by default a medium forwarder crane.
 
-    Angles are those of `kinematics`: the lift joint above the horizontal, the knuckle joint 0 for a
-    straight arm, negative when folded in. Full speed is the rate of a joint when its valve lets
-    full flow through; the slew joint has full speed and valve of the crane's slew axis.
+    Angles are those of `kinematics`: the lift joint is measured from the horizontal upwards; the
+    knuckle joint is 0 for a straight arm and negative when folded in. Full speed is the rate of a
+    joint when its valve lets full flow through; the slew joint takes full speed and valve from the
+    slew axis of the crane.
     """
 
     lift_cylinder: ValveParameters = field(default_factory=ValveParameters)
@@ -82,7 +83,7 @@ class JointParameters:
 
     @property
     def boom(self) -> Boom:
-        """The lengths."""
+        """The lengths of the boom."""
         return Boom(
             self.pillar_m,
             self.pillar_offset_m,
@@ -146,13 +147,13 @@ class JointBoom:
 
     @property
     def joints(self) -> tuple[float, float, float, float]:
-        """Slew, lift and knuckle in rad, extension in m."""
+        """Joint positions: slew, lift and knuckle in rad, extension in m."""
         slew, lift, knuckle, extension = self.axes.values()
         return slew.position, lift.position, knuckle.position, extension.position
 
     @property
     def joint_rates(self) -> tuple[float, float, float, float]:
-        """Rates of `joints` per second."""
+        """Rates of `joints`, in rad/s and m/s."""
         slew, lift, knuckle, extension = self.axes.values()
         return slew.speed, lift.speed, knuckle.speed, extension.speed
 
@@ -170,13 +171,13 @@ class JointBoom:
         )
 
     def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Move on by step_s seconds; how the tip moved at start, middle and end of the step.
+        """Advance by step_s seconds; return the tip motion at start, middle and end of the step.
 
-        Position and speed of the tip are the kinematics of the joints. Its acceleration at the end
-        is J q'' + J' q'; at start and middle it is what makes the Runge-Kutta step of the grapple
-        see the true travel and the true change of speed of the tip: exact for an acceleration that
-        is a parabola over the step, and with the right impulse where a joint meets its stop or a
-        spool arrives within it.
+        Position and speed of the tip follow from the kinematics of the joints. Its acceleration at
+        the end is J q'' + J' q'. The accelerations at start and middle are chosen so that the
+        Runge-Kutta step of the grapple sees the true travel and the true change of speed of the
+        tip: they are exact for an acceleration that is a parabola over the step, and give the right
+        impulse where a joint meets its stop or a spool arrives within the step.
         """
         slew, lift, knuckle, extension = self.axes.values()
         radius, radius_rate = self._radius_m, self._radius_rate_m_s
@@ -222,7 +223,7 @@ class JointBoom:
         )
 
     def _at_middle(self) -> tuple[float, float, float, float]:
-        """Radius, its rate, height and its rate in the middle of the step that was made."""
+        """Return radius, its rate, height and its rate in the middle of the last step."""
         _, lift, knuckle, extension = self.axes.values()
         middle = (lift.middle_position, knuckle.middle_position, extension.middle_position)
         rates = (lift.middle_speed, knuckle.middle_speed, extension.middle_speed)
@@ -238,10 +239,7 @@ def _dot(row: Iterable[float], column: Iterable[float]) -> float:
 def _stages(
     step_s: float, way: float, speed: float, end_speed: float, end_acceleration: float
 ) -> tuple[float, float]:
-    """(start, middle) acceleration with the way and the change of speed of the step.
-
-    Runge-Kutta sees (a0 + 2 a_mid) h^2/6 as travel and (a0 + 4 a_mid + a1) h/6 as change of speed.
-    """
+    """Return the (start, middle) acceleration that gives the step this way and change of speed."""
     travel = 6.0 * (way / step_s - speed) / step_s
     change = 6.0 * (end_speed - speed) / step_s
     middle = 0.5 * (change - end_acceleration - travel)

@@ -9,7 +9,7 @@ from canshaper_sim.strokes import Script
 
 
 def switches_off(deployment: Deployment) -> bool:
-    """Whether a joystick switches anti-sway off; without one every drive is shaped."""
+    """Return whether a joystick can switch anti-sway off; if none can, every drive is shaped."""
     return any(one.config.anti_sway_off for one in deployment.joysticks.values())
 
 
@@ -18,12 +18,12 @@ class JoystickNode:
 
     Args:
         deployment: names the joystick messages and their switches.
-        script: what the operator does.
+        script: the strokes of the operator.
         bypass: the operator has switched anti-sway off.
 
     Raises:
-        DesignError: the script was made for the other kind of crane, one driven by its tip or by
-            its joints. Axes that a crane merely lacks are left out.
+        DesignError: the script was made for joints and the crane is driven by its tip, or the
+            other way round. Axes that a crane merely lacks are left out.
     """
 
     def __init__(self, deployment: Deployment, script: Script, *, bypass: bool = False) -> None:
@@ -40,7 +40,7 @@ class JoystickNode:
         self._held = Held()
 
     def frames(self, time_ms: int) -> list[Frame]:
-        """Frames that are due at this time of the script."""
+        """Return the frames that are due at this time of the script, in ms."""
         if time_ms % self.cycle_ms:
             return []
         joysticks = {axis: self.script.command(axis, time_ms / 1000.0) for axis in self._axes}
@@ -49,5 +49,5 @@ class JoystickNode:
         return self._hand.frames(time_ms, self._held)
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
-        """Frames that came since the last tick, in order; the newest of each joystick counts."""
+        """Return the frames since the last tick, in order; the newest of each joystick counts."""
         return [frame for ms in self._hand.due(time_ms, tick_ms) for frame in self.frames(ms)]

@@ -6,9 +6,9 @@ radius and height are Eq. 3 of "Optimal sway motion reduction in forestry cranes
     r = a2 + a3 cos(theta2) + a4 cos(theta2 + theta3) - d4 sin(theta2 + theta3)
     z = d1 + a3 sin(theta2) + a4 sin(theta2 + theta3) + d4 cos(theta2 + theta3)
 
-theta2 is the lift angle, of the main boom above the horizontal. theta3 is the knuckle angle less
-90 deg: at knuckle angle 0 the arm is straight, at negative ones it is folded in. So the outer boom
-points lift + knuckle above the horizontal, written `outer` below.
+theta2 is the lift angle, from the horizontal up to the main boom. theta3 is the knuckle angle less
+90 deg: at knuckle angle 0 the arm is straight, at negative angles it is folded in. So the outer
+boom points lift + knuckle above the horizontal, written `outer` below.
 """
 
 import math
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 
 class Jacobian(NamedTuple):
-    """Tip speed per joint rate: radius and height by lift and knuckle (m/rad), extension (1)."""
+    """Derivatives of tip radius and height by lift and knuckle (m/rad) and by extension (m/m)."""
 
     r_lift: float
     r_knuckle: float
@@ -36,7 +36,7 @@ class Boom(NamedTuple):
     outer_boom_m: float  # along the telescope to the tip, telescope in (d4 less the extension)
 
     def tip(self, lift_rad: float, knuckle_rad: float, extension_m: float) -> tuple[float, float]:
-        """(radius, height) of the tip in m (Eq. 3)."""
+        """Return (radius, height) of the tip in m (Eq. 3)."""
         outer = lift_rad + knuckle_rad
         s, c = math.sin(outer), math.cos(outer)
         d4 = self.outer_boom_m + extension_m
@@ -47,7 +47,7 @@ class Boom(NamedTuple):
         )
 
     def jacobian(self, lift_rad: float, knuckle_rad: float, extension_m: float) -> Jacobian:
-        """Derivatives of `tip` by the joints."""
+        """Return the derivatives of `tip` by lift, knuckle and extension."""
         outer = lift_rad + knuckle_rad
         s, c = math.sin(outer), math.cos(outer)
         d4 = self.outer_boom_m + extension_m
@@ -67,11 +67,11 @@ class Boom(NamedTuple):
         joints: tuple[float, float, float],
         rates: tuple[float, float, float],
     ) -> tuple[float, float]:
-        """Tip acceleration (radius, height) in m/s^2 of constant joint rates: J' times the rates.
+        """Return the tip acceleration (radius, height), m/s^2, at constant joint rates: J' q'.
 
         Args:
-            joints: lift (rad), knuckle (rad), extension (m).
-            rates: their rates, per second.
+            joints: positions of lift (rad), knuckle (rad), extension (m).
+            rates: rates of lift (rad/s), knuckle (rad/s), extension (m/s).
         """
         lift, knuckle, extension = joints
         lift_rate, knuckle_rate, extension_rate = rates
@@ -88,10 +88,10 @@ class Boom(NamedTuple):
         )
 
     def angles(self, radius_m: float, height_m: float, extension_m: float) -> tuple[float, float]:
-        """(lift, knuckle) in rad that put the tip there with this extension, knuckle upwards.
+        """Return (lift, knuckle) in rad, knuckle up, that put the tip there with this extension.
 
         Raises:
-            ValueError: the tip cannot get there.
+            ValueError: the tip cannot reach this place.
         """
         d4 = self.outer_boom_m + extension_m
         out, up = radius_m - self.pillar_offset_m, height_m - self.pillar_m

@@ -1,11 +1,7 @@
-"""A log that the grapple grips while the crane is driven, and how a long one swings in it.
+"""A log that the grapple grips during a drive, and the second swing of a long log.
 
-Grapple and log are one body on one pendulum. A long log adds a second swing by its mode, linear,
-in both planes alike; the part of the lean that each mode has is what the tool shows of it:
-
-    angle = (1 - share) pendulum + q,    q'' + 2 zeta omega q' + omega^2 q = share omega^2 lean
-
-with lean = a/g, the angle at which it would hang under the acceleration a of the tip.
+Grapple and log are one body on one pendulum. A long log adds a second, linear swing, the same in
+both planes. The angle of the tool shows both; ``share`` is the part of the second one:
 """
 
 import math
@@ -30,7 +26,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class LogParameters:
-    """The log, and when it is gripped: seconds from the start, by default never."""
+    """A log, and the time when the grapple grips it: seconds from the start, by default never."""
 
     grip_s: float = math.inf
     mass_kg: float = 500.0
@@ -46,11 +42,11 @@ class LogParameters:
         check_ranges("log", self, _ALLOWED)
 
     def gripped(self, time_s: float) -> bool:
-        """Whether it is in the grapple at that time."""
+        """Return whether the log is in the grapple at that time."""
         return time_s >= self.grip_s
 
     def loaded(self, grapple: Grapple) -> Grapple:
-        """Grapple and log as one body: their mass, at their common centre."""
+        """Return grapple and log as one body: summed mass at the common centre of mass."""
         mass = grapple.m2_kg + self.mass_kg
         return replace(grapple, m2_kg=mass, l2_m=grapple.l2_m + self.below_m * self.mass_kg / mass)
 
@@ -59,9 +55,9 @@ class SecondSwing:
     """The second swing of a long log in motion.
 
     Args:
-        log: of a second period.
-        gravity_m_s2: of the crane.
-        sway: of the pendulum when it is gripped: the angle does not jump.
+        log: a log with a second period.
+        gravity_m_s2: gravity at the crane.
+        sway: sway of the pendulum when the log is gripped; the shown angle does not jump then.
     """
 
     __slots__ = ("_by", "_gravity_m_s2", "_omega", "_ratio", "_share", "_step_s", "across", "along")
@@ -78,7 +74,7 @@ class SecondSwing:
     def advance(
         self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion], push: Push
     ) -> None:
-        """Swing on for step_s seconds; push and the tip's mean acceleration act all the time."""
+        """Swing for step_s seconds under this push and the tip's mean acceleration."""
         if step_s != self._step_s:
             self._step_s, self._by = step_s, swing_over(self._omega, self._ratio, step_s)
         start, middle, end = (_pulls(tip) for tip in tips)
@@ -89,7 +85,7 @@ class SecondSwing:
         self.along = moved(self._by, self.along, lean * along)
 
     def shown(self, sway: Sway) -> Sway:
-        """The swing of the tool, of that of its pendulum."""
+        """Return the sway of the tool, given that of its pendulum."""
         rest, across, along = 1.0 - self._share, self.across, self.along
         return Sway(
             rest * sway.theta5_rad + across[0],
@@ -100,7 +96,7 @@ class SecondSwing:
 
 
 def _pulls(tip: TipMotion) -> tuple[float, float]:
-    """Acceleration of the tip in slew direction and outwards, m/s^2."""
+    """Return the acceleration of the tip in slew direction and outwards, m/s^2."""
     radius, rate, slew_rate = tip.radius_m, tip.radius_rate_m_s, tip.slew_rate_rad_s
     tangential = radius * tip.slew_acceleration_rad_s2 + 2.0 * rate * slew_rate
     return tangential, tip.radius_acceleration_m_s2 - radius * slew_rate**2

@@ -1,7 +1,7 @@
 """A telehandler or truck crane: slew, luffing, telescope and hoist; a load on a rope at the tip.
 
-The boom is that of ``joints``, straight. The winch is at its tip, or follows the telescope: what
-hangs from the tip is as long as the hoist makes it.
+The boom is that of ``joints``, held straight. The winch is at the tip, or follows the telescope:
+the hoist alone sets the length of the rope below the tip.
 """
 
 import math
@@ -24,7 +24,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class LuffingParameters(RopeParameters):
-    """Valves, full speeds and ways of one such crane, its rope and where it begins."""
+    """Valves, full speeds and ranges of one luffing crane, its rope and its start pose."""
 
     slew: ValveParameters = field(default_factory=ValveParameters)
     lift_cylinder: ValveParameters = field(default_factory=ValveParameters)
@@ -46,7 +46,7 @@ class LuffingParameters(RopeParameters):
         self.check("luffing", _ALLOWED)
 
     def boom(self, ends: EndParameters) -> RopedBoom:
-        """Boom and rope at the start."""
+        """Return boom and rope in the start pose."""
         joints = JointParameters(
             lift_cylinder=self.lift_cylinder,
             extension=self.extension,

@@ -1,11 +1,11 @@
-"""The machines a plant can be: which axes their valves have, and how these move the crane.
+"""The machines a plant can be: the axes of their valves, and how the valves move the crane.
 
-- ``tip``: one valve a tip coordinate; the tip follows its commands exactly.
+- ``tip``: one valve for each tip coordinate; the tip follows its commands exactly.
 - ``tip-controller``: tip commands go to the machine's tip controller, which drives the joints.
-- ``joints``: one valve a joint; the operator drives the joints.
-- ``overhead``: bridge, trolley and hoist, a drive each; the load hangs from a rope.
-- ``tower``: slew, trolley and hoist, a drive each; the load hangs from a rope.
-- ``luffing``: slew, luffing, telescope and hoist, a valve each; the load hangs from a rope.
+- ``joints``: one valve for each joint; the operator drives the joints.
+- ``overhead``: bridge, trolley and hoist, one drive each; the load hangs from a rope.
+- ``tower``: slew, trolley and hoist, one drive each; the load hangs from a rope.
+- ``luffing``: slew, luffing, telescope and hoist, one valve each; the load hangs from a rope.
 """
 
 import math
@@ -49,7 +49,7 @@ _SAME_TIME_S = 1e-9
 
 
 class Machine(Protocol):
-    """A crane behind its valve frames."""
+    """A crane with everything behind its valve frames: a tip controller if any, valves, boom."""
 
     @property
     def crane(self) -> Crane:
@@ -60,7 +60,7 @@ class Machine(Protocol):
 
 
 class ValveDrivenCrane:
-    """A crane whose valves take the commands themselves."""
+    """A crane whose valves take the commands directly, without a tip controller."""
 
     def __init__(self, crane: Crane) -> None:
         self.crane = crane
@@ -89,10 +89,10 @@ class TipControlledCrane:
         self._to_tick_s = 0.0
 
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
-        """Hold the tip commands for dt_s seconds; the controller ticks when it is time.
+        """Hold the tip commands for dt_s seconds; the tip controller ticks at its own period.
 
-        An axis that is not in `commands` keeps its last one.
-        Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
+        An axis that is not in `commands` keeps its last command.
+        Raises DesignError for an unknown axis, ValueError for dt_s <= 0 or a command not finite.
         """
         if not 0.0 < dt_s < math.inf:
             raise ValueError(f"crane: dt_s: expected a positive value, got {dt_s}")
@@ -120,10 +120,11 @@ class TipControlledCrane:
 def build_machine(
     name: str, parameters: CraneParameters | None = None, sway: Sway | None = None
 ) -> Machine:
-    """The machine of that name, standing in its start pose, the grapple with this initial sway.
+    """Return the machine of that name in its start pose, its grapple with this initial sway.
 
     Raises:
-        DesignError: no such machine, or the joints do not reach the start pose.
+        DesignError: no such machine, or a joint would start outside its range.
+        ValueError: the joints do not reach the start pose.
     """
     if name == TIP:
         return ValveDrivenCrane(Crane(parameters, sway))
@@ -137,12 +138,12 @@ def build_machine(
 
 
 def machine_for(axes: Iterable[str], requested: str | None = None) -> str:
-    """The machine for a deployment whose axes move these coordinates; `requested` may name one.
+    """Return the name of the machine for a deployment whose axes move these coordinates.
 
-    Without one the axes say it, see ``kind_of``.
+    `requested` may name the machine; without it ``kind_of`` derives the machine from the axes.
 
     Raises:
-        DesignError: no such machine, or it is no crane of this kind.
+        DesignError: no machine has the requested name.
     """
     if requested is None:
         return kind_of(axes)

@@ -29,11 +29,11 @@ __all__ = ["SCRIPTS", "Script", "Stroke", "random_script", "script_for", "script
 
 
 def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXES) -> Script:
-    """A script `random-<seed>`: plateaus and reversals, about 40 % of the time neutral.
+    """Return a script `random-<seed>`: plateaus and reversals, neutral about 40 % of the time.
 
     Ramps last 0.1 .. 0.4 s, plateaus 0.4 .. 2.5 s. The same arguments always give the same script.
-    Strokes that would carry the boom far away from the start pose of the default crane are turned
-    round or cut short. The last second is neutral.
+    Strokes that would carry the boom far away from the start pose of the default crane are reversed
+    or cut short. The last second is neutral.
     """
     strokes: list[Stroke] = []
     reach = reach_s(axes)
@@ -85,7 +85,7 @@ _PAUSE_SHARE = 0.33
 
 
 def reach_s(axes: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """How far from the start the strokes of each axis of a crane with these may add up to, s."""
+    """Return, by axis, how far the strokes of such a crane may add up in s of full speed."""
     return REACH_S | _REACH_OF.get(kind_of(axes), {})
 
 
@@ -119,13 +119,13 @@ def _random_strokes(
 
 
 def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
-    """A built-in script, or `random-<seed>` of 30 s on these axes.
+    """Return a built-in script, or `random-<seed>` of 30 s on these axes.
 
-    Where they are joints of the boom, `demo` and `loading` are the same work joint by joint; where
-    they are those of a crane with a rope, that of one.
+    On the joints of a boom, `demo` and `loading` are the same work joint by joint; on the axes of a
+    crane with a rope, `demo` is the one for that crane.
 
     Raises:
-        DesignError: no script of that name; lists the names.
+        DesignError: there is no script of that name; the message lists the names.
     """
     script = SCRIPTS.get(f"{name}-{kind_of(axes)}") or SCRIPTS.get(name)
     if script is not None:
@@ -138,10 +138,12 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
 
 
 def script_for(deployment: Deployment, name: str) -> Script:
-    """A script by its name, or the pulse of an axis by the axis' own, for a deployment's axes.
+    """Return a script by its name, for the axes of a deployment.
+
+    ``pulse-NAME`` may also give the deployment's own name of an axis.
 
     Raises:
-        DesignError: no script of that name, or it moves nothing of this crane.
+        DesignError: there is no script of that name, or it moves no axis of this crane.
     """
     moves = deployment.coordinates
     axes = deployment.by_coordinate

@@ -1,14 +1,15 @@
-"""A person at the joysticks: sees late, foresees roughly, aims, corrects, and catches the swing.
+"""A person at the joysticks: sees late, predicts roughly, aims, corrects, and catches the swing.
 
-Both axes move at once and arrive together (Kelso, Southard and Goodman 1979). The person lets go
-where the tip is believed to stop and corrects by taps, as a hand that aims does (Woodworth 1899;
-Meyer et al. 1988). What is believed is what was seen one reaction ago, and what is still to come of
-all that the own hand has done, by the run-on that was learned (Miall et al. 1993). One decision is
-taken at a time (Welford 1952). A swing is caught by a tap towards the load when it turns: by half
-of what the load is off, the other half on its way back, as ZV does.
+Both axes move at once and arrive together (Kelso, Southard and Goodman 1979). The person releases
+the joystick where the tip is expected to stop and corrects by taps, as an aiming hand does
+(Woodworth 1899; Meyer et al. 1988). The expected stop is the place seen one reaction time ago plus
+the way still to come from the person's own joystick input, by the learned run-on (Miall et al.
+1993). The person takes one decision at a time (Welford 1952). The person catches a swing by a tap
+towards the load when the load turns: by half of the load's offset, and by the other half on its way
+back, as ZV does.
 
-Published is what kind each number of `Skill` is, and its size where a source stands there. Every
-other size is chosen. Nothing here knows of anti-sway. Places are in m.
+The literature gives the meaning of each number of `Skill`, and its size where a source stands
+beside it. Every other size is chosen. The model takes no account of anti-sway. Places are in m.
 """
 
 import math
@@ -32,7 +33,7 @@ _TAP_S, _LEAST_LEVEL, _WORTH_A_TAP, _WORTH_A_CATCH = 0.3, 0.15, 0.33, 0.7
 
 @dataclass(frozen=True, slots=True)
 class Skill:
-    """Skill of a person; by default one who catches the swing. Noise: one sigma."""
+    """Skill of a person; by default of one who catches the swing. Noise is given as one sigma."""
 
     # Simple visual reaction .19 s, .15 s more for each bit of a choice (Hick 1952; Luce 1986);
     # corrections by sight .19 to .26 s (Keele and Posner 1968); a pilot .15 to .25 s (McRuer 1967).
@@ -51,7 +52,7 @@ class Skill:
 
 @dataclass(frozen=True, slots=True)
 class Operators:
-    """Those who work; a novice chooses where the others know, .38 s (Laming 1968)."""
+    """Three persons at work. A novice has to choose where the others know: .38 s (Laming 1968)."""
 
     catching: Skill = Skill()
     waiting: Skill = Skill(catch=0.0)
@@ -59,7 +60,7 @@ class Operators:
 
 
 class Known(NamedTuple):
-    """Knowledge of an axis that practice has taught."""
+    """Knowledge of one axis, learned by practice."""
 
     full_m_s: float  # speed of the tip at full deflection
     # Of that speed, tick by tick, after the joystick is let go at once: so much of what the hand
@@ -69,19 +70,19 @@ class Known(NamedTuple):
 
 
 class OperatorModel:
-    """A person who does one move.
+    """A person who makes one move of the load.
 
     Args:
-        skill: what the person can do.
-        technique: speed and catch of this person, parts of full deflection and of the swing.
-        task: of each axis what is known of it, and where the tip has to be.
-        within: how far off tip and load may be.
-        seed: of all that is random: the same one aims and errs alike with any crane.
-        tick_s: between two calls of `see`.
+        skill: skill of the person.
+        technique: largest deflection, part of full, and part of a swing caught at one turn.
+        task: for each axis, what the person knows of it, and the target of the tip, m.
+        within: largest final distances in m: of the tip from its target, of the load from the tip.
+        seed: of all random numbers; with the same seed the person aims and errs alike on any crane.
+        tick_s: time between two calls of `see`.
 
     Attributes:
         joysticks: position of each axis, -1 .. 1.
-        taps: how many corrections and catches were begun.
+        taps: number of corrections and catches begun.
     """
 
     def __init__(
@@ -106,7 +107,7 @@ class OperatorModel:
         self.joysticks, self.taps = [0.0] * len(task), 0
 
     def see(self, time_s: float, seen: Sequence[tuple[float, float]]) -> None:
-        """See of each axis where the tip is, and the load off it; move until the next time."""
+        """See each axis' (place of the tip, offset of the load), m; move the hand for one tick."""
         self._seen.append(seen)
         if len(self._seen) <= self._late:
             return
@@ -132,7 +133,7 @@ class OperatorModel:
 
 
 class _Axis:
-    """One axis: what the person believes of it, and the hand on its joystick."""
+    """One axis: the person's estimate of its motion, and the hand on its joystick."""
 
     def __init__(
         self, skill: Skill, known: Known, target_m: float, source: random.Random, tick_s: float
@@ -152,7 +153,7 @@ class _Axis:
         self._done = deque([0.0] * len(self._to_come), maxlen=len(self._to_come))
 
     def watch(self, place_m: float, off_m: float) -> None:
-        """See tip and load as they were one reaction ago, and believe where the tip will stop."""
+        """See tip and load as they were one reaction time ago; estimate where the tip will stop."""
         self._rate_m_s, self._off_m = (off_m - self._off_m) / self._tick_s, off_m
         self.swing_m = math.hypot(off_m, self._rate_m_s / self.known.omega_rad_s)
         coming = math.fsum(map(mul, self._done, self._to_come))
@@ -160,7 +161,7 @@ class _Axis:
         self.error_m = self._target_m - place_m - self._coming_m
 
     def let_go(self, time_s: float) -> bool:
-        """Let go where it is time for it; whether the hand was free."""
+        """Release the joystick where a stroke or tap ends; return whether the hand was free."""
         if not self.wanted:
             return time_s >= self._ready_s
         hand_s = 0.5 * self._joystick * abs(self._joystick) * self._skill.ramp_s
@@ -172,13 +173,13 @@ class _Axis:
         return False
 
     def worth_m(self, within_m: float) -> float:
-        """Way of a tap, if one is worth it: not within what is known of what is still to come."""
+        """Return the way of a correction, m; 0 for an error below what the person can trust."""
         worth_m = max(self._skill.dead_m, _WORTH_A_TAP * within_m)
         worth_m += self._skill.run_on * abs(self._coming_m)
         return self.error_m if abs(self.error_m) > worth_m else 0.0
 
     def caught_m(self, time_s: float, part: float) -> float:
-        """Way of a tap that has to begin now, to be half done when the load turns; else 0."""
+        """Return the way, m, of a tap due now, to be half done when the load turns; else 0."""
         omega = self.known.omega_rad_s
         phase = math.atan2(-self._rate_m_s / omega, self._off_m)  # it turns at each pi
         for turn in range(math.ceil(phase / math.pi), math.ceil(phase / math.pi) + 3):
@@ -190,19 +191,19 @@ class _Axis:
         return 0.0
 
     def _shape(self, way_m: float) -> tuple[float, float]:
-        """How long a tap lasts, s, and its deflection."""
+        """Return the duration of a tap in s, and its deflection."""
         level = abs(way_m) / (self.known.full_m_s * _TAP_S)
         level = min(1.0, max(_LEAST_LEVEL, level))
         return abs(way_m) / (self.known.full_m_s * level), math.copysign(level, way_m)
 
     def tap(self, time_s: float, way_m: float) -> None:
-        """Begin a tap that moves the tip so far, as well as the hand can."""
+        """Begin a tap that moves the tip by way_m, with the noise of the hand."""
         noise = 1.0 + self._skill.motor * self._source.gauss()
         lasts_s, self.wanted = self._shape(way_m * noise)
         self._until_s = time_s + lasts_s
 
     def advance(self) -> float:
-        """Move the hand on; position of the joystick until the next tick."""
+        """Move the hand for one tick; return the position of the joystick until the next tick."""
         most = self._tick_s / self._skill.ramp_s
         self._joystick += min(max(self.wanted - self._joystick, -most), most)
         self._done.appendleft(self._joystick)

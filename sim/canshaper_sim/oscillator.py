@@ -1,4 +1,4 @@
-"""A damped swing about a place that stands during a step, solved exactly."""
+"""A damped swing about a place that is constant during a step, solved exactly."""
 
 import math
 
@@ -17,6 +17,6 @@ def swing_over(omega: float, ratio: float, step_s: float) -> tuple[float, float,
 
 
 def moved(by: tuple[float, float, float, float], state: State, about: float) -> State:
-    """A state after such a step, in which the swing is about this place."""
+    """Return the state after a step with transition matrix `by`, for a swing about this place."""
     off = state[0] - about
     return about + by[0] * off + by[1] * state[1], by[2] * off + by[3] * state[1]

@@ -1,14 +1,14 @@
 """An overhead crane: bridge, trolley and hoist; a load that hangs from a rope and swings freely.
 
-The load is a point at r below the trolley, as far away as the rope is long, |r| = l(t). Its tension
-per kg and m of rope, k, keeps it there:
+The load is a point at r below the trolley, at the length of the rope: |r| = l(t). The tension of
+the rope per kg of load and m of rope, k, keeps this distance:
 
     r'' = -a - g e_z - k r - c (r' - (l'/l) r)      a: acceleration of the trolley
     k = (r . (-a - g e_z) + |r'|^2 - l'^2 - l l'') / l^2
 
 (r . r = l^2, differentiated twice; Goldstein, Classical Mechanics, 1.4). No small angle is assumed,
-and a rope that gets longer or shorter does all that it does: 2 l' theta' is in it. A rope that is
-slack is none: the load never falls freely.
+and the terms of a rope that changes its length, such as 2 l' theta', are included. The rope never
+gets slack: the load never falls freely.
 """
 
 import math
@@ -43,13 +43,13 @@ _ROPE = {
 
 
 def drive() -> ValveParameters:
-    """An inverter follows every command, within its ramp."""
+    """Return an electric drive: its inverter follows every command within its ramp."""
     return ValveParameters(deadband=0.0, rate_limit_1_s=5.0, lag_s=0.1)
 
 
 @dataclass(frozen=True, slots=True)
 class RopeParameters:
-    """Hoist and rope of a crane, and how its load swings."""
+    """Hoist and rope of a crane, and the damping of its load's swing."""
 
     hoist: ValveParameters = field(default_factory=drive)
     hoist_full_speed_m_s: float = 0.5
@@ -61,19 +61,19 @@ class RopeParameters:
     g_m_s2: float = 9.81
 
     def check(self, owner: str, allowed: Mapping[str, tuple[float, float]]) -> None:
-        """Refuse values that describe no crane; see ``check_ranges``."""
+        """Raise DesignError for values that describe no crane; see ``check_ranges``."""
         start = {"rope_m": (self.rope_min_m, self.rope_max_m)}
         check_ranges(owner, self, {**allowed, **_ROPE, **start})
 
     def winch(self, ends: EndParameters) -> Actuator:
-        """The hoist at the start; its position is the height below what the rope hangs from."""
+        """Return the hoist at the start; its position is minus the length of the rope, m."""
         rope = (-self.rope_m, -self.rope_max_m, -self.rope_min_m)
         return Actuator(self.hoist, self.hoist_full_speed_m_s, *rope, ends=ends)
 
 
 @dataclass(frozen=True, slots=True)
 class OverheadParameters(RopeParameters):
-    """Drives, full speeds and ways of one overhead crane, its rope and where it begins."""
+    """Drives, full speeds and ranges of one overhead crane, its rope and its start pose."""
 
     bridge: ValveParameters = field(default_factory=drive)
     trolley: ValveParameters = field(default_factory=drive)
@@ -87,7 +87,7 @@ class OverheadParameters(RopeParameters):
         self.check("overhead", _ALLOWED)
 
     def boom(self, ends: EndParameters) -> "OverheadBoom":
-        """Trolley and rope at the start."""
+        """Return trolley and rope in the start pose."""
         runway, span = 0.5 * self.runway_m, 0.5 * self.span_m
         return OverheadBoom(
             {
@@ -108,15 +108,15 @@ class OverheadBoom:
     """Bridge, trolley and rope, with the load on it.
 
     Args:
-        axes: actuators of the three axes; the hoist's position is the height below the trolley.
-        parameters: of the crane.
-        sling: what the load hangs from below the hook.
+        axes: actuators of the three axes; the hoist's position is minus the length of the rope, m.
+        parameters: hoist and rope of the crane.
+        sling: the sling between hook and load, if there is one.
 
     Attributes:
-        load: the load from the trolley: along the runway, along the bridge, upwards, m. With a
+        load: load relative to the trolley: along the runway, along the bridge, upwards, m. With a
             sling this is the hook.
-        rate: its velocity, from the trolley's, m/s.
-        slung: the load on the sling.
+        rate: velocity of ``load``, m/s.
+        slung: the load on the sling; None without a sling.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class OverheadBoom:
         self.slung: SlungLoad | None = None
 
     def swing(self, sway: "Sway") -> None:
-        """Let the load hang with these angles: theta5 along the runway, theta6 along the bridge."""
+        """Let the load hang at these angles: theta5 along the runway, theta6 along the bridge."""
         along, across = math.tan(sway.theta5_rad), math.tan(sway.theta6_rad)
         down = self.rope_m / math.sqrt(1.0 + along * along + across * across)
         self.load = (down * along, down * across, -down)
@@ -143,17 +143,17 @@ class OverheadBoom:
 
     @property
     def rope_m(self) -> float:
-        """Length of the rope."""
+        """Length of the rope, m."""
         return -self.axes[HOIST].position
 
     @property
     def signal_m(self) -> float:
-        """Length that the crane reports."""
+        """Length of the rope that the crane reports, m."""
         return self.rope_m * (1.0 + self._p.rope_error_pct / 100.0)
 
     @property
     def angles(self) -> tuple[float, float, float, float]:
-        """Swing along runway and bridge, rad, and its rates."""
+        """Swing along runway and along bridge, rad, then the rates of both, rad/s."""
         x, y, z = self.load
         vx, vy, vz = self.rate
         along, across = x * x + z * z, y * y + z * z
@@ -166,7 +166,7 @@ class OverheadBoom:
 
     @property
     def sling_angles(self) -> tuple[float, float]:
-        """Swing of the sling along runway and bridge, rad; without one that of the rope."""
+        """Swing of the sling along runway and bridge, rad; of the rope if there is no sling."""
         if not self.slung:
             return self.angles[:2]
         x, y, z = plus(self.slung.position, -1.0, self.hook)
@@ -174,13 +174,13 @@ class OverheadBoom:
 
     @property
     def hook(self) -> Vector:
-        """Where the rope ends, as ``SlungLoad.position``."""
+        """Position of the hook, m, in the same coordinates as ``SlungLoad.position``."""
         bridge, trolley, _ = self.axes.values()
         return plus((bridge.position, trolley.position, 0.0), 1.0, self.load)
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """Trolley in polar coordinates about the start, hook below it, and their rates."""
+        """Polar coordinates of the trolley about the start, height of the hook, and their rates."""
         bridge, trolley, hoist = self.axes.values()
         x, y, vx, vy = bridge.position, trolley.position, bridge.speed, trolley.speed
         radius = math.hypot(x, y)
@@ -201,7 +201,7 @@ class OverheadBoom:
             self._pull(slung, 0.5 * part_s)
 
     def _pull(self, slung: SlungLoad, part_s: float) -> None:
-        """Let the sling pull at the hook for part_s seconds; along the rope that takes it."""
+        """Let the sling pull at the hook for part_s seconds; the rope bears the part along it."""
         bridge, trolley, _ = self.axes.values()
         rate = plus((bridge.speed, trolley.speed, 0.0), 1.0, self.rate)
         change = slung.pull(part_s, self.hook, rate)
@@ -220,7 +220,7 @@ class OverheadBoom:
     def _hang(self, step_s: float, start: Vector, middle: Vector, end: Vector) -> None:
         """Move rope and load on below a trolley with these accelerations, m/s^2.
 
-        A classical Runge-Kutta step, and back onto the rope.
+        One classical Runge-Kutta step, then load and rate are put back onto the rope.
         """
         hoist = self.axes[HOIST]
         before = hoist.position, hoist.speed
@@ -248,13 +248,13 @@ class OverheadBoom:
     def _acceleration(
         self, r: Vector, v: Vector, trolley: Vector, hoist: tuple[float, float, float]
     ) -> Vector:
-        """Return that of the load relative to the trolley.
+        """Return the acceleration of the load relative to the trolley, m/s^2.
 
         Args:
-            r: load from the trolley, m.
-            v: its rate, m/s.
-            trolley: acceleration, m/s^2.
-            hoist: position, speed and acceleration of the hook.
+            r: load relative to the trolley, m.
+            v: velocity of r, m/s.
+            trolley: acceleration of the trolley, m/s^2.
+            hoist: position (m), speed (m/s) and acceleration (m/s^2) of the hook.
         """
         length, change, change_2 = (-one for one in hoist)
         pull = (-trolley[0], -trolley[1], -trolley[2] - self._p.g_m_s2)

@@ -14,7 +14,7 @@ P = TypeVar("P")
 
 
 def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float]:
-    """Every parameter by its name, such as ``grapple.l2_m``, with its value."""
+    """Return every parameter by its dotted name, such as ``grapple.l2_m``, with its value."""
     values: dict[str, float] = {}
     owner = CraneParameters() if parameters is None else parameters
     for field in dataclasses.fields(owner):
@@ -29,7 +29,7 @@ def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float
 def changed_parameters(
     changes: list[str], deployment: "Deployment | None" = None
 ) -> CraneParameters:
-    """The nominal crane, as its file says, with NAME=VALUE changes put in; see `changed`."""
+    """Return the nominal crane changed by the file, then by these NAME=VALUE changes."""
     crane = CraneParameters()
     if deployment and (section := deployment.config.crane):
         own = [f"{name}={value}" for name, value in section.simulated.items()]
@@ -38,10 +38,15 @@ def changed_parameters(
 
 
 def changed(parameters: P, changes: list[str], option: str) -> P:
-    """Parameters with NAME=VALUE changes of this option put in, such as grapple.l2_m=1.5.
+    """Return the parameters with NAME=VALUE changes applied, such as grapple.l2_m=1.5.
+
+    Args:
+        parameters: the parameters to change.
+        changes: NAME=VALUE each.
+        option: option or place that the changes come from, for the message.
 
     Raises:
-        DesignError: no such parameter, no number, or a value that cannot be.
+        DesignError: no such parameter, no number, or a value outside its range.
     """
     known, values = parameter_names(parameters), dict[str, float]()
     for change in changes:
@@ -57,7 +62,7 @@ def changed(parameters: P, changes: list[str], option: str) -> P:
 
 
 def _replaced(owner: P, values: Mapping[str, float]) -> P:
-    """A copy of a parameter object with these parameters changed at once, by dotted names."""
+    """Return a copy of a parameter object with these values, by dotted name, changed at once."""
     changes: dict[str, Any] = {name: one for name, one in values.items() if "." not in name}
     for group in {name.partition(".")[0] for name in values if "." in name}:
         inner = {n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{group}.")}

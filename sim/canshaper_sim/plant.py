@@ -68,9 +68,9 @@ VALVE_ADDRESS = 0x80
 
 
 class _ValveInput:
-    """Commands for one valve, and how old the last one is.
+    """Commands for one valve, and the age of the last one.
 
-    A frame whose protection is wrong is passed over: the valve closes when no right one comes.
+    A frame with wrong protection is ignored: the valve closes when no correct frame comes in time.
     """
 
     def __init__(self, axis: str, deployment: Deployment) -> None:
@@ -86,7 +86,7 @@ class _ValveInput:
         self._known: dict[bytes, tuple[int, float]] = {}
 
     def receive(self, data: bytes) -> None:
-        """Take a command; what is none (wrong length, no velocity) closes the valve."""
+        """Take a valve frame; one of a wrong length or without a velocity closes the valve."""
         command = 0.0
         if len(data) == self._length:
             known = self._known.get(data) or self._read(data)
@@ -99,7 +99,7 @@ class _ValveInput:
         self.command = command
 
     def _read(self, data: bytes) -> tuple[int, float]:
-        """Alive counter and command of a frame, kept for when the same bytes come again."""
+        """Return alive counter and command of a frame, cached by the bytes of the frame."""
         if len(self._known) >= MOST_KNOWN:
             self._known.clear()
         reader = self._reader
@@ -128,7 +128,7 @@ class _Measurement:
         self._left_s = first_s
 
     def frames(self, crane: Crane, passed_s: float) -> Iterator[Frame]:
-        """The frame, when it is due after so much more time."""
+        """Yield the frame if it is due once passed_s more seconds have passed."""
         self._left_s -= passed_s
         if self._left_s <= 1e-9:
             self._left_s += self._cycle_s
@@ -175,18 +175,17 @@ class PlantNode:
     """Valves, crane and grapple behind the valve messages of a deployment.
 
     Args:
-        deployment: names the valve messages; what its axes move names the machine where none is
-            named.
+        deployment: names the valve messages; its axes choose the machine where ``machine`` is None.
         parameters: the crane; by default the nominal one.
         machine: one of `machines.MACHINES`.
         sway: swing of the grapple at the start; by default it hangs still.
-        unit: a crane of someone else in place of ours.
-        listeners: whether others than the controller listen; without them pose, speeds and sway
-            are only sent where the controller receives them.
+        unit: an FMU in place of our crane.
+        listeners: nodes other than the controller listen; without them pose, speeds and sway are
+            sent only if the controller receives them.
 
     Raises:
-        ConfigError: an axis that this machine does not have, or no feedback messages in the
-            DBC files.
+        ConfigError: the machine lacks an axis of the deployment, or the DBC files lack a feedback
+            message.
         ValueError: no such machine, or the joints do not reach the start pose.
     """
 
@@ -252,18 +251,18 @@ class PlantNode:
         return self._machine.crane
 
     def command(self, axis: str) -> float:
-        """What the last frame of a valve says, -1 .. 1; 0 once it has closed by itself."""
+        """Return the command in the last frame of a valve, -1 .. 1; 0 once the valve timed out."""
         return self._inputs[axis].command
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame from a bus; those that are no valve commands are passed over."""
+        """Take a frame from a bus; frames that are no command of this plant are ignored."""
         for valve in self._valves.get(frame[:3], ()):
             valve.receive(frame.data)
         if self._canopen.present:
             self._canopen.receive(frame)
 
     def advance(self, dt_s: float) -> None:
-        """Let time pass with the last commands held, as long as the valves hold them."""
+        """Let dt_s seconds pass; each valve holds its last command until its timeout."""
         self._passed_s += dt_s
         commands, canopen = {}, self._canopen
         for valve in self._inputs.values():
@@ -275,7 +274,7 @@ class PlantNode:
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:
-        """What the valves say of themselves, pose, speeds and sway as frames."""
+        """Return the due frames of valves, pose, speeds, sway, load and CANopen nodes."""
         state = self.crane.state
         frames = self._measured(state) if self._feedback else []
         for one in self._measurements:
@@ -289,7 +288,7 @@ class PlantNode:
         return frames
 
     def _measured(self, state: CraneState) -> list[Frame]:
-        """Pose, speeds and sway as frames."""
+        """Return pose, speeds and sway as frames."""
         frames = []
         for name, signals in self._feedback.items():
             sender = self._senders[name]
@@ -299,7 +298,7 @@ class PlantNode:
         return frames
 
     def _values(self, name: str, state: CraneState) -> tuple[float, ...]:
-        """Of the signals of a feedback message, in its order."""
+        """Return the values of the signals of a feedback message, in its order."""
         if name == "TipPosition":
             return _heading_deg(state.theta1_rad), state.radius_m, state.height_m
         if name == "TipVelocity":
@@ -319,7 +318,7 @@ class PlantNode:
 def _rope_values(name: str, boom: OverheadBoom) -> tuple[float, ...]:
     """Return the values of a feedback message of a crane with a rope, in the order of its signals.
 
-    An overhead crane sends its own ones, see ``OVERHEAD_FEEDBACK``.
+    An overhead crane sends messages of its own, see ``OVERHEAD_FEEDBACK``.
     """
     if name == "HookPosition":
         return (boom.signal_m,)
@@ -340,7 +339,7 @@ def _heading_deg(theta1_rad: float) -> float:
 
 
 def _axis_problems(deployment: Deployment, machine: str, *, named: bool) -> list[Problem]:
-    """Axes of the deployment that the machine does not have."""
+    """Return a problem for each axis of the deployment that the machine does not have."""
     has = f"the crane has {', '.join(AXES_OF[machine])}"
     if deployment.config.crane:
         has = f"the section crane names no coordinate of it; {has}"

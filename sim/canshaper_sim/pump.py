@@ -1,10 +1,10 @@
-"""One pump for all axes: where they ask for more oil than it delivers, they get less of it.
+"""One pump for all axes: when the valves demand more oil than it delivers, they get less.
 
 Flow is counted in full flows of one axis. Valves that share the flow behind their spools (LUDV) all
-get the same part of what they ask for, whatever their loads. Plain load sensing keeps the pressure
-that the heaviest load needs: where the flow does not last, the oil goes to the lighter loads, and
-the axis with the heaviest one starves first. How far a pump limits a forestry crane: flow
-constraint in time-optimal planning of a timber crane, arXiv 2506.20314.
+get the same part of their demand, whatever their loads. Plain load sensing keeps the pressure that
+the heaviest load needs: when the flow is too small, the oil goes to the lighter loads, and the axis
+with the heaviest load starves first. How far a pump limits a forestry crane: flow constraint in
+time-optimal planning of a timber crane, arXiv 2506.20314.
 """
 
 import math
@@ -28,7 +28,7 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PumpParameters:
-    """How the pump follows what is asked for, and how the valves share what it delivers."""
+    """How the pump follows the demand for oil, and how the valves share its flow."""
 
     lag_s: float = 0.0  # time constant with which it follows what is asked for
     shares_flow: float = 1.0  # 1: all valves get the same part; 0: plain load sensing
@@ -44,12 +44,12 @@ class PumpParameters:
 
 
 class Pump:
-    """Pump and valves in motion: ``advance`` before each step of the axes.
+    """Pump and valves in motion: call ``advance`` before each step of the axes.
 
     Args:
-        flow: most that it delivers, full axis flows.
-        parameters: how it is shared.
-        axes: what it drives, by name.
+        flow: largest flow of the pump, full axis flows.
+        parameters: lag of the pump, and how the valves share its flow.
+        axes: actuators that the pump drives, by name.
     """
 
     __slots__ = ("_by_load", "_delivered", "_flow", "_parameters")
@@ -64,7 +64,7 @@ class Pump:
         self._delivered = 0.0
 
     def advance(self, step_s: float) -> None:
-        """Share the oil of the next step among the valves, by what their spools ask for now."""
+        """Share the oil of the next step among the valves by the present demand of their spools."""
         p, valves = self._parameters, self._by_load
         asked = [abs(valve.spool * valve.ease) for valve in valves]
         total = sum(asked)

@@ -7,15 +7,15 @@ from canshaper.errors import DesignError
 
 
 def check_ranges(owner: str, values: Any, allowed: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse the first attribute of `values` outside its range, and every value that is no number.
+    """Refuse the first attribute of `values` that is outside its range or not a number.
 
     Args:
-        owner: what is described, for the message, such as "valve".
+        owner: name of the described thing for the message, such as "valve".
         values: the object whose attributes are checked.
         allowed: attribute name -> (lowest, highest) value.
 
     Raises:
-        DesignError: names owner, attribute, value and the allowed range.
+        DesignError: the message names owner, attribute, value and allowed range.
     """
     for name, (low, high) in allowed.items():
         value = getattr(values, name)

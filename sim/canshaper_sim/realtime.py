@@ -17,7 +17,7 @@ PLANT_STEP_MS = 10
 
 
 class StopFlag:
-    """True once SIGTERM or SIGINT came."""
+    """A flag that is set once SIGTERM or SIGINT came."""
 
     def __init__(self) -> None:
         self.set = False
@@ -29,7 +29,10 @@ class StopFlag:
 
 
 def open_ports(deployment: Deployment) -> dict[str, Port]:
-    """Open every bus of the deployment; faults of the simulated side are passed over.
+    """Open every bus of the deployment; faults of the simulated frames are ignored.
+
+    Returns:
+        bus name -> open port.
 
     Raises:
         BusError: a bus cannot be opened.
@@ -47,7 +50,7 @@ def open_ports(deployment: Deployment) -> dict[str, Port]:
 def run_plant(
     deployment: Deployment, parameters: CraneParameters, machine: str | None = None
 ) -> None:
-    """Be the crane until stopped: valve frames in, feedback frames out every 20 ms."""
+    """Simulate the crane until SIGTERM or SIGINT: read valve frames, send feedback every 20 ms."""
     node = PlantNode(deployment, parameters, machine)
     ports = open_ports(deployment)
     stop = StopFlag()
@@ -73,7 +76,7 @@ def run_plant(
 
 
 def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> bool:
-    """Play a script once on the joysticks, then leave them in neutral; whether all was played."""
+    """Play a script once on the joysticks, then let go; return False if a signal stopped it."""
     node = JoystickNode(deployment, script, bypass=bypass)
     ports = open_ports(deployment)
     stop = StopFlag()

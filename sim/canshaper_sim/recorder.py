@@ -1,9 +1,9 @@
-"""From the frames on the buses to a recording: what was asked, sent, and what the crane did.
+"""From frames on the buses to a recording: demand, sent frames and motion of the crane.
 
-Sway of an axis: slewing swings the grapple across the boom (perpendicular), near_far and the joints
-lift_cylinder, knuckle and extension swing it along the boom (parallel), lift by the tip excites
-none. With joint commands the three boom joints thus show the same sway, each with its own strokes.
-Bridge and trolley swing the load in their own directions, the hoist excites none.
+Sway of an axis: slewing swings the grapple across the boom (perpendicular); near_far and the joints
+lift_cylinder, knuckle and extension swing it along the boom (parallel); lift by the tip excites no
+sway. With joint commands the three boom joints thus show the same sway, each with its own strokes.
+Bridge and trolley swing the load in their own directions; the hoist excites no sway.
 """
 
 import math
@@ -50,13 +50,16 @@ _SWAY_SIGNAL = {SLEW: ACROSS, **dict.fromkeys((NEAR_FAR, LIFT_CYLINDER, KNUCKLE,
 
 
 def dwell_s(deployment: Deployment) -> float:
-    """How long after a release what swings is residual: where a run-on lasts longer, its tail."""
+    """Return the time in s after a release from which sway counts as residual.
+
+    This time is the longest tail of the axes if it exceeds twice the default, else the default.
+    """
     longest = max(axis.config.limits.tail_s for axis in deployment.axes.values())
     return longest if longest > 2.0 * DWELL_S else DWELL_S
 
 
 class Recorder:
-    """Takes every frame; one row for each sway feedback, from the first joystick frame on."""
+    """Takes every frame; keeps one row for each sway frame, from the first joystick frame on."""
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
         crane = parameters or changed_parameters([], deployment)
@@ -104,7 +107,7 @@ class Recorder:
                     self._handlers[key] = name, message.length, handler
 
     def receive(self, frame: Frame, time_s: float) -> None:
-        """Take a frame seen at this time (any origin, increasing)."""
+        """Take a frame seen at time_s; times have any origin and increase."""
         entry = self._handlers.get(frame[:3])
         if entry is None and frame.extended:  # of J1939, from any address
             entry = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
@@ -116,7 +119,7 @@ class Recorder:
             handler(frame.data, time_s)
 
     def recording(self) -> Recording:
-        """Everything so far."""
+        """Return the recording of all frames taken so far."""
         traces = {}
         for name, rows in self._rows.items():
             columns = [list(column) for column in zip(*rows, strict=True)] or [[], [], [], []]
@@ -260,6 +263,6 @@ class Recorder:
 
 
 def _from_above(heading: float, out_m: float, across_m: float) -> Point:
-    """(x, y) about the pillar of a point that far out along the boom, and in slew direction."""
+    """Return (x, y) about the pillar, m, of a point so far along the boom and in slew direction."""
     cosine, sine = math.cos(heading), math.sin(heading)
     return out_m * cosine - across_m * sine, out_m * sine + across_m * cosine

@@ -1,4 +1,4 @@
-"""A recorded drive: what the operator asked, what the valves were sent, what the crane did."""
+"""A recorded drive: the operator's demand, the sent valve frames, and the motion of the crane."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -12,8 +12,8 @@ class AxisTrace:
     """One axis over a drive; every list is as long as the recording's ``t_s``.
 
     Attributes:
-        joystick: operator command, [-1, 1] of full speed.
-        sent: velocity command carried by the valve frame (deadband compensation undone), [-1, 1].
+        joystick: demand of the operator, [-1, 1] of full speed.
+        sent: velocity setpoint in the valve frame (deadband compensation undone), [-1, 1].
         speed: speed of the tip in this axis as a fraction of the axis' full speed.
         sway_deg: swing of the grapple in the plane of this axis (slew: theta5, near-far: theta6),
             degrees; None for an axis that excites no swing (lift).
@@ -27,13 +27,13 @@ class AxisTrace:
 
 @dataclass(frozen=True)
 class CraneTrace:
-    """Tip and grapple over a drive; every list with values is as long as the recording's ``t_s``.
+    """Tip and grapple over a drive; every non-empty list is as long as the recording's ``t_s``.
 
     Attributes:
         tip_m: tip of the boom from above, m; x points along the boom that has not slewed. Empty
-            where nothing measures it.
-        grapple_m: grapple from above, m; empty where nothing measures it.
-        sway_deg: total swing: both planes together, root of the sum of squares, degrees.
+            if no sensor measures it.
+        grapple_m: grapple from above, m; empty if no sensor measures it.
+        sway_deg: total swing of both planes, as the root of the sum of squares, degrees.
     """
 
     tip_m: list[Point]
@@ -45,8 +45,8 @@ class CraneTrace:
 class Recording:
     """A drive on a common time base (seconds from its start, increasing).
 
-    ``crane`` is None where nothing says where the tip is and how the grapple swings; swing is
-    residual from ``dwell_s`` after a release on.
+    ``crane`` is None if the drive has neither the place of the tip nor the total swing. From
+    ``dwell_s`` seconds after a release on, swing counts as residual.
     """
 
     t_s: list[float]

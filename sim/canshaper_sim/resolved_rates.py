@@ -5,10 +5,11 @@ Joint rates are fractions of full speed u, tip velocities m/s. With A the Jacobi
     u = s p + t n,    p = A^T (A A^T + lambda^2 I)^-1 v,    A n = 0, |n| = 1
 
 p is the damped least-squares solution (Nakamura and Hanafusa 1986, Wampler 1986): exact while the
-manipulability w = sqrt(det A A^T) is good, bounded where it is not. n is the one motion that leaves
-the tip where it is. Damping alone bends the way of the tip where a joint is blocked; so the bounds
-are kept by t as far as it can, and beyond that by s <= 1, which slows the tip down and leaves its
-direction: a linear programme in (s, t) whose best s is found pair by pair of bounds.
+manipulability w = sqrt(det A A^T) is good, bounded where it is not. n is the one joint motion that
+does not move the tip. Damping alone bends the path of the tip where a joint is blocked. So t keeps
+the rates within their bounds as far as it can; beyond that s <= 1 does, which slows the tip down
+and keeps its direction: a linear programme in (s, t), whose best s is found over all pairs of
+bounds.
 """
 
 import math
@@ -38,7 +39,7 @@ class Bounds(NamedTuple):
 
 
 class ResolvedRates:
-    """Solves at one pose for any number of tip velocities."""
+    """Solver of the joint rates in one pose, for any number of tip velocities."""
 
     __slots__ = ("_height", "_inverse", "_radius", "free")
 
@@ -70,7 +71,7 @@ class ResolvedRates:
             self.free = (cross[0] * f, cross[1] * f, cross[2] * f)
 
     def least_squares(self, radius_speed: float, height_speed: float) -> Vector:
-        """The damped least-squares rates p."""
+        """Return the damped least-squares rates p for a tip velocity in m/s."""
         a, b, c = self._inverse
         y_r = a * radius_speed + b * height_speed
         y_z = b * radius_speed + c * height_speed
@@ -90,7 +91,8 @@ class ResolvedRates:
             preferred: the t that is preferred where the bounds leave a choice.
 
         Returns:
-            (s, s p + t n): the largest s the bounds allow, at most 1, t nearest to ``preferred``.
+            (s, s p + t n), with the largest s <= 1 that the bounds allow, t nearest to
+            ``preferred``.
         """
         floors, ceilings, scale = self._lines(rates, bounds)
         for at_low, by_low in floors:
@@ -114,7 +116,7 @@ class ResolvedRates:
     def _lines(
         self, rates: Vector, bounds: Bounds
     ) -> tuple[list[tuple[float, float]], list[tuple[float, float]], float]:
-        """Bounds on t as (at, by), meaning at - s by; and the s of joints that n does not move."""
+        """Return bounds on t as (at, by): at - s by; and the s of joints that n does not move."""
         floors: list[tuple[float, float]] = []
         ceilings: list[tuple[float, float]] = []
         scale = 1.0
@@ -134,7 +136,7 @@ class ResolvedRates:
 
 
 def less(bounds: Bounds, used: Sequence[float]) -> Bounds:
-    """What the rates `used` leave of the bounds."""
+    """Return the bounds that remain once the rates `used` are taken."""
     low, high = bounds
     return Bounds(
         (min(0.0, low[0] - used[0]), min(0.0, low[1] - used[1]), min(0.0, low[2] - used[2])),

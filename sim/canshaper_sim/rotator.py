@@ -1,14 +1,14 @@
-"""The rotator, and what a log does to the swing that hangs from it off its middle or is long.
+"""The rotator, and how a log that is long or gripped off its middle changes the grapple's swing.
 
-The log turns with the rotator, n being its horizontal direction seen from the boom, and q the tilt
-of the grapple outwards and in slew direction. Its centre, e from the line through the joints,
-pulls the grapple askew; its moment of inertia J counts in the plane of the log only, so a swing
-that is neither along nor across the log wanders between the two planes. Of the rigid body by
-Lagrange, in small angles:
+The log turns with the rotator; n is the horizontal direction of the log seen from the boom, and q
+the tilt of the grapple outwards and in slew direction. The centre of the log, at distance e from
+the line through the joints, pulls the grapple askew. The log's moment of inertia J counts in the
+plane of the log only, so a swing that is neither along nor across the log wanders between the two
+planes. By Lagrange for the rigid body, at small angles:
 
     M q'' + J n (n . q'') = M q''(of a point mass) - m e ((g + z'') n + l n'')
 
-The rotator holds against the log and draws no oil from the pump. It does 6 to 12 rounds a minute.
+The rotator holds the log in place and draws no oil from the pump. It turns 6 to 12 times a minute.
 """
 
 import math
@@ -26,7 +26,7 @@ _ALLOWED = {"full_speed_rad_s": (0.1, 5.0), "start_deg": (-360.0, 360.0)}
 
 @dataclass(frozen=True, slots=True)
 class RotatorParameters:
-    """The rotator; it matters with a log that is long or is held off its middle."""
+    """The rotator; it matters only with a log that is long or gripped off its middle."""
 
     valve: ValveParameters = field(default_factory=ValveParameters)
     full_speed_rad_s: float = 1.0
@@ -37,11 +37,11 @@ class RotatorParameters:
 
 
 class Rotator:
-    """The rotator in motion, empty at first.
+    """The rotator in motion, at first without a log.
 
     Args:
-        parameters: of the rotator.
-        log: what it will hold.
+        parameters: valve, full speed and start angle of the rotator.
+        log: the log that the grapple will grip.
     """
 
     __slots__ = ("_inertia", "_log", "_off_m", "axis")
@@ -52,14 +52,14 @@ class Rotator:
         self._log, self._off_m, self._inertia = log, 0.0, 0.0
 
     def grip(self, loaded: Grapple) -> None:
-        """Hold the log, with which the grapple is this one."""
+        """Hold the log; `loaded` is the grapple with the log."""
         log, off = self._log, self._log.off_centre_m
         part = log.mass_kg / loaded.m2_kg
         self._off_m = off * part
         self._inertia = log.mass_kg * (log.length_m**2 / 12.0 + off * off * (1.0 - part))
 
     def lean(self, grapple: Grapple) -> tuple[float, float]:
-        """(theta5, theta6) that the log holds the grapple askew by, rad."""
+        """Return the angles (theta5, theta6) in rad by which the log pulls the grapple askew."""
         pull = grapple.m2_kg * self._off_m
         down = grapple.m1_kg * grapple.l1_m + grapple.m2_kg * (grapple.l1_m + grapple.l2_m)
         askew = math.cos(self.axis.position) * self._off_m / grapple.l2_m
@@ -68,7 +68,7 @@ class Rotator:
     def accelerations(
         self, grapple: Grapple, tip: TipMotion, free: tuple[float, float]
     ) -> tuple[float, float]:
-        """(theta5'', theta6'') with the log, of those without it; see `grapple.accelerations`."""
+        """Return (theta5'', theta6'') with the log, given `free`, those without it; rad/s^2."""
         n = math.cos(self.axis.position), math.sin(self.axis.position)
         m1, m2, l1, l2 = grapple.m1_kg, grapple.m2_kg, grapple.l1_m, grapple.l2_m
         lengths, inertias = (l2, l1 + l2), (m2 * l2**2, m1 * l1**2 + m2 * (l1 + l2) ** 2)

@@ -1,4 +1,4 @@
-"""Built-in operator scripts: pulses, a demonstration, loading; of tips, joints and ropes."""
+"""Built-in operator scripts: pulses, a demonstration, loading; for tips, joints and ropes."""
 
 from canshaper_sim.axes import (
     BRIDGE,

@@ -14,14 +14,14 @@ from canshaper_sim.sway_sensor import SwaySensor, SwaySensorParameters
 
 
 class SensorMessage:
-    """A message with the measurements of one sensor or several, sent each cycle.
+    """A message with the measurements of one or several sway sensors, sent each cycle.
 
     Args:
-        axes: the sensors of the deployment that are read from it, by axis.
-        parameters: what they make of the swing.
+        axes: axis -> the sway sensor of the deployment that is read from this message.
+        parameters: errors of the sensors.
 
     Attributes:
-        node: name of the node of CANopen that sends it; None without one that is watched.
+        node: name of the CANopen node that sends the message; None if no watched node sends it.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class SensorMessage:
         }
 
     def frames(self, state: CraneState, passed_s: float) -> Iterator[Frame]:
-        """The frame, when it is due after so much more time."""
+        """Yield the frame if it is due once passed_s more seconds have passed."""
         time_s = state.time_s
         sway = Sway(
             state.theta5_rad, state.theta6_rad, state.theta5_rate_rad_s, state.theta6_rate_rad_s
@@ -72,7 +72,7 @@ class SensorMessage:
 def sensor_messages(
     deployment: Deployment, parameters: SwaySensorParameters
 ) -> list[SensorMessage]:
-    """Every message with sway that the deployment reads."""
+    """Return every message with sway that the deployment reads."""
     messages: dict[tuple[str, int, bool], dict[str, BoundSwaySensor]] = {}
     for name, axis in deployment.axes.items():
         if bound := axis.sway_sensor:

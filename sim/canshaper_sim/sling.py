@@ -1,8 +1,9 @@
-"""A load on a sling below a hook: with the rope a double pendulum; it may stand on the ground.
+"""A load on a sling below a hook, a double pendulum with the rope; it may stand on the ground.
 
-The load is a point in the world, drawn by the sling while that is taut, carried by the ground and
-held by its friction while it stands there. Sling and ground are springs per kg of load, as stiff as
-the steps allow: some 6 mm under the load at rest. A drive feels nothing of it.
+The load is a point in the world. A taut sling pulls it; while it stands on the ground, the ground
+carries it and friction holds it. Sling and ground are springs per kg of load, as stiff as the step
+length allows: about 6 mm of deflection under the load at rest. The drives feel no force of the
+load.
 """
 
 import math
@@ -38,17 +39,17 @@ class SlingParameters:
 
 
 class SlungLoad:
-    """The load: where it is, and what the sling does to both of its ends.
+    """The load on a sling, and the force of the sling on both of its ends.
 
     Args:
-        parameters: of the sling.
-        damping_ratio: of a swing about the hook.
+        parameters: the sling.
+        damping_ratio: damping ratio of a swing about the hook.
         g_m_s2: gravity.
-        hook: where the hook hangs, from the trolley, m; the load below it in line with the rope.
+        hook: position of the hook relative to the trolley, m; the load hangs in line with the rope.
 
     Attributes:
         position: along the runway, along the bridge, upwards, from where the trolley began, m.
-        rate: its velocity, m/s.
+        rate: velocity of the load, m/s.
     """
 
     def __init__(
@@ -62,15 +63,15 @@ class SlungLoad:
         self.rate: Vector = (0.0, 0.0, 0.0)
 
     def pull(self, part_s: float, hook: Vector, hook_rate: Vector) -> Vector:
-        """Change the load's rate by what acts for part_s seconds.
+        """Change the load's velocity by the forces that act on it for part_s seconds.
 
         Args:
-            part_s: how long.
-            hook: position, as that of the load.
-            hook_rate: its rate, m/s.
+            part_s: duration, s.
+            hook: position of the hook, in the coordinates of the load, m.
+            hook_rate: velocity of the hook, m/s.
 
         Returns:
-            by how much the rate of the hook changes, were it free.
+            the change of the hook's velocity, as if it were free, m/s.
         """
         x, y, z = held = self._held(plus(hook, -1.0, self.position), hook_rate)
         vx, vy, vz = self.rate
@@ -84,7 +85,7 @@ class SlungLoad:
         return plus((0.0, 0.0, 0.0), -part_s * self._p.load_ratio, held)
 
     def _held(self, up: Vector, hook_rate: Vector) -> Vector:
-        """Return the pull of the sling at the load, m/s^2; none while it is slack."""
+        """Return the pull of the sling at the load, m/s^2; zeros while the sling is slack."""
         apart = math.sqrt(dot(up, up))
         stretch = apart - self._p.length_m
         if stretch <= 0.0:
@@ -96,7 +97,7 @@ class SlungLoad:
 
 
 def plus(first: Vector, factor: float, second: Vector) -> Vector:
-    """Return the first and so many times the second."""
+    """Return first + factor * second."""
     return (
         first[0] + factor * second[0],
         first[1] + factor * second[1],
@@ -105,5 +106,5 @@ def plus(first: Vector, factor: float, second: Vector) -> Vector:
 
 
 def dot(first: Vector, second: Vector) -> float:
-    """Return their product."""
+    """Return the dot product of two vectors."""
     return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]

@@ -1,9 +1,9 @@
 """Joystick strokes over time, repeatable to the last bit.
 
 A stroke is a trapezoid: the joystick leaves neutral at its start, reaches its level one ramp later,
-is let go at start + duration and is neutral one ramp after that. Strokes of one axis add up, so
-two that follow each other without a pause make one straight movement from level to level, a
-reversal included. The area under a stroke is level times duration, whatever the ramp.
+is released at start + duration and is neutral one ramp after that. Strokes of one axis add up, so
+two strokes without a pause between them make one straight movement from level to level, even if the
+level changes its sign. The area under a stroke is level times duration, whatever the ramp.
 """
 
 import math
@@ -48,11 +48,11 @@ class Stroke:
 
     @property
     def end_s(self) -> float:
-        """When the joystick is neutral again."""
+        """Time in s when the joystick is neutral again."""
         return self.start_s + self.duration_s + self.ramp_s
 
     def command(self, time_s: float) -> float:
-        """Joystick value of this stroke alone."""
+        """Return the joystick value of this stroke alone, -1 .. 1."""
         since_press = time_s - self.start_s
         if since_press < 0.0:
             return 0.0
@@ -68,7 +68,7 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """Strokes of the operator in duration_s seconds; neutral before, between and after."""
+    """Strokes of the operator in duration_s seconds; the joystick is neutral between strokes."""
 
     name: str
     strokes: tuple[Stroke, ...]
@@ -94,22 +94,25 @@ class Script:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The axes this script moves, in the order of ALL_AXES; others behind, as they come."""
+        """The axes that this script moves, in the order of ALL_AXES; axes of other names follow."""
         moved = dict.fromkeys(stroke.axis for stroke in self.strokes)
         known = tuple(axis for axis in ALL_AXES if axis in moved)
         return known + tuple(axis for axis in moved if axis not in ALL_AXES)
 
     def moving(self, axes: Mapping[str, str]) -> "Script":
-        """Return the script with axes in place of the coordinates that they move; no others."""
+        """Return the script with axes in place of coordinates; other strokes are dropped.
+
+        `axes` maps coordinate to axis.
+        """
         moved = tuple(replace(s, axis=axes[s.axis]) for s in self.strokes if s.axis in axes)
         return Script(self.name, moved, self.duration_s)
 
     def of_axis(self, axis: str) -> tuple[tuple[float, float, Stroke], ...]:
-        """The strokes of an axis in order of time, each with when it begins and is over."""
+        """Return (start, end, stroke), times in s, of each stroke of an axis, in order of time."""
         return self._by_axis.get(axis, ())
 
     def command(self, axis: str, time_s: float) -> float:
-        """Joystick value -1 .. 1 of one axis; neutral for an axis the script does not move."""
+        """Return the joystick value of an axis, -1 .. 1; 0 for an axis without strokes."""
         strokes = self._by_axis.get(axis)
         if strokes is None:
             return 0.0

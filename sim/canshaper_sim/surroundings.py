@@ -1,4 +1,4 @@
-"""Surroundings that pull at the grapple: ground, carrier, wind, and how a log hangs in it."""
+"""Surroundings that act on the grapple: ground, carrier, wind, and the log on its rotator."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from canshaper_sim.wind import Wind
 
 @dataclass(slots=True)
 class Surroundings:
-    """Those that there are."""
+    """The surroundings of one crane; an absent one is None."""
 
     contact: ContactParameters | None
     carrier: Carrier | None
@@ -20,18 +20,18 @@ class Surroundings:
 
     @property
     def none(self) -> bool:
-        """Whether the grapple hangs free from a crane on level ground."""
+        """True if the grapple hangs free from a crane on level ground."""
         return not (self.contact or self.carrier or self.wind or self.rotator)
 
     def settle(self, grapple: Grapple, tip: TipMotion) -> None:
-        """Let the carrier lean under what hangs still from its tip."""
+        """Let the carrier lean under the grapple at rest."""
         for _ in range(4):  # each leans on the other, by less every time
             if self.carrier:
                 sway = Sway(*self.rest(grapple, tip.slew_rad, tip.radius_m))
                 self.carrier.settle(grapple, sway, tip)
 
     def rest(self, grapple: Grapple, slew_rad: float, radius_m: float) -> tuple[float, float]:
-        """(theta5, theta6) in rad at which the grapple would hang still, in the present wind."""
+        """Return (theta5, theta6) in rad at which the grapple hangs still in the present wind."""
         theta5, theta6 = rest(grapple, *self.pushes(grapple, slew_rad, radius_m))
         askew = self.rotator.lean(grapple) if self.rotator else (0.0, 0.0)
         return theta5 + askew[0], theta6 + askew[1]
@@ -48,7 +48,7 @@ class Surroundings:
     def accelerations(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """(theta5'', theta6'') with all of them; see `grapple.accelerations`."""
+        """Return (theta5'', theta6'') with all surroundings, rad/s^2; see `accelerations`."""
         across, along = accelerations(grapple, sway, tip)
         if self.contact:
             held = self.contact.accelerations(grapple, sway, tip)
@@ -61,7 +61,7 @@ class Surroundings:
         return across, along
 
     def pushes(self, grapple: Grapple, slew_rad: float, radius_m: float) -> tuple[Push, Push]:
-        """Return the forces on link and grapple in addition to the gravity of level ground."""
+        """Return the forces on link and grapple besides the gravity of level ground, N/kg."""
         link = self.carrier.push(slew_rad, radius_m) if self.carrier else (0.0, 0.0, 0.0)
         if self.wind is None:
             return link, link

@@ -1,4 +1,4 @@
-"""A sway sensor on the simulated grapple: noise, offset, delay, and what can go wrong with it."""
+"""A sway sensor on the simulated grapple: noise, offset, delay, and its faults."""
 
 import math
 import random
@@ -31,9 +31,9 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class SwaySensorParameters:
-    """Errors of a sway sensor; of one of the rate, in degrees per second.
+    """Errors of a sway sensor, in degrees; for a sensor of the rate, in degrees per second.
 
-    A fault begins at its time, seconds from the start; by default never.
+    Each fault begins at its time, in seconds from the start; by default never.
     """
 
     noise_deg: float = 0.1  # standard deviation
@@ -55,13 +55,13 @@ class SwaySensorParameters:
 
 
 class SwaySensor:
-    """One sensor.
+    """One sway sensor of one axis.
 
     Args:
-        parameters: what it makes of the swing.
-        name: of its own, for noise of its own.
-        across: it measures across the boom (theta5), else along it (theta6).
-        kind: what it measures.
+        parameters: errors of the sensor.
+        name: name of the sensor, which seeds its noise.
+        across: the sensor measures across the boom (theta5), else along it (theta6).
+        kind: the measured quantity.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class SwaySensor:
         self._stuck: float | None = None
 
     def swing(self, time_s: float, sway: Sway) -> None:
-        """The grapple has moved on."""
+        """Take the sway of the grapple at time_s."""
         rate = self._kind == "rate"
         if self._across:
             swing = sway.theta5_rate_rad_s if rate else sway.theta5_rad
@@ -96,14 +96,14 @@ class SwaySensor:
             past.popleft()
 
     def _fused(self, angle: float, passed_s: float) -> float:
-        """An angle by a gyro that accelerations correct: they show 0 on a free pendulum."""
+        """Return a gyro's angle corrected by accelerations, which show 0 on a free pendulum."""
         fusion_s = self._parameters.fusion_s
         share = -math.expm1(-passed_s / fusion_s) if fusion_s else 1.0
         self._hidden += share * (angle - self._hidden)
         return angle - self._hidden
 
     def value(self, time_s: float) -> float:
-        """Its measurement, degrees or degrees per second."""
+        """Return the measurement, degrees or degrees per second."""
         p = self._parameters
         gain = -p.gain if time_s >= p.reversed_s else p.gain
         value = gain * self._past[0][1] + p.offset_deg + self._noise.gauss(0.0, p.noise_deg)

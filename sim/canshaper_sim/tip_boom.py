@@ -1,4 +1,4 @@
-"""What carries the grapple, and the boom whose tip is moved directly, coordinate by coordinate."""
+"""The interface of a boom, and the boom whose tip the valves move directly, by its coordinates."""
 
 from typing import Protocol
 
@@ -8,7 +8,7 @@ from canshaper_sim.grapple import TipMotion, new_tuple
 
 
 class CraneBoom(Protocol):
-    """What carries the grapple: its actuators by axis name, and how they move the tip."""
+    """A boom that carries the grapple: its actuators by axis name, and the motion of its tip."""
 
     axes: dict[str, Actuator]
 
@@ -17,11 +17,11 @@ class CraneBoom(Protocol):
         """theta1, radius, height and their rates; rad, m, per second."""
 
     def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
+        """Advance by step_s seconds; return the tip motion at start, middle and end of the step."""
 
 
 class TipBoom:
-    """The tip itself, moved by a valve in each cylindrical coordinate."""
+    """A boom without joints: one valve moves the tip in each cylindrical coordinate."""
 
     __slots__ = ("_lift", "_near_far", "_slew", "axes")
 
@@ -43,7 +43,7 @@ class TipBoom:
         )
 
     def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
+        """Advance by step_s seconds; return the tip motion at start, middle and end of the step."""
         slew, near_far, lift = self._slew, self._near_far, self._lift
         start_radius, start_radius_rate = near_far.position, near_far.speed
         start_slew, start_slew_rate = slew.position, slew.speed

@@ -1,9 +1,9 @@
 """A machine-side tip controller: tip commands in, joint valve commands out, tick by tick.
 
-The block between anti-sway filter and valves in Figure 5 of "Optimal sway motion reduction in
-forestry cranes" (2024): the filter shapes the speed of the tip, the tip controller makes joints
-move it. It is simulated as a machine maker's own controller would be: it knows lengths, joint
-positions and full speeds, and of its valves the deadband and roughly the delay, and no more.
+This is the block between anti-sway filter and valves in Figure 5 of "Optimal sway motion reduction
+in forestry cranes" (2024): the filter shapes the speed of the tip; the tip controller computes the
+joint rates that give it. It knows what a machine maker's own controller would know: lengths, joint
+positions, full speeds, the deadband of its valves and roughly their delay.
 """
 
 import math
@@ -34,7 +34,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class TipControllerParameters:
-    """How the tip controller is set."""
+    """Parameters of the tip controller."""
 
     period_s: float = 0.01  # cycle of a common crane controller
     # Deadband of its command input, that of the valves it stands in for: a deployment made for tip
@@ -77,7 +77,7 @@ class TipController:
         joints: JointParameters,
         tip_full_speeds: tuple[float, float, float],
     ) -> None:
-        """For this boom; tip_full_speeds are those of slew (rad/s), near_far and lift (m/s)."""
+        """Control this boom; tip_full_speeds are those of slew (rad/s), near_far and lift (m/s)."""
         p = self._p = parameters
         self.period_s = p.period_s
         self._boom = joints.boom
@@ -102,10 +102,10 @@ class TipController:
     def tick(
         self, commands: Mapping[str, float], joints: tuple[float, float, float, float]
     ) -> dict[str, float]:
-        """Joint commands, -1 .. 1, for the tip commands as their frames carry them.
+        """Return the joint commands, axis -> -1 .. 1, for the tip commands of the valve frames.
 
         Args:
-            commands: value of the valve frames of slew, near_far and lift; missing ones are 0.
+            commands: values of the valve frames of slew, near_far and lift; a missing one is 0.
             joints: measured positions: slew, lift and knuckle in rad, extension in m.
         """
         slew, near_far, lift = (self._input(commands.get(name, 0.0)) for name in TIP_AXES)
@@ -130,7 +130,7 @@ class TipController:
         }
 
     def _boom_rates(self, near_far: float, lift: float, joints: Vector, limits: Bounds) -> Vector:
-        """Rates of the boom joints, fractions of full speed."""
+        """Return the rates of the boom joints, fractions of full speed."""
         solver = ResolvedRates(self._boom.jacobian(*joints), self._full, self._p.damping_m_s)
         radius_speed, height_speed = self._tip_full[1] * near_far, self._tip_full[2] * lift
         rates_of_tip = solver.least_squares(radius_speed, height_speed)
@@ -149,7 +149,7 @@ class TipController:
         return rates
 
     def _posture(self, joints: Vector, free: Vector, activity: float) -> float:
-        """How much self-motion brings the joints nearest to the middle of their ranges."""
+        """Return the self-motion t that draws the joints to the middle of their ranges."""
         pull = sum(
             n * (middle - q) / half
             for n, q, (middle, half) in zip(free, joints, self._middles, strict=True)
@@ -157,7 +157,7 @@ class TipController:
         return self._p.posture * activity * pull
 
     def _bounds(self, name: str, position: float, full_speed: float) -> tuple[float, float]:
-        """Rates that still leave the joint a smooth stop before its margin."""
+        """Return lowest and highest rate from which the joint stops smoothly before its margin."""
         low, high = self._ranges[name]
         slope = self._p.braking_1_s / full_speed
         return (

@@ -1,7 +1,7 @@
 """A tower crane: slew, trolley and hoist; a load that hangs from a rope below a turning jib.
 
-The rope is that of ``overhead``. What it hangs from turns about the pillar, so it has these
-accelerations outwards and in the direction of slew, R from the pillar and turned by phi:
+The rope is that of ``overhead``. The trolley turns about the pillar. At distance R from the pillar
+and slew angle phi its accelerations outwards and in slew direction are:
 
     a_r = R'' - R phi'^2        a_t = R phi'' + 2 R' phi'
 """
@@ -33,7 +33,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class TowerParameters(RopeParameters):
-    """Drives, full speeds and ways of one tower crane, its rope and where it begins."""
+    """Drives, full speeds and ranges of one tower crane, its rope and its start pose."""
 
     slew: ValveParameters = field(default_factory=drive)
     near_far: ValveParameters = field(default_factory=drive)  # the trolley
@@ -53,7 +53,7 @@ class TowerParameters(RopeParameters):
         self.check("tower", _ALLOWED | reach)
 
     def boom(self, ends: EndParameters) -> "RopedBoom":
-        """Trolley and rope at the start."""
+        """Return trolley and rope in the start pose."""
         reach = self.start_radius_m, self.radius_min_m, self.radius_max_m
         height = self.jib_m, self.jib_m, self.jib_m
         jib = TipBoom(
@@ -68,10 +68,10 @@ class RopedBoom(OverheadBoom):
     """A boom with a rope at its tip, and the load on it.
 
     Args:
-        carrier: the boom.
-        fixed: coordinate of it that has no drive.
-        parameters: of the rope.
-        ends: of its hoist.
+        carrier: the boom that carries the rope.
+        fixed: coordinate of this boom that has no drive.
+        parameters: hoist and rope.
+        ends: end stops of the hoist.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class RopedBoom(OverheadBoom):
         self.carrier = carrier
 
     def swing(self, sway: "Sway") -> None:
-        """Let the load hang with these angles of a grapple."""
+        """Let the load hang at these angles of a grapple."""
         inwards = math.sin(sway.theta6_rad)
         across = math.cos(sway.theta6_rad) * math.sin(sway.theta5_rad)
         down = math.sqrt(1.0 - inwards * inwards - across * across)
@@ -96,7 +96,7 @@ class RopedBoom(OverheadBoom):
 
     @property
     def angles(self) -> tuple[float, float, float, float]:
-        """Swing as a grapple's: theta5 in the direction of slew, theta6 inwards; rad, and rates."""
+        """Angles (rad), then rates (rad/s): theta5 in slew direction, theta6 inwards."""
         (x, y, z), (vx, vy, vz) = self.load, self.rate
         cosine, sine = self._heading
         turn = self.axes[SLEW].speed
@@ -120,7 +120,7 @@ class RopedBoom(OverheadBoom):
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius and height of what the rope hangs from, and their rates."""
+        """theta1, radius and height of the point from which the rope hangs, and their rates."""
         return self.carrier.pose
 
     def advance(self, step_s: float) -> None:

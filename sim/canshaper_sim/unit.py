@@ -1,7 +1,7 @@
-"""A crane of someone else: a co-simulation unit (FMU) in place of ours, run by fmpy.
+"""A third party's crane: a co-simulation unit (FMU) in place of our crane, run by fmpy.
 
-Its variables are those of the unit that ``canshaper export --fmu plant`` makes. Only letters and
-digits of a name count, and not their case: ``Slew_Command`` is ``slew.command``.
+Its variables have the names of the unit that ``canshaper export --fmu plant`` makes. Of a name only
+letters and digits count, in either case: ``Slew_Command`` is ``slew.command``.
 """
 
 import math
@@ -26,13 +26,13 @@ _SAME = 1e-9
 
 
 class Unit:
-    """A unit of FMI 2.0 or 3.0, unpacked.
+    """An unpacked unit of FMI 2.0 or 3.0.
 
     Args:
-        path: the file.
+        path: the FMU file.
 
     Raises:
-        DesignError: it is none, or not for co-simulation.
+        DesignError: the file is no such unit, or not for co-simulation.
         ModuleNotFoundError: fmpy is not installed.
     """
 
@@ -59,16 +59,16 @@ class Unit:
     def crane(
         self, axes: Mapping[str, str], tick_s: float, parameters: CraneParameters
     ) -> "UnitCrane":
-        """Begin a drive.
+        """Instantiate the unit and return its crane at the start of a drive.
 
         Args:
-            axes: names by what they move.
-            tick_s: how long each step is.
-            parameters: of what the unit does not say: the speeds of a full command.
+            axes: coordinate -> name of the axis that moves it.
+            tick_s: length of each step.
+            parameters: full speeds of the axes, which the unit does not have.
 
         Raises:
-            DesignError: it is the crane of other axes, or has another step.
-            DriveError: it does not begin.
+            DesignError: the unit has other axes or another step.
+            DriveError: the unit does not start.
         """
         if others := {*axes} - {*TIP_AXES, ROTATOR}:
             text = f"expected axes that move the tip, got {', '.join(sorted(others))}"
@@ -120,7 +120,7 @@ class Unit:
 
 
 class _Slave:
-    """A unit that runs."""
+    """A running instance of a unit."""
 
     def __init__(self, path: Path, slave: Any, said: list[str]) -> None:
         self._path, self._slave, self._said = path, slave, said
@@ -129,15 +129,15 @@ class _Slave:
         weakref.finalize(self, _end, slave)
 
     def read(self, references: Sequence[int]) -> list[float]:
-        """Values of these variables."""
+        """Return the values of these variables."""
         values: list[float] = self._get(references)
         return values
 
     def step(self, time_s: float, dt_s: float, commands: Mapping[int, float]) -> None:
-        """Go on with these commands.
+        """Hold these commands for dt_s seconds from time_s on.
 
         Raises:
-            DriveError: it does not.
+            DriveError: the unit fails.
         """
         try:
             self._set([*commands], [*commands.values()])
@@ -154,7 +154,7 @@ def _end(slave: Any) -> None:
 
 
 class UnitCrane(Crane):
-    """Crane whose motion is that of a unit. It takes no load, no initial swing, no parameters."""
+    """A crane moved by a unit; it has no load, no initial swing and no parameters of our crane."""
 
     def __init__(
         self,
@@ -172,7 +172,7 @@ class UnitCrane(Crane):
 
     @property
     def state(self) -> CraneState:
-        """Its pose, speeds and swing."""
+        """Pose, tip speeds and sway from the outputs of the unit."""
         pose, speeds = [*self.boom.pose[:3]], [0.0, 0.0, 0.0]
         count, sway = len(self._moved), self._values[-4:]
         for k, axis in enumerate(self._moved):
@@ -181,18 +181,18 @@ class UnitCrane(Crane):
         return CraneState(self._time_s, *pose, *speeds, *sway)
 
     def speed(self, axis: str) -> float:
-        """Speed of an axis, rad/s or m/s."""
+        """Return the speed of an axis, rad/s or m/s."""
         return self._values[len(self._moved) + self._moved.index(axis)]
 
     def opening(self, axis: str) -> float:
-        """Command of its valve, which says nothing else of itself."""
+        """Return the command of an axis, since a unit does not report the opening of its valve."""
         return self._commands[axis]
 
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
-        """Hold the commands; an axis without one keeps its last.
+        """Hold the commands for dt_s seconds; an axis without a command keeps its last one.
 
         Raises:
-            DriveError: the unit does not go on.
+            DriveError: the unit fails.
         """
         self._commands |= {one: value for one, value in commands.items() if one in self._commands}
         given = {self._inputs[one]: value for one, value in self._commands.items()}
@@ -206,7 +206,7 @@ class UnitCrane(Crane):
 
 @cache
 def unit_of(path: Path) -> Unit:
-    """The unit of a file, unpacked once in a process; see ``Unit``."""
+    """Return the unit of a file; each process unpacks a file once."""
     return Unit(path)
 
 

@@ -3,11 +3,11 @@
 The command goes, in this order, through dead time (bus, valve electronics), the hysteresis of the
 magnet, the deadband of the spool, the flow limit, the rate limit of the spool and the first-order
 lag of oil and actuator. All values are fractions of the full speed of the axis. Between two changes
-of the command the spool moves on straight lines, so rate limit and lag are solved exactly for any
+of the command the spool moves at a constant rate, so rate limit and lag are solved exactly for any
 step length.
 
-Without a pressure compensator the flow is that through an orifice, the root of the pressure that
-the load leaves (Merritt, Hydraulic Control Systems, 1967): an axis is slower against its load than
+Without a pressure compensator the flow is that through an orifice, the root of the pressure left by
+the load (Merritt, Hydraulic Control Systems, 1967): an axis moves slower against its load than
 with it. A cylinder is faster towards its rod, by the ratio of its areas, 1.25 to 2
 (``negative_gain``).
 """
@@ -57,7 +57,7 @@ class ValveParameters:
         check_ranges("valve", self, _ALLOWED)
 
     def flow(self, command: float) -> float:
-        """Speed in the steady state for a command, both as fractions: deadband and flow limit.
+        """Return the steady-state speed for a command, behind deadband and flow limit; fractions.
 
         Just outside the deadband the flow starts at zero; a full command gives a full flow.
         """
@@ -74,15 +74,16 @@ class ValveParameters:
         return math.copysign(min(opening, most), command)
 
     def against(self, gripped_kg: float) -> float:
-        """Pressure that the load takes in the positive direction with so much in the grapple."""
+        """Return the pressure of the load in the positive direction, fraction of the supply's."""
         return self.load + self.load_per_t * gripped_kg / 1000.0
 
 
 class Valve:
-    """A valve in motion: `set_command`, then `advance` in steps, read `speed`.
+    """A valve in motion: call `set_command`, then `advance` in steps, read `speed`.
 
-    `supply` is the part of the oil that it asks for which it gets in the next step; 1 by itself.
-    `ease` is what its load makes of the flow, where nothing compensates it.
+    `supply` is the part of its demanded oil that the valve gets in the next step, 1 unless
+    pump or load set it.
+    `ease` is the factor of the load on the flow where no compensator cancels it.
     """
 
     __slots__ = (
@@ -120,7 +121,7 @@ class Valve:
         self._decay = 1.0
 
     def set_command(self, command: float) -> None:
-        """The valve frame carries `command` from now on; -1 .. 1, larger values meet the limit.
+        """Hold `command`, -1 .. 1, from now on; the flow limit bounds larger values.
 
         Raises ValueError for a value that is not finite.
         """
@@ -141,7 +142,7 @@ class Valve:
             self._move_to(flow)
 
     def meet(self, load: float) -> None:
-        """Get, in the next step, what flows against this load (`ValveParameters.against`)."""
+        """Reduce or raise the flow of the next step by this load (`ValveParameters.against`)."""
         forward = (self.spool or self._target) > 0.0
         self.supply = self.ease = math.sqrt(max(0.0, 1.0 - load if forward else 1.0 + load))
 
@@ -168,7 +169,7 @@ class Valve:
         return start_rate, middle, speed, (self.spool * self.supply - speed) / lag_s
 
     def _pass(self, step_s: float) -> None:
-        """Let step_s seconds pass."""
+        """Let step_s seconds pass; commands whose dead time ends take effect within them."""
         rest_s = step_s
         while self._pending:
             due_s, flow = self._pending[0]
@@ -192,7 +193,7 @@ class Valve:
             self.spool = flow
 
     def _follow(self, step_s: float) -> None:
-        """Spool on a straight line to its target, speed behind it: tau v' = flow - v, exactly."""
+        """Move the spool at its rate to its target and the speed behind it: tau v' = flow - v."""
         spool, supply = self.spool, self.supply
         gap = self._target - spool
         if gap == 0.0:

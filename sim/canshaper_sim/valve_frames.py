@@ -1,7 +1,7 @@
-"""A valve reads its frames by the DBC and the deployment file alone.
+"""The simulated valve's decoder of its frames, from the DBC and the deployment file alone.
 
-A valve does not know how the controller encodes. So nothing here is of ``canshaper.codec``, and a
-fault of that moves the simulated crane as it would move a real one.
+A real valve does not know how the controller encodes. So this module uses nothing of
+``canshaper.codec``: an error there moves the simulated crane as it would move a real one.
 """
 
 from cantools.database.can import Signal
@@ -13,16 +13,16 @@ _ROUNDING = 1e-6
 
 
 class CommandReader:
-    """Reads the command of one axis.
+    """Reader of the command of one axis.
 
     Args:
         deployment: names message and signals.
-        axis: whose valve it is.
+        axis: the axis of the valve.
 
     Attributes:
         zero: raw value at rest.
-        step: raw values of a step of the command, 1 or -1.
-        full: steps of full speed.
+        step: change of the raw value for one step of the command, 1 or -1.
+        full: number of steps at full speed.
     """
 
     __slots__ = ("_codes", "_counter", "_flags", "_negative", "_signal", "full", "step", "zero")
@@ -56,11 +56,11 @@ class CommandReader:
         self._counter = next((s for s in bound if s.name == valve.alive_counter), None)
 
     def count(self, data: bytes) -> int:
-        """Alive counter of a frame; 0 where the message has none."""
+        """Return the alive counter of a frame; 0 if the message has none."""
         return _raw(self._counter, data) if self._counter else 0
 
     def command(self, data: bytes) -> float:
-        """Command of a frame, -1 .. 1; 0 where its bytes are none."""
+        """Return the command of a frame, -1 .. 1; 0 if its bytes hold no valid command."""
         steps = self.step * (_raw(self._signal, data) - self.zero)
         if self._negative:
             back = self.step * (_raw(self._negative, data) - self.zero)
@@ -72,7 +72,7 @@ class CommandReader:
         return steps / self.full if abs(steps) <= self.full else 0.0
 
     def _direction(self, data: bytes) -> int:
-        """1, -1, or 0 for neutral and for what is no direction."""
+        """Return 1 or -1; 0 for neutral and for an invalid direction code."""
         if self._codes:
             signal, codes = self._codes
             return codes.get(_raw(signal, data), 0)
@@ -82,7 +82,7 @@ class CommandReader:
 
 
 def _raw(signal: Signal, data: bytes) -> int:
-    """The bits of a signal, as a number."""
+    """Return the raw value of a signal."""
     if signal.byte_order == "little_endian":
         value = int.from_bytes(data, "little") >> signal.start
     else:  # ``start`` is its highest bit

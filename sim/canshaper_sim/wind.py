@@ -1,8 +1,9 @@
-"""Wind on what hangs from the tip: drag of a mean wind with gusts along it.
+"""Wind on the grapple: drag of a mean wind with gusts along its direction.
 
-Gusts are noise behind a filter of first order, as those along the wind are in the model of Dryden
+Gusts are noise behind a first-order filter, as the gusts along the wind in the model of Dryden
 (MIL-F-8785C, low altitude). At 5 m above the ground their scale is 36 m and their standard
-deviation a fifth of the mean: 6 m/s give 1.2 m/s and 6 s. The load is slow against the wind.
+deviation a fifth of the mean: a wind of 6 m/s has gusts of 1.2 m/s and 6 s. The speed of the load
+is neglected against that of the wind.
 """
 
 import math
@@ -27,7 +28,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class WindParameters:
-    """The wind; by default there is none."""
+    """Mean wind and gusts; by default there is no wind."""
 
     speed_m_s: float = 0.0  # mean
     gust_m_s: float = 0.0  # standard deviation; gusts reach twice to three times as much
@@ -41,7 +42,7 @@ class WindParameters:
 
 
 class Wind:
-    """The wind as it blows; at first without a gust."""
+    """The wind in time; it starts without a gust."""
 
     __slots__ = ("_gust_m_s", "_parameters", "_random", "force_n")
 
@@ -51,7 +52,7 @@ class Wind:
         self.advance(0.0)
 
     def advance(self, step_s: float) -> None:
-        """Blow on for step_s seconds."""
+        """Let the wind blow for step_s seconds."""
         p = self._parameters
         kept = math.exp(-step_s / p.gust_s)
         new = self._random.gauss(0.0, p.gust_m_s) * math.sqrt(1.0 - kept * kept)
@@ -60,7 +61,7 @@ class Wind:
         self.force_n = 0.5 * AIR_KG_M3 * p.drag_m2 * speed * abs(speed)
 
     def push(self, slew_rad: float, mass_kg: float) -> Push:
-        """On a mass, seen from the boom."""
+        """Return the force on a mass, N/kg: outwards, in slew direction, upwards."""
         angle = math.radians(self._parameters.heading_deg) - slew_rad
         push = self.force_n / mass_kg
         return push * math.cos(angle), push * math.sin(angle), 0.0

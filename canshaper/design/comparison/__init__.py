@@ -1,1 +1,1 @@
-"""Every filter on the same work: the same manoeuvres, crane, valves and output limits."""
+"""Comparison of all filters on the same manoeuvres, crane, valves and output limits."""

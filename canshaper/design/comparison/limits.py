@@ -1,4 +1,4 @@
-"""The limits that no shaper of one axis can beat, as a table and for the picture."""
+"""The limits that no filter of one axis can beat, for the table and the picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ _LAGS_TO_STOP = 1.5
 
 @dataclass(frozen=True)
 class Least:
-    """Least worst residual of a duration that the best shaper leaves, parts of the unshaped swing.
+    """Least worst residual that filters of this duration leave, parts of the unshaped swing.
 
     Attributes:
         duration_s: from the first to the last change of the output after a step.
-        ours_15: with a floor in its taps, at lengths within 15 %.
-        no_dip_15, no_dip_30: of all whose output never goes back, within 15 and 30 %.
-        any_15: of all whose output stays between 0 and the command.
+        ours_15: least of our filters, whose taps have a floor, at lengths within 15 %.
+        no_dip_15, no_dip_30: least of filters whose output never goes back, within 15 and 30 %.
+        any_15: least of filters whose output stays between 0 and the command, within 15 %.
     """
 
     duration_s: float
@@ -44,7 +44,7 @@ class Least:
 
 
 def least(deployment: Deployment) -> list[Least]:
-    """The convex limits of near-far by duration, within its valve's rate."""
+    """Return the least residuals of near-far by duration, within the rate of its valve."""
     mode, tick, rate = _axis(deployment)
 
     def taps(duration_s: float, range_pct: float, least_tap: float = 0.0) -> float:
@@ -70,10 +70,10 @@ def least(deployment: Deployment) -> list[Least]:
 
 
 def limits_for(deployment: Deployment, outcomes: Sequence[Outcome]) -> Limits:
-    """Limits of near-far alone on these manoeuvres, for the picture.
+    """Return the limits of near-far alone on these manoeuvres, for the picture.
 
-    Linear theory: of the swing that each manoeuvre makes with the filter off at each length, a
-    shaper leaves the part |H(p)|. Run-on: duration of the command and lag of the valve.
+    Linear theory: at each length a filter leaves the part |H(p)| of the swing that the manoeuvre
+    makes without a filter. Run-on is the duration of the filter plus the lag of the valve.
     """
     swing: dict[int, float] = {}
     for o in outcomes:
@@ -97,7 +97,7 @@ def limits_for(deployment: Deployment, outcomes: Sequence[Outcome]) -> Limits:
 
 
 def _axis(deployment: Deployment) -> tuple[SwayMode, float, float]:
-    """Mode, tick and rate of the valve."""
+    """Return sway mode, tick in s and slowest valve rate (1/s) of near-far."""
     bound, sway = swinging_axis(deployment, AXIS)
     return sway.mode(), tick_s(deployment, AXIS), bound.config.limits.slowest_per_s
 
@@ -105,7 +105,7 @@ def _axis(deployment: Deployment) -> tuple[SwayMode, float, float]:
 def _least_of_any(
     mode: SwayMode, tick: float, duration_s: float, range_pct: float, rate_per_s: float
 ) -> float:
-    """Least worst residual where the output may go back, but stays between 0 and the command."""
+    """Return the least residual of outputs that may go back, but stay between 0 and the command."""
     count = round(duration_s / tick) + 1
     turns = np.exp(-2j * np.pi * np.arange(_SIDES) / _SIDES)
     responses = responses_of(mode, range_pct, tick, count)

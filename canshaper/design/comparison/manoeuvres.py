@@ -1,6 +1,6 @@
-"""The comparison drives each filter, made for both axes of a deployment, through manoeuvres.
+"""The filters and the manoeuvres of the comparison; each filter is made for both axes.
 
-Manoeuvres are strokes of one axis and of both, loading, random joysticks.
+The manoeuvres are strokes of one axis and of both axes, loading, and random joysticks.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,16 +26,16 @@ DESIGNS = ((0.68, 15.0), (0.82, 15.0), (1.1, 30.0))
 
 @dataclass(frozen=True)
 class Candidate:
-    """A filter with a name for tables, and whether it is one of ours.
+    """A filter of the comparison, with its name for tables.
 
     Attributes:
-        name: what it is called.
+        name: name of the filter in tables.
         filters: by axis, as they would stand in a deployment file.
-        ours: limit-aware, as G_FF and the robust shaper are.
-        motion: with the two-axis motion, where the deployment has one.
-        sensor: with its sway sensors.
-        by_load: the file's own, with the sets of its gain schedules.
-        sway: keys of the swing that they are for, by axis, where it is not that of the file.
+        ours: the filter is limit-aware, as G_FF and the robust shaper are.
+        motion: it runs with the two-axis motion, if the deployment has one.
+        sensor: it runs with the sway sensors of the deployment.
+        by_load: it is the file's own filter, with the sets of its gain schedules.
+        sway: by axis, the keys of ``sway`` that differ from the file for this filter.
     """
 
     name: str
@@ -48,10 +48,10 @@ class Candidate:
 
 
 def candidates(deployment: Deployment) -> list[Candidate]:
-    """Every filter, on slew and near-far; the impulse responses are made for the valves' rates.
+    """Return every filter, for slew and near-far; impulse responses suit the rates of the valves.
 
     Raises:
-        DesignError: one of these axes is not there, or has no sway data.
+        DesignError: the deployment lacks one of these axes, or its sway data.
     """
     if not {*AXES} <= deployment.axes.keys():
         text = f"expected axes {' and '.join(AXES)}, or a crane with a rope"
@@ -102,25 +102,25 @@ def candidates(deployment: Deployment) -> list[Candidate]:
 
 
 def _short(name: str) -> str:
-    """Without what it covers: tables have 80 columns."""
+    """Return the name without its length range and prefix: tables have 80 columns."""
     return name.removeprefix("limit-aware ").partition(" ±")[0]
 
 
 def _damped(deployment: Deployment, axis: str) -> bool:
-    """Whether the axis feeds back what a sway sensor measures."""
+    """Return whether a sway sensor damps the axis."""
     sensor = deployment.axes[axis].sway_sensor
     return sensor is not None and sensor.config.use == "damp"
 
 
 def tick_s(deployment: Deployment, axis: str) -> float:
-    """Period of the axis' valve."""
+    """Return the period of the axis' valve message, s."""
     return deployment.axes[axis].period_ticks * deployment.config.tick_ms / 1000.0
 
 
 def _robust(
     deployment: Deployment, axis: str, mode: SwayMode, duration_s: float, range_pct: float
 ) -> Filter:
-    """A designed impulse response as it stands in a deployment file."""
+    """Return a designed impulse response as a filter of a deployment file."""
     period_s = tick_s(deployment, axis)
     shaper = least_residual(
         mode,
@@ -134,7 +134,7 @@ def _robust(
 
 
 def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
-    """The deployment with these filters, with its sensors or without, and time to run on."""
+    """Return the deployment with the candidate's filters, its sensors or none, and a long tail."""
     axes = dict(deployment.axes)
     for axis, its_filter in candidate.filters.items():
         config = axes[axis].config
@@ -182,18 +182,18 @@ _NOMINAL = CraneParameters()
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A script with what goes with it.
+    """A script, the crane that drives it, and the place of its results in the table.
 
     Attributes:
         work: kind of work, a column of the table: pulse, tap, reversal, both, random, cycle,
             load, gain, pump, end or start.
-        name: what it is called.
+        name: name of the manoeuvre.
         script: the strokes, with a rest at the end.
-        axis: the axis that moves, None where several do.
-        initial_deg: swing along the boom at the start.
-        lengths_pct: errors of the pendulum length at which it is driven.
-        crane: the crane at the right length.
-        load_s: when a load is picked up.
+        axis: the axis that moves; None if several move.
+        initial_deg: swing along the boom at the start, degrees.
+        lengths_pct: errors of the pendulum length at which it is driven, percent.
+        crane: the crane with the right pendulum length.
+        load_s: time at which the grapple picks up a load, s; None for no load.
     """
 
     work: str
@@ -207,7 +207,7 @@ class Manoeuvre:
 
 
 def manoeuvres() -> list[Manoeuvre]:
-    """All manoeuvres."""
+    """Return all manoeuvres."""
     single = [task for axis in AXES for task in _single(axis)]
     pulse = next(task for task in single if task.name == "pulse near-far")
     loading = SCRIPTS["loading"].strokes
@@ -248,7 +248,7 @@ def manoeuvres() -> list[Manoeuvre]:
 
 
 def _single(axis: str) -> Iterator[Manoeuvre]:
-    """Pulse, reversal and taps of one axis."""
+    """Yield pulse, reversal and taps of one axis."""
     pulse = Stroke(axis, _START_S, 3.0, 1.0, _RAMP_S)
     out = replace(pulse, duration_s=1.5)
     back = replace(out, start_s=_START_S + 1.5, level=-1.0)
@@ -263,7 +263,7 @@ def _single(axis: str) -> Iterator[Manoeuvre]:
 
 
 def _both() -> Iterator[Manoeuvre]:
-    """A slew, and a stroke of near-far before, with and after it: out, or a little in."""
+    """Yield a slew with a stroke of near-far before, with or after it: outwards, or a little in."""
     for late_s in LATE_S:
         start_s = _START_S + max(0.0, -late_s)
         slew = Stroke("slew", start_s, 3.0, 1.0, _RAMP_S)
@@ -276,7 +276,7 @@ def _both() -> Iterator[Manoeuvre]:
 
 
 def _slow_cranes() -> Iterator[tuple[str, CraneParameters]]:
-    """The valve of one axis is slower than the file says."""
+    """Yield an axis and a crane whose valve of this axis is slower than the file says."""
     slew, near_far = _NOMINAL.slew_full_speed_rad_s, _NOMINAL.near_far_full_speed_m_s
     yield "slew", replace(_NOMINAL, slew_full_speed_rad_s=SLOW_VALVE * slew)
     yield "near_far", replace(_NOMINAL, near_far_full_speed_m_s=SLOW_VALVE * near_far)

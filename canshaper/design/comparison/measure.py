@@ -1,4 +1,4 @@
-"""Driving one candidate through one manoeuvre, and all of them on all processors."""
+"""Drive one candidate through one manoeuvre, or all candidates through all on all processors."""
 
 import math
 from collections.abc import Callable
@@ -35,18 +35,18 @@ class Outcome:
     """Measures of one candidate in one manoeuvre at one length error.
 
     Attributes:
-        residual_deg: largest swing after the dwell: tilt of the grapple, of both planes together.
-        peak_deg: largest tilt of the drive.
-        path: way of the tip on both axes, to and fro, in s of full speed.
-        travel: of a tap: way of the tip along the axis, in s of full speed.
-        movements: of a tap: how often the tip began to move.
-        rise_s: of a pulse: time to 95 % of the commanded speed.
-        still_s: of a pulse: from release until the tilt stays below ``still_deg`` of the file.
-        swings_on: of a pulse: whether that is a lower bound, since the drive ended before.
-        stop_s: of a pulse: run-on after release until the tip stays below 5 % of full speed.
-        run_on_m: of a pulse: travel after release; of slew on the largest radius.
-        dip: of a pulse: largest fall of the command while the joystick is held.
-        re_rise: of a pulse: largest rise of the command after release.
+        residual_deg: largest swing after the dwell: tilt of the grapple in both planes together.
+        peak_deg: largest tilt during the drive.
+        path: total way of the tip on both axes, there and back, in s of full speed.
+        travel: in a tap: way of the tip along the axis, in s of full speed.
+        movements: in a tap: number of times that the tip began to move.
+        rise_s: in a pulse: time to 95 % of the commanded speed.
+        still_s: in a pulse: time from release until the tilt stays below ``still_deg`` of the file.
+        swings_on: in a pulse: ``still_s`` is a lower bound, since the drive ended before.
+        stop_s: in a pulse: run-on after release until the tip stays below 5 % of full speed.
+        run_on_m: in a pulse: travel after release; for slew on the largest radius.
+        dip: in a pulse: largest fall of the command while the joystick is held.
+        re_rise: in a pulse: largest rise of the command after release.
     """
 
     candidate: str
@@ -71,7 +71,7 @@ class Outcome:
 def measure(
     deployment: Deployment, candidate: Candidate, task: Manoeuvre, length_pct: int
 ) -> Outcome:
-    """Drive once and measure."""
+    """Drive a candidate once through a manoeuvre and measure the drive."""
     grapple = task.crane.grapple.longer(length_pct)
     recording = drive(
         with_candidate(deployment, candidate),
@@ -114,7 +114,7 @@ def _movements(speed: list[float]) -> int:
 def _with_metrics(
     outcome: Outcome, recording: Recording, axis: str, deployment: Deployment
 ) -> Outcome:
-    """Add to the outcome what the operator feels of a pulse."""
+    """Return the outcome with the pulse's rise, run-on, dip and time until still."""
     of_axis = axis_metrics(recording, axis)
     assert recording.crane is not None  # of a tip with both planes
     of_crane = crane_metrics(recording, recording.crane, deployment.config.still_deg)
@@ -144,16 +144,16 @@ def measure_all(
     on_progress: Callable[[float], None],
     processes: int | None = None,
 ) -> list[Outcome]:
-    """Every candidate through every manoeuvre, on all processors.
+    """Drive every candidate through every manoeuvre, on all processors.
 
-    Interrupted it ends at once, and so do its processes.
+    An interrupt ends it and its processes at once.
 
     Args:
         file: deployment file, loaded again in every process.
-        candidates: what is compared.
+        candidates: the filters to compare.
         tasks: the manoeuvres.
         on_progress: called with the part done, 0 to 1.
-        processes: number of processes; by default one a processor.
+        processes: number of processes; by default one for each processor.
     """
     jobs = [(c, t, p) for c in candidates for t in tasks for p in t.lengths_pct]
     outcomes = []

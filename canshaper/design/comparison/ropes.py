@@ -1,6 +1,6 @@
-"""Filters of a crane with a rope on the same work, by the length of the rope.
+"""Comparison of filters on the same work of a crane with a rope, by the length of the rope.
 
-A rope without a length signal is compared as long as the file says, and a tenth wrong.
+A crane without a rope-length signal is driven with the length in the file, and 10 % off it.
 """
 
 import math
@@ -57,10 +57,10 @@ class RopeFilter:
     """A filter of the axes that swing the load.
 
     Attributes:
-        name: for the table.
-        filters: by axis; empty for those of the file.
-        rope_m: a length that it is made for, whatever the rope; None: it follows the rope.
-        bypass: with anti-sway off.
+        name: name of the filter in the table.
+        filters: by axis; empty for the filters of the file.
+        rope_m: fixed length that the filter is made for; None: it follows the rope.
+        bypass: drive with anti-sway off.
     """
 
     name: str
@@ -74,10 +74,10 @@ class Work:
     """Work that each filter does.
 
     Attributes:
-        name: of its column, such as ``5 m hoisted``.
-        rope_m: the rope at the start.
-        strokes: of the joysticks, by coordinates.
-        radius_m: of a tower crane, at the start.
+        name: its column of the table, such as ``5 m hoisted``.
+        rope_m: length of the rope at the start, m.
+        strokes: strokes of the joysticks, by coordinate.
+        radius_m: radius of a tower crane at the start, m.
     """
 
     name: str
@@ -87,16 +87,16 @@ class Work:
 
 
 def on_rope(deployment: Deployment) -> str | None:
-    """Return the kind of crane where it is one with a rope; else None."""
+    """Return the kind of crane if its load hangs from a rope, else None."""
     kind = kind_of(deployment.coordinates.values())
     return kind if kind in ON_ROPE else None
 
 
 def rope_filters(deployment: Deployment) -> list[RopeFilter]:
-    """Return what is compared.
+    """Return the filters to compare.
 
     Raises:
-        DesignError: an axis is missing.
+        DesignError: the deployment lacks an axis that swings the load.
     """
     by_coordinate = deployment.by_coordinate
     kind = kind_of(by_coordinate)
@@ -131,12 +131,12 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
 
 
 def is_measured(deployment: Deployment) -> bool:
-    """Whether an axis follows the length of the rope."""
+    """Return whether any axis follows a rope-length signal."""
     return any(axis.rope for axis in deployment.axes.values())
 
 
 def _nominal_m(deployment: Deployment) -> float:
-    """Return the rope of the simulated crane at the start."""
+    """Return the length of the simulated crane's rope at the start, m."""
     crane: Any = getattr(changed_parameters([], deployment), kind_of(deployment.by_coordinate))
     rope_m: float = crane.rope_m
     return rope_m
@@ -160,7 +160,7 @@ def _with(deployment: Deployment, one: RopeFilter) -> Deployment:
 
 
 def works(deployment: Deployment) -> Iterator[Work]:
-    """Yield the work of a crane: with each rope still, or hoisted in travel and after it."""
+    """Yield a crane's work for each rope: of constant length, or hoisted in or after travel."""
     kind = kind_of(deployment.by_coordinate)
     if kind == TOWER:
         for rope_m, radius_m in PLACES_M:
@@ -195,7 +195,7 @@ def _of_bridge(rope_m: float, hoists: bool) -> Iterator[tuple[Any, ...]]:
 
 
 def _of_tower(rope_m: float, radius_m: float) -> Iterator[Work]:
-    """Slew and trolley at once, each alone, turned round; hoisted in travel and after it."""
+    """Yield slew and trolley together, reversed, each alone; and hoisting in or after travel."""
     out = 1.0 if radius_m < 50.0 else -1.0
     turn, run = Stroke(SLEW, 0.5, 10.0, 1.0), Stroke(NEAR_FAR, 2.5, 8.0, out)
     back = Stroke(SLEW, 6.5, 6.0, -1.0)
@@ -216,7 +216,7 @@ def _of_tower(rope_m: float, radius_m: float) -> Iterator[Work]:
 
 
 def _of_luffing() -> Iterator[tuple[str, tuple[Stroke, ...]]]:
-    """Each axis pressed and turned round, all at once, and a random operator."""
+    """Yield pulse and reversal of each axis, all axes at once, and random operators."""
     for axis, press_s in ((SLEW, 8.0), (LIFT_CYLINDER, 5.0), (EXTENSION, 6.0)):
         yield "pulse", (Stroke(axis, 0.5, press_s, 1.0),)
         half_s = 0.5 * press_s + 1.0
@@ -232,7 +232,7 @@ Job = tuple[RopeFilter, Work]
 
 
 def left_deg(deployment: Deployment, job: Job) -> float:
-    """Swing that is left of a drive, degrees."""
+    """Return the largest swing that remains after a drive, degrees."""
     (one, work), crane = job, changed_parameters([], deployment)
     strokes, rope_m = work.strokes, work.rope_m
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
@@ -252,7 +252,7 @@ def left_deg(deployment: Deployment, job: Job) -> float:
 def compare_ropes(
     deployment: Deployment, on_progress: Callable[[float], None], processes: int | None = None
 ) -> dict[str, dict[str, float]]:
-    """Largest swing that each filter leaves, degrees, by rope and work, such as ``5 m hoisted``."""
+    """Return the largest swing that each filter leaves, degrees: filter -> work -> swing."""
     jobs: list[Job] = [
         (one, work) for one in rope_filters(deployment) for work in works(deployment)
     ]

@@ -1,4 +1,4 @@
-"""One row a candidate, and a plain recommendation."""
+"""One row for each candidate, and recommendations in plain words."""
 
 from dataclasses import dataclass
 from statistics import fmean
@@ -24,15 +24,15 @@ class Row:
     """Measures of a candidate over all manoeuvres.
 
     Attributes:
-        worst_deg: by kind of work, largest residual at the right length.
-        mean_deg: by kind of work, its mean.
+        worst_deg: by kind of work, largest residual at the right length, degrees.
+        mean_deg: by kind of work, mean residual at the right length, degrees.
         worst_15_deg, worst_30_deg: largest residual at length errors up to 15 and 30 %.
-        worst_case: manoeuvre and length error of the latter.
-        still_s: of both pulses, longest time from release until the grapple is still.
-        swings_on: whether that is a lower bound.
-        stop_s, rise_s, run_on_m: of the pulse of near-far at the right length.
+        worst_case: manoeuvre and length error of ``worst_30_deg``.
+        still_s: longer of both pulses' times from release until the grapple is still.
+        swings_on: ``still_s`` is a lower bound.
+        stop_s, rise_s, run_on_m: ``Outcome`` of near-far's pulse at the right length.
         slew_run_on_m: travel after release of the pulse of slew, on its largest radius.
-        dip, re_rise: of both pulses.
+        dip, re_rise: larger value of the two pulses.
         peak_deg: largest swing with both joysticks at the right length.
         tap_part: travel of the shortest tap of near-far, as a part of that without filter.
         tap_movements: largest number of movements of a tap.
@@ -61,7 +61,7 @@ class Row:
 
 
 def rows(compared: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
-    """Summaries in the order of the candidates."""
+    """Return one row for each candidate, in the order of the candidates."""
     raw = [o for o in outcomes if o.candidate == "off"]
     return [_row(c, [o for o in outcomes if o.candidate == c.name], raw) for c in compared]
 
@@ -117,7 +117,7 @@ def _path(outcomes: list[Outcome]) -> float:
 
 
 def beaten_by(row: Row, table: list[Row]) -> Row | None:
-    """One of ours that stops as soon, to half a tick, and leaves less over +-30 %; or None."""
+    """Return the best of our filters that stops as soon and leaves less at +-30 %, or None."""
     better = [
         r
         for r in table
@@ -127,9 +127,9 @@ def beaten_by(row: Row, table: list[Row]) -> Row | None:
 
 
 def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, str]]:
-    """Return for "fast", "balanced" and "calm" a row and a sentence that says why.
+    """Return a row and a sentence with its reason for each of "fast", "balanced" and "calm".
 
-    The filter that is off dips never, so that there always is one.
+    A row always exists: the candidate "off" never dips.
     """
     off = next(r for r in table if r.name == "off")
     even = [r for r in table if r.dip <= FELT_DIP]

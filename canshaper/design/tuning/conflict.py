@@ -1,7 +1,7 @@
-"""Why no setting keeps all requirements, and what could be had instead.
+"""Report why no setting keeps all requirements, and which values are attainable instead.
 
-A search over the poles, on a grid that closes in on what it looks for; it needs no start and does
-not care whether a measure is smooth.
+The module searches the poles on a grid that closes in on the best point; the search needs no start
+and no smooth measures.
 """
 
 import itertools
@@ -19,7 +19,7 @@ _TOLERANCE = 1e-6
 
 
 def box_conflict(task: Task) -> None:
-    """Raise InfeasibleError where the bounds on single poles leave no room."""
+    """Raise InfeasibleError if the bounds on single poles leave no room."""
     (low, why_low), (high, why_high) = task.slowest(), task.fastest()
     if high <= 0.0:
         raise InfeasibleError(
@@ -34,7 +34,7 @@ def box_conflict(task: Task) -> None:
 
 
 def feasible_point(program: Program) -> Vector | None:
-    """Poles that keep all requirements, as z, or None."""
+    """Return poles that keep all requirements, as z, or None."""
     limits = _limits(program.task)
 
     def violation(measures: dict[str, float]) -> float:
@@ -45,7 +45,7 @@ def feasible_point(program: Program) -> Vector | None:
 
 
 def explain(program: Program) -> str:
-    """Say which requirements conflict and, for each, what the others leave attainable."""
+    """Return which requirements conflict and the attainable value of each with the others kept."""
     limits = _limits(program.task)
     slow, fast = program.task.slowest()[0], program.task.fastest()[0]
     requirements = "; ".join(text.format(f"{limit:.3g}") for limit, text in limits.values())
@@ -70,7 +70,7 @@ def explain(program: Program) -> str:
 
 
 def _limits(task: Task) -> dict[str, tuple[float, str]]:
-    """Measure -> (limit, how to say it)."""
+    """Return measure -> (limit, text of the requirement)."""
     require = task.require
     result = {}
     if require.within_command:
@@ -102,7 +102,7 @@ def _measures(program: Program, z: Vector) -> dict[str, float]:
 
 
 def _search(program: Program, value: Callable[[dict[str, float]], float]) -> tuple[float, Vector]:
-    """Smallest value over all poles of the box; (value, z)."""
+    """Return (value, z) of the smallest value over all poles of the box."""
     n = program.size
     low, high = program.low.copy(), program.high.copy()
     top = program.high[0]

@@ -1,4 +1,4 @@
-"""A tuning in the deployment file, and what a person should know of it."""
+"""A tuning as it goes into the deployment file, with its measures and its recommendation."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -22,13 +22,13 @@ _TAIL_MATTERS = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A G_FF as it stands in a file, and its measures.
+    """A G_FF with the values of a deployment file, and its measures.
 
     Attributes:
-        a1: coefficient of Eq. 13, s.
-        a2: the same, s^2.
-        poles_rad_s: the poles that gives, slowest first.
-        third_pole_rad_s: lag on the command, or None.
+        a1: coefficient of s in Eq. 13, s.
+        a2: coefficient of s^2 in Eq. 13, s^2.
+        poles_rad_s: the poles of these coefficients, slowest first.
+        third_pole_rad_s: pole of the lag on the command, or None.
         measures: see ``evaluate``.
     """
 
@@ -44,7 +44,7 @@ class Setting:
         return filter_of("gff", a1=self.a1, a2=self.a2, third_pole_rad_s=self.third_pole_rad_s)
 
     def values(self) -> dict[str, float | None]:
-        """Keys of the filter section; None for those that have to go."""
+        """Return the keys of the filter section with their values; None for a key to delete."""
         return {
             "a1": self.a1,
             "a2": self.a2,
@@ -62,14 +62,14 @@ def setting(
     tick_s: float,
     machine: Machine,
 ) -> Setting:
-    """Measure a denominator as it stands."""
+    """Return the setting of this denominator, with its measures."""
     fast, slow = poles_from_denominator(a1, a2)
     measures = evaluate(mode, tick_s, gff((slow, fast), third_pole_rad_s), machine)
     return Setting(a1, a2, (slow, fast), third_pole_rad_s, measures)
 
 
 def deployed(tuning: Tuning, mode: SwayMode, tick_s: float, machine: Machine) -> Setting:
-    """The tuning with the digits a file gets, measured with exactly these.
+    """Return the tuning with its values rounded as in a file, measured with these values.
 
     a2 and a1 are rounded up and the third pole towards zero, so that neither a pole turns complex
     nor the first jump grows.
@@ -86,7 +86,7 @@ def deployed(tuning: Tuning, mode: SwayMode, tick_s: float, machine: Machine) ->
 def from_parameters(
     parameters: Mapping[str, Any], mode: SwayMode, tick_s: float, machine: Machine
 ) -> Setting:
-    """Measure the gff section of a deployment."""
+    """Return the setting of a deployment's gff section, with its measures."""
     third = parameters.get("third_pole_rad_s")
     if "poles_rad_s" in parameters:
         a1, a2 = denominator_from_poles(parameters["poles_rad_s"])
@@ -99,9 +99,9 @@ def from_parameters(
 def tail_for(
     setting: Setting, mode: SwayMode, tick_s: float, machine: Machine
 ) -> tuple[float, float] | None:
-    """Shortest ``tail_s`` from which on none adds to the residual sway, and what it leaves.
+    """Return the shortest ``tail_s`` that adds no residual sway, and the residual it leaves.
 
-    None where not even the longest tail that a file may have is enough.
+    Return None if even the longest tail that a file may have is too short.
     """
     shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
     longest_s = longest_tail_s(mode)
@@ -116,7 +116,7 @@ def tail_for(
 
 
 def recommendation(axis: str, setting: Setting, tail: tuple[float, float] | None) -> str:
-    """One plain sentence, and one more where the tail ends the run-on early."""
+    """Return a plain sentence for a person, and a second one if the tail ends the run-on early."""
     m = setting.measures
     third = f", third_pole_rad_s: {setting.third_pole_rad_s:g}" if setting.third_pole_rad_s else ""
     text = (
@@ -134,7 +134,7 @@ def recommendation(axis: str, setting: Setting, tail: tuple[float, float] | None
 
 
 def optimum_lines(tuning: Tuning) -> list[str]:
-    """Return what bounds an optimum, how flat it is, and how the solver came to it, for people."""
+    """Return lines for a person: what bounds the optimum, its flatness, the solver's starts."""
     held = ", ".join(tuning.active) or "nothing: an optimum between all limits"
     return [
         f"Held by: {held}",
@@ -145,13 +145,13 @@ def optimum_lines(tuning: Tuning) -> list[str]:
 
 
 def flatness(tuning: Tuning) -> str:
-    """How far each pole may go for one percent of the cost."""
+    """Return the range of each pole within one percent more cost, as a sentence."""
     ranges = [f"{slow:.2f} to {fast:.2f}" for slow, fast in tuning.ranges_rad_s]
     return f"{' and '.join(ranges)} rad/s cost at most {100 * FLAT:.0f} % more"
 
 
 def _up(value: float) -> float:
-    """Round up to ``_DIGITS`` significant digits."""
+    """Return the value rounded up to ``_DIGITS`` significant digits."""
     digits = _DIGITS - 1 - math.floor(math.log10(value))
     rounded = round(value, digits)
     return rounded if rounded >= value else round(rounded + 10.0**-digits, digits)
@@ -165,7 +165,7 @@ def _left(
 
 
 def table(setting: Setting, before: Setting | None, method: str) -> Table:
-    """The setting next to the one in the file; residuals through the machine, filter alone."""
+    """Return a table of the setting beside that of the file; residuals: machine | filter alone."""
     columns = [setting] if before is None else [before, setting]
     result = new_table("", *([] if before is None else ["in the file"]), method)
 

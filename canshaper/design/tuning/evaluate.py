@@ -1,8 +1,8 @@
 """Measures of a filter setting: joystick and swing, also with wrong sway data.
 
-Pure and for every filter: the running code is asked, tick by tick. Times in s, speeds as fractions
-of full speed, residual sway as a fraction of what the same movement of the joystick leaves without
-the filter.
+The module is pure and works for every filter: it runs the deployed code tick by tick. Times are in
+s and speeds in fractions of full speed. Residual sway is a fraction of the sway that the same
+joystick movement leaves without the filter.
 """
 
 import cmath
@@ -44,7 +44,7 @@ class Machine:
 
     Attributes:
         limits: output limits of the axis.
-        neutral_band: |joystick| that counts as neutral.
+        neutral_band: largest |joystick| that counts as neutral.
         stop_s: longest shaped stop of the axis.
         grid_steps: raw steps of the valve frame from zero to full command.
         lag_s: time constant of valve and actuator.
@@ -58,7 +58,7 @@ class Machine:
 
     @classmethod
     def of(cls, bound: BoundAxis) -> Self:
-        """Return the machine of an axis, as its deployment has it."""
+        """Return the machine of an axis, with the values of its deployment."""
         limits = bound.config.limits
         return cls(
             limits=limits.output_limits(),
@@ -73,11 +73,11 @@ class Residual:
     """Residual sway at one true pendulum length.
 
     Attributes:
-        length_pct: how much longer the pendulum is than the sway data says.
-        linear: |H(e^(pT))| at the true sway pole p, nothing but the filter.
-        machine: full press and full release through the axis with its limits and a lagging
-            valve, when both have ended, with and without the filter; the worse of the two. Less
-            than ``STILL`` of the largest raw swing counts as that: the tool hangs still by itself.
+        length_pct: percent by which the true pendulum is longer than the sway data says.
+        linear: |H(e^(pT))| of the filter alone, at the true sway pole p.
+        machine: swing after a full press and after a full release, through the limits of the axis
+            and a lagging valve, as a part of that without the filter; the worse of the two. The
+            swing without the filter counts as at least ``STILL`` of its largest value.
     """
 
     length_pct: float
@@ -90,16 +90,16 @@ class Evaluation:
     """Measures of one setting.
 
     Attributes:
-        first_jump: part of a step that comes out in the tick of the step.
+        first_jump: part of a step that the filter passes in the tick of the step.
         peak: largest output for a unit step.
-        rise_s: until the output has 95 % of the command for good (a first jump that dips again
-            does not count).
-        run_on_s: until the output stays within 5 % of the command; after a release, how long the
-            crane runs on.
-        mean_delay_s: area between command and output: how much further the crane goes after a
-            release, in seconds of full speed.
+        rise_s: time until the output stays above 95 % of the command (a first jump that dips
+            again does not count).
+        run_on_s: time until the output stays within 5 % of the command; after a release, the
+            run-on of the crane.
+        mean_delay_s: area between command and output: travel of the crane after a release, in
+            seconds of full speed.
         dip: largest fall of the output, through the limits, while the joystick is held.
-        residuals: residual sway over the length error.
+        residuals: residual sway at each length error.
     """
 
     first_jump: float
@@ -111,15 +111,15 @@ class Evaluation:
     residuals: tuple[Residual, ...]
 
     def worst(self, within_pct: float = 30.0) -> float:
-        """Worst residual through the machine for lengths within +- ``within_pct``."""
+        """Return the worst residual through the machine for lengths within +- ``within_pct``."""
         return max(r.machine for r in self.residuals if abs(r.length_pct) <= within_pct)
 
 
 @dataclass(frozen=True, slots=True)
 class Traces:
-    """A full press through the machine, and the swing it makes with and without the filter.
+    """A full press through the machine, and its swing with and without the filter.
 
-    ``sent`` is one value a tick; ``swing`` and ``swing_raw`` are in s, as ``SwayModel.angle``.
+    ``sent`` has one value a tick; ``swing`` and ``swing_raw`` are in s, as ``SwayModel.angle``.
     """
 
     t_s: tuple[float, ...]
@@ -129,12 +129,12 @@ class Traces:
 
 
 def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
-    """G_FF of any axis with these poles."""
+    """Return a function that makes G_FF with these poles on a sway model."""
     return lambda sway: Gff(sway, poles_rad_s, third_pole_rad_s=third_pole_rad_s)
 
 
 def shaper_of(chosen: Filter, tick_s: float, valve_rate_per_s: float) -> ShaperFor:
-    """A filter as a file describes it."""
+    """Return a function that makes the filter of a file on a sway model."""
     parameters = chosen.parameters()
     return lambda sway: build_shaper(
         chosen.kind, tick_s, sway, valve_rate_per_s=valve_rate_per_s, **parameters
@@ -151,11 +151,11 @@ def evaluate(
     """Measure a setting.
 
     Args:
-        mode: sway mode the filter is made for.
-        tick_s: period of the axis.
+        mode: sway mode that the filter is made for.
+        tick_s: period of the axis, s.
         shaper_for: makes the filter on a sway model, such as ``gff(poles)``.
-        machine: what stands behind the filter.
-        lengths_pct: length errors at which the residual is taken.
+        machine: limits and valve behind the filter.
+        lengths_pct: length errors of the residuals, percent.
 
     Raises:
         ValueError: the filter does not suit the tick.
@@ -185,7 +185,7 @@ def evaluate(
 
 
 def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[float]:
-    """Output for a unit step without any limit, one value a tick, until it stands still."""
+    """Return the output for a unit step without limits, one value per tick, until it is still."""
     sway = SwayModel(mode, tick_s)
     shaper = shaper_for(sway)
     y: list[float] = []
@@ -202,7 +202,7 @@ def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[
 def press(
     mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, duration_s: float
 ) -> Traces:
-    """Full press from rest and what it does, for a picture."""
+    """Return a full press from rest and the swing it makes, for a picture."""
     presses = [moves[0] for moves in _moves(mode, tick_s, shaper_for, machine, duration_s)]
     sent = presses[0][1]
     angles = [
@@ -215,7 +215,7 @@ def press(
 def _moves(
     mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, hold_s: float
 ) -> tuple[Moves, Moves]:
-    """Press and release through the axis, with the filter and without."""
+    """Return press and release through the axis, with the filter and without."""
     shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
     return shaped, _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
 
@@ -252,13 +252,13 @@ def swing_left(
     machine: Machine,
     trues: Sequence[SwayMode],
 ) -> list[float]:
-    """See ``Residual.machine``, of each true pendulum."""
+    """Return ``Residual.machine`` for each true pendulum."""
     shaped, raw = _moves(mode, tick_s, shaper_for, machine, _HELD_S)
     return [_worst(true, tick_s, machine, shaped, raw) for true in trues]
 
 
 def _worst(true: SwayMode, tick_s: float, machine: Machine, shaped: Moves, raw: Moves) -> float:
-    """See ``Residual.machine``."""
+    """Return ``Residual.machine`` for one true pendulum."""
     worst = 0.0
     for (speed, sent), (raw_speed, raw_sent) in zip(shaped, raw, strict=True):
         count = max(_moving(sent), _moving(raw_sent))
@@ -273,7 +273,7 @@ def _worst(true: SwayMode, tick_s: float, machine: Machine, shaped: Moves, raw: 
 
 
 def _moving(sent: Sequence[float]) -> int:
-    """Ticks until the output stands still."""
+    """Return the number of ticks until the output stands still."""
     count = len(sent)
     while count > 1 and sent[count - 1] == sent[count - 2]:
         count -= 1
@@ -283,10 +283,10 @@ def _moving(sent: Sequence[float]) -> int:
 def _modal(
     mode: SwayMode, tick_s: float, lag_s: float, speed: float, sent: Sequence[float]
 ) -> list[complex]:
-    """Swing c = x' - conj(p) x of x'' + 2 zeta w x' + w^2 x = v', lag v' + v = sent, exactly.
+    """Return c = x' - conj(p) x of x'' + 2 zeta w x' + w^2 x = v', lag v' + v = sent, exactly.
 
-    c' = p c + v', and |c| is the amplitude of the free swing; over a tick sent is held, so that
-    v' dies away with the lag.
+    c' = p c + v', and |c| is the amplitude of the free swing. ``sent`` is constant over a tick, so
+    that v' decays with the lag.
     """
     free, slow = cmath.exp(mode.pole * tick_s), math.exp(-tick_s / lag_s)
     forced = (free - slow) / (mode.pole + 1.0 / lag_s) / lag_s

@@ -1,9 +1,9 @@
-"""Task of the tuner: weights, requirements and the grid of time of Eq. 14-15.
+"""Task of the tuner: weights, requirements and time grid of Eq. 14-15.
 
     minimise   1/N sum_k  x'Q x + R (y - 0.95)^2 + S (y - 1)^2 + P (y_k - y_(k-1))^2        (Eq. 15)
     over       the real poles of G_FF (14d), at a distance from the imaginary axis (14e)
 
-for a unit step on the joystick, k = 0 ... N-1, y_(-1) = 0, so that the first jump counts. Commands
+for a unit step on the joystick, k = 0 ... N-1. With y_(-1) = 0 the first jump counts. Commands
 are fractions of full speed; u_max cancels, because the cost grows with its square.
 """
 
@@ -36,7 +36,7 @@ OVER_COMMAND = 1e-4
 
 
 def in_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """DesignError with range and value, unless the value is finite and in [low, high]."""
+    """Raise DesignError with range and value unless the value is finite and in [low, high]."""
     if not (math.isfinite(value) and low <= value <= high):
         expected = f"{low:g} to {high:g} {unit}".rstrip()
         raise DesignError(f"{name}: expected {expected}, got {value:g} {unit}".rstrip())
@@ -47,14 +47,14 @@ class Weights:
     """Weights of Eq. 15; the defaults are those of the paper's slewing axis.
 
     Attributes:
-        q: Q: one number for both states, its diagonal, or the rows of the symmetric matrix.
+        q: matrix Q: one number for both states, its diagonal, or its rows (symmetric).
         r: weight R of the distance from 95 % of the command (rise time).
         s: weight S of the distance from the command.
         p: weight P of the change of the output from sample to sample.
 
     Raises:
-        DesignError: a weight is negative or no number, Q is no positive semi-definite matrix, or R
-            and S are both zero (then the best filter would be one that never moves).
+        DesignError: a weight is negative or no number, Q is not positive semi-definite, or R and S
+            are both zero (then the best filter would never move the crane).
     """
 
     q: tuple[float, ...] = (1.0, 1.0)
@@ -70,7 +70,7 @@ class Weights:
 
     @property
     def matrix(self) -> tuple[float, float, float]:
-        """Q as q11, q12, q22."""
+        """The entries q11, q12, q22 of Q."""
         return matrix(self.q)
 
 
@@ -80,16 +80,16 @@ PAPER_NEAR_FAR = Weights(r=2.0, s=0.0, p=0.03)
 
 @dataclass(frozen=True, slots=True)
 class Requirements:
-    """Requirements on every setting, besides real poles (14d).
+    """Requirements on a setting, besides real poles (14d).
 
     Attributes:
-        pole_distance: sense of Eq. 14e.
+        pole_distance: reading of Eq. 14e: as in the text, as printed, or off.
         within_command: the response to a step never passes the command.
-        max_jump: largest part of a step that may come out at once.
+        max_jump: largest part of a step that the filter may pass at once.
         max_rate_per_s: rate of the valve, full speeds per second. It bounds the poles
             (``POLE_PER_RATE``) and, with a third pole, the slope of the response to a full step.
-        max_run_on_s: until then the response to a step is within 5 % of full speed for good.
-        third_pole: a third real pole, so that nothing comes out at once.
+        max_run_on_s: time after which the response to a step stays within 5 % of full speed.
+        third_pole: require a third real pole, so that the filter passes no part of a step at once.
 
     Raises:
         DesignError: a value is out of range.
@@ -115,7 +115,7 @@ class Requirements:
 
 
 def check_swing(mode: SwayMode) -> None:
-    """DesignError for a tool that swings out by itself: a filter would only prolong it."""
+    """Raise DesignError for a tool whose swing decays by itself: a filter would only prolong it."""
     if mode.damping_ratio > MOST_DAMPED:
         raise DesignError(
             f"damping ratio: expected 0 to {MOST_DAMPED:g}, got {mode.damping_ratio:.3g}: the tool"
@@ -125,17 +125,17 @@ def check_swing(mode: SwayMode) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One tuning: sway mode, sampling, what to minimise and what to keep.
+    """One tuning: sway mode, sampling, cost and requirements.
 
     Attributes:
         mode: sway mode of the axis.
         tick_s: Ts, the period at which the axis is sent.
-        horizon_s: N Ts, how long the step is watched.
-        weights: weights of Eq. 15; without meaning where ``length_range_pct`` is set.
-        states: what Q weighs.
-        require: what every setting has to keep.
-        length_range_pct: instead of Eq. 15, minimise the worst residual sway over pendulum lengths
-            of -range ... +range percent. Slow filters leave less, so a run-on has to be required.
+        horizon_s: N Ts, the time for which the cost watches the step.
+        weights: weights of Eq. 15; unused if ``length_range_pct`` is set.
+        states: the states that Q weighs.
+        require: requirements that every setting keeps.
+        length_range_pct: if set, minimise the worst residual sway over pendulum lengths of
+            -range ... +range percent, not Eq. 15; then ``max_run_on_s`` is required.
 
     Raises:
         DesignError: a value is out of range.
@@ -166,23 +166,23 @@ class Task:
 
     @property
     def samples(self) -> int:
-        """N, the samples of the horizon."""
+        """N, the number of samples in the horizon."""
         return max(5, round(self.horizon_s / self.tick_s))
 
     @property
     def pole_count(self) -> int:
-        """Poles of the filter, 2 or 3."""
+        """Number of poles of the filter, 2 or 3."""
         return 3 if self.require.third_pole else 2
 
     def slowest(self) -> tuple[float, str]:
-        """Smallest |pole| allowed, rad/s, and why."""
+        """Return the smallest allowed |pole|, rad/s, and the name of the bound that sets it."""
         far = POLE_DISTANCE * -self.mode.pole.real
         if self.require.pole_distance == "text" and far > SLOWEST_RAD_S:
             return far, "pole distance (14e)"
         return SLOWEST_RAD_S, "slowest pole of a deployment"
 
     def fastest(self) -> tuple[float, str]:
-        """Largest |pole| allowed, rad/s, and why."""
+        """Return the largest allowed |pole|, rad/s, and the name of the bound that sets it."""
         bounds = [
             (FASTEST_RAD_S, "fastest pole of a deployment"),
             (1.0 / self.tick_s, "fastest pole of the tick"),
@@ -197,14 +197,14 @@ class Task:
 
 
 def lengths(range_pct: float, count: int) -> list[float]:
-    """Lengths over -range ... +range percent, as factors of the nominal one."""
+    """Return lengths over -range ... +range percent, as factors of the nominal length."""
     return [1.0 + range_pct / 100.0 * (2.0 * i / (count - 1) - 1.0) for i in range(count)]
 
 
 def at_length(mode: SwayMode, factor: float) -> SwayMode:
-    """Mode of the same joint and mass on a pendulum ``factor`` times as long.
+    """Return the mode of the same joint and mass on a pendulum ``factor`` times as long.
 
-    w^2 ~ 1/l and, the damping of the joint being what it is, 2 zeta w = c/(m l^2) ~ 1/l^2.
+    w^2 ~ 1/l and, for a constant damping of the joint, 2 zeta w = c/(m l^2) ~ 1/l^2.
     """
     return SwayMode(
         mode.omega_rad_s / math.sqrt(factor), min(0.95, mode.damping_ratio * factor**-1.5)
@@ -212,12 +212,12 @@ def at_length(mode: SwayMode, factor: float) -> SwayMode:
 
 
 def longest_tail_s(mode: SwayMode) -> float:
-    """Longest tail that is looked at for a swing: two periods, 5 s or more, 12 s as in a file."""
+    """Return the longest tail that the tools try: two periods, at least 5 s, at most 12 s."""
     return min(max(5.0, math.ceil(2.0 * mode.period_s)), 12.0)
 
 
 def gain_at(mode: SwayMode, tick_s: float, y: Sequence[float]) -> float:
-    """|H(e^(pT))| from the step response: sum of its increments times e^(-pT k), over its end."""
+    """Return |H(e^(pT))|: the sum of a step response's increments times e^(-pT k), over its end."""
     turn, at = cmath.exp(-mode.pole * tick_s), 1.0 + 0j
     total, before = 0j, 0.0
     for value in y:

@@ -1,8 +1,8 @@
-"""Modes over a range of pendulum lengths, and what a response leaves of their swing.
+"""Modes over a range of pendulum lengths, and the part of their swing that a response leaves.
 
-The residual of the first mode is |H(p)|. That of a second mode is what is left when the response
-is over, as a part of its unshaped swing at the beginning: |H(p)| compares with a swing that has
-died away by then, and a damped mode would spoil the response for the first one.
+The residual of the first mode is |H(p)|. The residual of a second mode is its swing at the end of
+the response, as a part of its unshaped swing at the beginning: |H(p)| compares with a swing that
+has died away by then, and a damped mode would spoil the response for the first mode.
 """
 
 import math
@@ -29,11 +29,11 @@ _SHORTEST_S = 0.25  # the fastest mode that can be modelled, with the largest ra
 
 @dataclass(frozen=True)
 class SecondMode:
-    """Another mode that the taps have to leave in peace.
+    """Another mode that the taps must not excite.
 
     Attributes:
         mode: nominal mode.
-        range_pct: error of its pendulum length covered, +- percent, 0 to 60.
+        range_pct: error of the mode's pendulum length that the taps cover, +- percent, 0 to 60.
     """
 
     mode: SwayMode
@@ -41,7 +41,7 @@ class SecondMode:
 
 
 def modes_over_range(mode: SwayMode, range_pct: float, count: int = LENGTHS) -> list[SwayMode]:
-    """Modes for pendulum lengths of -range ... +range percent, with the damping ratio kept."""
+    """Return modes for pendulum lengths of -range ... +range percent, with one damping ratio."""
     lengths = np.linspace(1.0 - range_pct / 100.0, 1.0 + range_pct / 100.0, count)
     return [SwayMode(mode.omega_rad_s / math.sqrt(x), mode.damping_ratio) for x in lengths]
 
@@ -55,13 +55,13 @@ def second_mode(
     tick_s: float,
     rate_per_s: float,
 ) -> SecondMode:
-    """A second mode that taps can leave in peace without spoiling the first one.
+    """Return a second mode that taps can spare without spoiling the first mode.
 
     Args:
         first: nominal mode of the axis.
         period_s: period of the second mode.
-        damping_ratio: its damping ratio.
-        range_pct: error of its pendulum length covered, +- percent.
+        damping_ratio: damping ratio of the second mode.
+        range_pct: error of its pendulum length that the taps cover, +- percent.
         tick_s: tick of the axis.
         rate_per_s: rate of the valve, full speeds per second.
 
@@ -86,7 +86,7 @@ def second_mode(
 def second_residual(
     taps: Sequence[float] | NDArray[np.float64], second: SecondMode, tick_s: float
 ) -> float:
-    """Largest swing of a second mode when taps are over, fraction of its unshaped swing."""
+    """Return the largest swing of a second mode after the taps, part of its unshaped swing."""
     responses = second_responses(second, tick_s, len(taps), FINE)
     return float(np.max(np.abs(responses @ np.asarray(taps))))
 
@@ -98,7 +98,7 @@ Responses = NDArray[np.complex128]
 def responses_of(
     mode: SwayMode, range_pct: float, tick_s: float, count: int, lengths: int = LENGTHS
 ) -> Responses:
-    """Return the responses of a mode, at lengths over its range."""
+    """Return the responses of a mode, one row for each length over its range."""
     poles = np.array([one.pole for one in modes_over_range(mode, range_pct, lengths)])
     return np.exp(-np.outer(poles, np.arange(count)) * tick_s)
 

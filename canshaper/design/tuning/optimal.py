@@ -1,4 +1,4 @@
-"""The optimal tuner: Eq. 14-15 from several starts, what holds the optimum and how flat it is."""
+"""The optimal tuner: Eq. 14-15 from several starts, the bounds at the optimum, and its flatness."""
 
 import itertools
 import math
@@ -27,16 +27,16 @@ class Tuning:
 
     Attributes:
         poles_rad_s: the two poles of the filter, rad/s, slowest first.
-        third_pole_rad_s: the lag on the command, rad/s, or None.
-        a1: coefficient of Eq. 13 for the two poles, s.
-        a2: the same, s^2.
+        third_pole_rad_s: pole of the lag on the command, rad/s, or None.
+        a1: coefficient of s in Eq. 13 for the two poles, s.
+        a2: coefficient of s^2 in Eq. 13, s^2.
         method: "optimal" or "manual".
-        cost: Eq. 15 (mean over the samples), or the worst residual where that was minimised.
-        active: requirements that hold the optimum where it is.
-        ranges_rad_s: per pole, how far it may go, the others following, while the requirements are
-            kept and the cost is at most 1 % higher.
+        cost: Eq. 15 (mean over the samples), or the worst residual if that was minimised.
+        active: requirements that bound the optimum.
+        ranges_rad_s: per pole, its range with the requirements kept and at most 1 % more cost, if
+            the other poles follow.
         starts: number of starts.
-        converged: how many of them ended in this optimum.
+        converged: number of starts that ended in this optimum.
         build_s: time to build the programme.
         solve_s: time to solve it, the ranges included.
     """
@@ -63,12 +63,12 @@ def tune(
     """Solve a task.
 
     Args:
-        task: what is asked.
-        starts: how many starts, or the poles of each in rad/s (negative, slowest first).
-        on_progress: called with the part done, 0 to 1, and what is done next.
+        task: cost and requirements.
+        starts: number of starts, or the poles of each start in rad/s (negative, slowest first).
+        on_progress: called with the part done, 0 to 1, and the name of the next step.
 
     Raises:
-        InfeasibleError: no poles keep all requirements; says which conflict and what is attainable.
+        InfeasibleError: no poles keep all requirements; the message has the attainable values.
         DesignError: a value is out of range, or no start converged.
     """
     report = on_progress or (lambda _done, _what: None)
@@ -112,9 +112,9 @@ def tune(
 
 
 def spread(program: Program, count: int) -> list[Vector]:
-    """Starts over the whole box: golden section for the slowest pole, modest ratios for the rest.
+    """Return starts over the whole box: slowest pole by golden section, small ratios to the rest.
 
-    The first one lies at the frequency of the sway, where the optimum usually is.
+    The first start lies at the frequency of the sway, where the optimum usually is.
     """
     low, high = program.low[0], program.high[0]
     swing = math.log(program.task.mode.omega_rad_s)
@@ -130,7 +130,7 @@ def spread(program: Program, count: int) -> list[Vector]:
 
 
 def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]:
-    """Starts from poles."""
+    """Return starts from these poles."""
     points = []
     for poles in starts:
         if len(poles) != program.size or not all(p < 0.0 for p in poles):
@@ -142,7 +142,7 @@ def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]
 
 
 def _second_try(program: Program) -> Solution:
-    """Solve from a feasible point of a search over all poles, or say why there is none."""
+    """Solve from a feasible point of a search over all poles, or raise the reason for none."""
     point = feasible_point(program)
     if point is None:
         raise InfeasibleError(explain(program))
@@ -153,7 +153,7 @@ def _second_try(program: Program) -> Solution:
 
 
 def _ranges(program: Program, best: Solution) -> tuple[tuple[float, float], ...]:
-    """Smallest and largest |pole| within ``FLAT`` of the cost, as poles, slowest first."""
+    """Return each pole's range, slowest first, in which the cost is within ``FLAT`` of the best."""
     limit = best.cost * (1.0 + FLAT)
     result = []
     for i in range(program.size):
@@ -168,7 +168,7 @@ def _ranges(program: Program, best: Solution) -> tuple[tuple[float, float], ...]
 
 
 def _settled(program: Program, best: Solution) -> list[float]:
-    """Poles q_i; ones that the interior-point method left a hair apart are put together."""
+    """Return the poles q_i; poles that the interior-point method left a hair apart become equal."""
     q = [float(x) for x in np.exp(np.cumsum(best.z))]
     for together in range(len(q), 1, -1):
         group = q[:together]
@@ -182,11 +182,11 @@ SECOND_TO_FIRST = 1.9
 
 
 def manual(mode: SwayMode) -> Tuning:
-    """Setting by the rule: first pole at five times the real part of the sway pole.
+    """Return the setting of the manual rule: first pole at five times the sway pole's real part.
 
     Raises:
-        DesignError: the sway is damped so little or so much that the poles are outside what a
-            deployment may have.
+        DesignError: the sway is damped so little or so much that the poles leave the range of a
+            deployment.
     """
     first = POLE_DISTANCE * mode.pole.real
     poles = first, SECOND_TO_FIRST * first

@@ -1,6 +1,6 @@
-"""The picture of a tuning: the answer to a full press, and the swing left when the length is wrong.
+"""The picture of a tuning: the answer to a full press, and the swing left at wrong lengths.
 
-Drawn through the object API of matplotlib, like ``canshaper.report.plot``.
+It uses the object API of matplotlib, like ``canshaper.report.plot``.
 """
 
 import math
@@ -40,17 +40,17 @@ def figure(
     before: Setting | None = None,
     choices: Sequence[Choice] = (),
 ) -> Figure:
-    """The picture of a setting.
+    """Return the picture of a setting.
 
     Args:
         axis: name of the axis.
         setting: the setting.
         mode: sway mode of the axis.
-        tick_s: period of the axis.
-        machine: what stands behind the filter.
+        tick_s: period of the axis, s.
+        machine: limits and valve behind the filter.
         full_speed_m_s: speed of the tip at full command, for the swing in degrees.
-        before: the setting in the file, to compare with.
-        choices: front of settings from quick to calm that it was chosen of, drawn below.
+        before: the setting in the file, for comparison.
+        choices: the front from quick to calm from which the setting was chosen, drawn below.
     """
     duration_s = max(3.0, 1.5 * setting.measures.run_on_s, 1.5 * mode.period_s)
     shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
@@ -78,9 +78,9 @@ def figure(
 
 
 def finding(axis: str, setting: Setting) -> str:
-    """Say what the setting does: "Slew: 4 % of the swing is left, ...".
+    """Return the effect of the setting as a sentence: "Slew: 4 % of the swing is left, ...".
 
-    Shares are of what the same movement of the joystick leaves without the filter.
+    Shares refer to the swing that the same movement of the joystick leaves without the filter.
     """
     m = setting.measures
     return (
@@ -157,7 +157,7 @@ def _draw_swing(panel: Axes, traces: Traces, to_deg: float) -> None:
 
 
 def _draw_front(panel: Axes, choices: Sequence[Choice], chosen: Evaluation) -> None:
-    """Dip and swing left over the rise of each setting that no other one beats."""
+    """Draw dip and swing left over the rise time of each setting of the front."""
     plain(panel)
     rise_s = [one.felt[0] for one in choices]
     for at, text, colour in ((2, "dip while held", "#56A0D3"), (3, "left, ±10 %", SHAPED_COLOUR)):
@@ -169,7 +169,7 @@ def _draw_front(panel: Axes, choices: Sequence[Choice], chosen: Evaluation) -> N
 
 
 def _draw_length(panel: Axes, measures: Evaluation, before: Evaluation | None) -> None:
-    """Residual over the length error; the names stand at the ends of the curves."""
+    """Draw the residual over the length error; the names stand at the ends of the curves."""
     errors = [r.length_pct for r in measures.residuals]
     curves = [
         ([r.machine for r in measures.residuals], "through limits and valve", SHAPED_COLOUR, "-"),

@@ -1,9 +1,10 @@
 """One number from quicker to calmer, in place of weights: settings along a Pareto front.
 
-Each setting of a grid of two or three real poles that keeps the requirements is measured through
-the limits of the axis. The number weighs what is quick (rise and run-on) against what is calm (dip
-and swing left): the larger of both, each as a part of its span on the front, is least (Chebyshev),
-so that every setting of the front can be the answer, and more of the number is never quicker.
+The module measures settings on a grid of two or three real poles through the limits of the axis and
+keeps those that meet the requirements. The number weighs quickness (rise and run-on) against calm
+(dip and swing left). Each of the two is scaled to its span on the front, and the setting with the
+smallest larger one is chosen (Chebyshev). So every setting of the front can be the answer, and a
+larger number never gives a quicker setting.
 """
 
 from collections.abc import Callable, Iterator
@@ -44,13 +45,13 @@ def front(
     preference: float,
     on_progress: Callable[[float, str], None] = lambda _done, _what: None,
 ) -> list[Choice]:
-    """Settings that no other one beats, quickest first.
+    """Return the settings of the Pareto front, quickest first.
 
     Args:
         task: swing, tick and requirements; its weights and length range have no meaning here.
-        machine: what stands behind the filter.
-        preference: from 0, quickest, to 1, calmest.
-        on_progress: called with the part done, 0 to 1, and what is done.
+        machine: limits and valve behind the filter.
+        preference: from 0, quickest, to 1, calmest; only its range is checked.
+        on_progress: called with the part done, 0 to 1, and the name of the present step.
 
     Raises:
         DesignError: the preference is out of range.
@@ -76,7 +77,7 @@ def front(
 
 
 def chosen(choices: list[Choice], preference: float) -> Choice:
-    """The setting of a front for a preference."""
+    """Return the setting of a front for a preference."""
 
     def shares(first: int) -> list[float]:
         sums = [sum(one.felt[first : first + 2]) for one in choices]
@@ -91,7 +92,7 @@ def chosen(choices: list[Choice], preference: float) -> Choice:
 
 
 def table(choices: list[Choice], preference: float, full_speed_m_s: float) -> Table:
-    """The front from quick to calm, with the row of a preference."""
+    """Return the front from quick to calm as a table, with the row of this preference in bold."""
     heads = ("poles, rad/s", "rise, s", "dip, %", "run-on, m", "left, %", "±10 %")
     result = new_table("preference", *heads)
     for row in sorted({0.0, 0.25, 0.5, 0.75, 1.0, preference}):
@@ -106,7 +107,7 @@ def table(choices: list[Choice], preference: float, full_speed_m_s: float) -> Ta
 
 
 def _grid(task: Task) -> Iterator[tuple[float, ...]]:
-    """Poles in rad/s, slowest first; with a third one alone where the task asks for it."""
+    """Yield poles in rad/s, slowest first; only with a third pole if the task requires it."""
     low, high = task.slowest()[0], task.fastest()[0]
     for k, second, third in product(range(_COUNT), _RATIOS, (None, *_RATIOS)):
         first = low * (high / low) ** (k / (_COUNT - 1))

@@ -4,10 +4,10 @@ The unknowns are z = [ln q1, ln(q2/q1), (ln(q3/q2))] with the poles -q_i, slowes
 z_2, z_3 >= 0, and 14e becomes a bound on z_1 (or on the sum of z):
 docs/decisions.md#poles-as-logarithms.
 
-The cost watches Eq. 13 sampled exactly: u is held, so a chain of first-order lags gives v of
-v = u / (a2 s^2 + a1 s + 1) by a matrix exponential that also holds for a double pole, and
-y = v + b1 v' + b2 v''. The requirements watch the filter as it is deployed, state feedback on the
-sampled sway model (``canshaper.shaping.shapers.gff``), so that what they promise is what is sent.
+The cost uses Eq. 13 sampled exactly: u is held over a tick, so a chain of first-order lags gives v
+= u / (a2 s^2 + a1 s + 1) by a matrix exponential that also holds for a double pole, and y = v + b1
+v' + b2 v''. The requirements apply to the filter as it is deployed, state feedback on the sampled
+sway model (``canshaper.shaping.shapers.gff``), so that they hold for the sent frames.
 """
 
 import math
@@ -43,7 +43,7 @@ _IPOPT: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A requirement: name, expression (a column), bounds of each of its entries."""
+    """A requirement: its name, its expression (a column), and the bounds of each entry."""
 
     name: str
     value: Any
@@ -58,8 +58,8 @@ class Solution:
     Attributes:
         z: the unknowns, [ln q1, ln(q2/q1), ...].
         cost: value of the cost.
-        active: names of the requirements that hold it there.
-        success: whether IPOPT says so.
+        active: names of the requirements that bound the solution.
+        success: IPOPT reports success.
     """
 
     z: Vector
@@ -120,9 +120,9 @@ class Program:
         """Run IPOPT.
 
         Args:
-            start: first z.
-            direction: instead of the cost, minimise its product with the ln q_i.
-            cost_limit: the cost may not exceed this.
+            start: z of the start.
+            direction: if given, minimise its scalar product with the ln q_i in place of the cost.
+            cost_limit: largest allowed cost.
         """
         n = self.size
         extra = [self.cost(start)] if self._epigraph else []
@@ -142,11 +142,11 @@ class Program:
         return Solution(z, self.cost(z), active, stats["success"])
 
     def cost(self, z: Vector) -> float:
-        """Cost of a setting, whatever its requirements."""
+        """Return the cost of a setting, whatever its requirements."""
         return float(self._cost(z))
 
     def response(self, z: Vector) -> Vector:
-        """Response of the deployed filter to a unit step, one value a tick."""
+        """Return the response of the deployed filter to a unit step, one value for each tick."""
         return np.asarray(self._response(z).full()).ravel()
 
     def _requirements(self, z: Any, q: Any, response: Any, worst: Any) -> list[Row]:
@@ -178,7 +178,7 @@ class Program:
         return rows
 
     def _active(self, answer: Any, z: Vector) -> tuple[str, ...]:
-        """Requirements at their bound with a force on it."""
+        """Return the requirements at their bound whose multiplier is not zero."""
         names: dict[str, None] = {}
         if any(np.expm1(z[1:]) < 1e-2):
             names["real poles (14d)"] = None
@@ -192,7 +192,7 @@ class Program:
 
 
 def _chain(task: Task, n: int) -> Any:
-    """Function q -> [Ad | Bd] of v_i' = q_i (v_(i-1) - v_i), v_0 = u held over a tick."""
+    """Return q -> [Ad | Bd] of v_i' = q_i (v_(i-1) - v_i), v_0 = u held over a tick."""
     q = ca.SX.sym("q", n)
     m = ca.SX(n + 1, n + 1)
     for i in range(n):
@@ -205,7 +205,7 @@ def _chain(task: Task, n: int) -> Any:
 
 
 def _cost(task: Task, z: Any) -> Any:
-    """Eq. 15 for a unit step: mean over the N samples."""
+    """Return Eq. 15 for a unit step: the mean over the N samples."""
     n, w, weights = task.pole_count, task.mode.omega_rad_s, task.weights
     b1, b2 = 2.0 * task.mode.damping_ratio / w, 1.0 / w**2
     x, q, chain = ca.SX.sym("x", n + 2), ca.SX.sym("q", n), ca.SX.sym("chain", n, n + 1)
@@ -243,9 +243,9 @@ def _cost(task: Task, z: Any) -> Any:
 
 
 def _deployed_response(task: Task, n: int) -> Any:
-    """Function z -> response of ``Gff`` to a unit step, until well after the horizon.
+    """Return the function z -> response of ``Gff`` to a unit step, until after the horizon.
 
-    The first two poles are those of the state feedback, the fastest one is the lag of the command.
+    The first two poles belong to the state feedback, the third to the lag of the command.
     """
     z = ca.SX.sym("z", n)
     sway = SwayModel(task.mode, task.tick_s)
@@ -274,7 +274,7 @@ def _deployed_response(task: Task, n: int) -> Any:
 
 
 def _residuals(task: Task, q: Any) -> Any:
-    """|H(e^(pT))| of the deployed filter at the sway poles p over the range of lengths."""
+    """Return |H(e^(pT))| of the deployed filter at the sway poles p over the range of lengths."""
     assert task.length_range_pct is not None
     tick = task.tick_s
     zero = np.exp(task.mode.pole * tick)

@@ -1,13 +1,13 @@
 """The robust shaper: a non-negative impulse response for a range of pendulum lengths, by LP.
 
-Taps h_k >= 0 with sum 1 keep the output within the range of the commands, so it is never clipped;
+Taps h_k >= 0 with sum 1 keep the output within the range of the commands, so no limit clips it;
 taps below the valve's rate times the tick keep a press or a release within the rate. Among these
 the programme finds the one with the least worst residual |H(p)| over the range (``least_residual``)
 or the shortest one below a given residual (``shortest``).
 
-Without a floor no shaper of this kind can beat the optimum: that is also the limit that others are
-measured against. But its taps stand in a few heaps, and a tap of the joystick moves the crane once
-for each heap. A least tap makes one movement of it, for a little more residual.
+Without a floor of the taps no shaper of this kind can beat the optimum, which is also the limit in
+the comparison. But its taps stand in a few groups, and a tap of the joystick moves the crane once
+for each group. A least tap turns them into one movement, for a little more residual.
 
 A second mode (grapple and rotator with long logs) adds rows.
 """
@@ -49,9 +49,9 @@ class RobustShaper:
     Attributes:
         taps: impulse response at the tick, sum 1.
         residual: largest |H(p)| over the range of lengths, fraction of the unshaped swing.
-        second_residual: that of the second mode; 0 without one.
-        duration_s: from the first to the last tap.
-        mean_delay_s: centre of the taps: how far the crane lags behind the joystick.
+        second_residual: residual of the second mode; 0 without a second mode.
+        duration_s: time from the first to the last tap.
+        mean_delay_s: centre of the taps: lag of the crane behind the joystick.
     """
 
     taps: tuple[float, ...]
@@ -73,20 +73,20 @@ def least_residual(
     second: SecondMode | None = None,
     first: Sequence[float] = (),
 ) -> RobustShaper:
-    """Least worst residual over the range that taps within the duration and the rate can give.
+    """Return the shaper with the least worst residual over the range, for this duration and rate.
 
     Args:
         mode: nominal sway mode.
         tick_s: tick of the axis.
         duration_s: length of the impulse response.
-        range_pct: pendulum length error covered, +- percent, 0 to 60.
+        range_pct: error of the pendulum length that the taps cover, +- percent, 0 to 60.
         rate_per_s: rate of the valve, full speeds per second.
         swing: unshaped swing as (length error in percent, swing), rising in the error, linear
-            between; by default the same at every length. The residual then is in its unit.
-        least_tap: least tap, as a part of the mean one, 0 to 1.
+            between; by default 1 at every length. The residual has the unit of the swing.
+        least_tap: least tap, as a part of the mean tap, 0 to 1.
         second: second mode, whose residual counts twice.
-        first: taps with which it begins, as those of another load do: until then a change between
-            both changes no output.
+        first: taps with which the response begins, shared with the shaper of another load: during
+            these a change between both shapers changes no output.
 
     Raises:
         DesignError: a value is out of range, or the rate cannot reach full speed in the duration.
@@ -121,10 +121,10 @@ def least_residual(
 def _least_taps(
     rows: NDArray[np.float64], tick_s: float, bounds: list[tuple[float, float]]
 ) -> NDArray[np.float64]:
-    """Taps with the least largest row, each within its bounds, 1 in sum.
+    """Return the taps with the least largest row, each within its bounds, with sum 1.
 
     Raises:
-        DesignError: the solver finds none.
+        DesignError: the solver finds no such taps.
     """
     # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
     count = rows.shape[1]
@@ -152,10 +152,10 @@ def shortest(
     rate_per_s: float,
     second: SecondMode | None = None,
 ) -> RobustShaper:
-    """Shortest impulse response with at most this residual over the range (bisection).
+    """Return the shortest impulse response with at most this residual over the range (bisection).
 
     Raises:
-        DesignError: not reached within five swings, or a value out of range.
+        DesignError: no response of five swings is good enough, or a value is out of range.
     """
     longest = 5.0 * mode.period_s
     _check(tick_s, longest, range_pct, rate_per_s)
@@ -194,9 +194,9 @@ def shortest(
 def time_optimal_s(
     mode: SwayMode, *, tick_s: float, rate_per_s: float, low: float = 0.0, high: float = 1.0
 ) -> float:
-    """Shortest time to change the speed by one with no swing left, output within [low, high].
+    """Return the least time in s of a speed change by 1 without residual, output in [low, high].
 
-    Not a shaper for moving joysticks (it may step back and forth): the limit that none can pass.
+    The output is a limit for shapers, not a shaper for moving joysticks: it may go back.
     """
     n_low, n_high = 1, round(3.0 * mode.period_s / tick_s)
 
@@ -239,7 +239,7 @@ def _weights(swing: Swing, range_pct: float, count: int) -> NDArray[np.float64]:
 def _disc_rows(
     responses: Responses, weights: float | NDArray[np.float64] = 1.0
 ) -> NDArray[np.float64]:
-    """Rows whose product with the taps is Re(H e^(-i phi)) for every length and direction."""
+    """Return rows whose product with the taps is Re(H e^(-i phi)), by length and direction."""
     turns = np.exp(-2j * np.pi * np.arange(_SIDES) / _SIDES)
     weighted = responses * np.reshape(weights, (-1, 1))
     rows: NDArray[np.float64] = (turns[None, :, None] * weighted[:, None, :]).real

@@ -1,4 +1,4 @@
-"""The picture of a robust shaper: its impulses, its step, and what it leaves over the length."""
+"""The picture of a robust shaper: impulse response, step response, residual over the length."""
 
 import math
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ LENGTHS_PCT = tuple(range(-30, 31, 5))
 
 @dataclass(frozen=True)
 class Candidate:
-    """A filter in the picture: its name, and how it is made on a sway model."""
+    """A filter in the picture: its name, and the function that makes it on a sway model."""
 
     name: str
     shaper_for: ShaperFor
@@ -58,15 +58,15 @@ def figure(
     filters: Sequence[Candidate],
     range_pct: float,
 ) -> Figure:
-    """Impulse response, step response, and residual over the length error.
+    """Return the picture: impulse response, step response, and residual over the length error.
 
     Args:
-        axis: its name.
+        axis: name of the axis.
         mode: sway mode of the axis.
-        tick_s: period of the axis.
-        machine: what stands behind the filter.
-        filters: the new one, and the one of the file where there is one.
-        range_pct: length error that the new one is made for.
+        tick_s: period of the axis, s.
+        machine: limits and valve behind the filter.
+        filters: the new filter, and that of the file if there is one.
+        range_pct: length error that the new filter is made for, +- percent.
     """
     steps = [step_response(mode, tick_s, one.shaper_for) for one in filters]
     measured = [evaluate(mode, tick_s, f.shaper_for, machine, LENGTHS_PCT) for f in filters]
@@ -107,7 +107,7 @@ def figure(
 
 
 def _ends(response: Sequence[float]) -> int:
-    """The tick from which it stays where it ends."""
+    """Return the tick from which the response stays at its final value."""
     last = [k for k, value in enumerate(response) if abs(value - response[-1]) > 1e-3]
     return (last[-1] if last else 0) + 2
 

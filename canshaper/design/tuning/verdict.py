@@ -1,7 +1,7 @@
-"""Whether a filter damps on its machine: what is left of the swing, and what would leave less.
+"""Judge a filter on its machine: the part of the swing that it leaves, and what would leave less.
 
-Left is the larger of a full press and a full release, through the limits of the axis (tail, rates,
-smallest output) and a lagging valve, as a part of what the same movement leaves without filter.
+That part is the larger one of a full press and a full release, through the limits of the axis
+(tail, rates, smallest output) and a lagging valve, relative to the same movement without filter.
 """
 
 import math
@@ -31,9 +31,9 @@ class Verdict:
     """Swing that a filter leaves, and changes that would leave less.
 
     Attributes:
-        left: largest part of the swing that is left at the lengths looked at.
-        length_pct: how much longer the pendulum is there than the sway data says.
-        cures: what would leave less, each with how much, in words; none for a good filter.
+        left: largest part of the swing that is left at the judged lengths.
+        length_pct: percent by which that pendulum is longer than the sway data says.
+        cures: texts of changes that would leave less; empty for a good filter.
     """
 
     left: float
@@ -42,23 +42,23 @@ class Verdict:
 
     @property
     def useless(self) -> bool:
-        """Whether it is not to be written."""
+        """True if the filter must not be written to the file."""
         return self.left > USELESS
 
     @property
     def word(self) -> str:
-        """Good, poor or useless."""
+        """One of "good", "poor" and "useless"."""
         return "useless" if self.useless else "poor" if self.left > GOOD else "good"
 
     def with_cure(self, left: float, change: str) -> Self:
-        """Itself with a change in front, where it is not good and that leaves less."""
+        """Return a copy with this change as first cure if it is needed and helps, else itself."""
         if self.left <= GOOD or left >= _HELPS * self.left:
             return self
         text = f"{change} would leave {100.0 * left:.1f} %"
         return replace(self, cures=(text, *self.cures))
 
     def as_dict(self) -> dict[str, Any]:
-        """For ``--json``."""
+        """Return the verdict for ``--json``."""
         return {"word": self.word, **asdict(self)}
 
     def __str__(self) -> str:
@@ -76,11 +76,11 @@ def judge(
     """Judge a filter at the right length and at both ends of the range that it covers.
 
     Args:
-        mode: sway mode as the file says.
-        tick_s: period of the axis.
+        mode: sway mode of the file.
+        tick_s: period of the axis, s.
         shaper_for: makes the filter on a sway model.
-        machine: what stands behind it.
-        range_pct: length error that it covers, +- %.
+        machine: limits and valve behind the filter.
+        range_pct: length error that the filter covers, +- percent.
     """
     lengths = (-range_pct, 0.0, range_pct) if range_pct else (0.0,)
     residuals = evaluate(mode, tick_s, shaper_for, machine, lengths).residuals
@@ -132,13 +132,13 @@ def on_axis(
     sway: Sway | None = None,
     tail_s: float | None = None,
 ) -> tuple[SwayMode, float, ShaperFor, Machine]:
-    """Arguments of ``judge``, ``evaluate`` and ``press`` for a filter on an axis that swings.
+    """Return the arguments of ``judge``, ``evaluate`` and ``press`` for a filter on a swaying axis.
 
     Args:
-        deployment: the machine; the limits are those of the axis, its stopping distance too.
+        deployment: the machine; the axis gives the limits, with its stopping distance.
         axis: name of the axis.
         chosen: the filter.
-        sway: swing; None for that of the axis.
+        sway: sway data; None for that of the axis.
         tail_s: tail in place of that of the file.
     """
     bound = deployment.axes[axis]
@@ -152,7 +152,7 @@ def on_axis(
 
 
 def verdicts(deployment: Deployment) -> Iterator[tuple[Place, Verdict]]:
-    """Judge each filter of a swinging axis, profiles and breakpoints too; yield them by place."""
+    """Yield (place, verdict) of each filter of a swaying axis, profiles and breakpoints too."""
     for name, bound in deployment.axes.items():
         for place, chosen, sway in every_filter(("axes", name), bound.config):
             if sway is not None and chosen.kind != "off":
