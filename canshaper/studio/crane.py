@@ -232,7 +232,7 @@ class SimulatedPose:
 
 @dataclass
 class CraneSession:
-    """A crane that the page shows; ``hand`` is set if the page drives it, ``here`` if it runs here."""
+    """A crane on the page; ``hand`` is set if the page drives it, ``here`` if it runs here."""
 
     view: CraneView
     ports: Mapping[str, Port]
