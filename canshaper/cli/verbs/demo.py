@@ -110,7 +110,6 @@ def demo(
 
       canshaper demo --plant crane.fmu
     """
-    from canshaper.campaign.draw import on_unit
     from canshaper.cli.results import Results
     from canshaper.design.processes import choose_transport
     from canshaper.report.console import print_report
@@ -141,8 +140,7 @@ def demo(
             released_s = max((stroke.end_s for stroke in played.strokes), default=0.0)
             played = replace(played, duration_s=released_s + rest)
     else:
-        drawn = _drawn(deployment, seed, ranges, nominal)
-        drawn = on_unit(drawn, plant, nominal) if plant else drawn
+        drawn = _drawn(deployment, seed, ranges, nominal, plant)
         played, options = drawn.script, drawn.options
     results.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     if crane:
@@ -173,14 +171,19 @@ def demo(
 
 
 def _drawn(
-    deployment: "Deployment", seed: int, ranges: str | None, nominal: "CraneParameters"
+    deployment: "Deployment",
+    seed: int,
+    ranges: str | None,
+    nominal: "CraneParameters",
+    plant: Path | None,
 ) -> "Setting":
-    """A drive of a campaign; with the ranges of another file, one of its second file."""
-    from canshaper.campaign.draw import check_same_axes, draw_drive
+    """Draw a drive of a campaign; with the ranges of another file, one of its second file."""
+    from canshaper.campaign.draw import check_same_axes, draw_drive, on_unit
 
     first = loader(ranges)() if ranges else deployment
     check_same_axes(first, deployment)
-    return draw_drive(deployment, seed, first.config.uncertainty, nominal)
+    drawn = draw_drive(deployment, seed, first.config.uncertainty, nominal)
+    return on_unit(drawn, plant, nominal) if plant else drawn
 
 
 def _driven(

@@ -191,7 +191,7 @@ def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
         swing = math.degrees(math.sqrt(fit.square / fit.count))
         faults.append(
             f"{source}: expected the delay to {1000 * WIDEST_DELAY_S:.0f} ms, got it to"
-            f" {1000 * half:.0f} ms, by {swing:.2g} {finding.unit} of swing in a noise of"
+            f" {1000 * half:.1f} ms, by {swing:.2g} {finding.unit} of swing in a noise of"
             f" {finding.noise:.2g}: drive it more often, or faster"
         )
     least_m_s = most_m_s = axis.config.sway.full_speed_m_s

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from canshaper.commissioning.sensor.finding import Finding, changes
+from canshaper.commissioning.sensor.finding import WIDEST_DELAY_S, Finding, changes
 from tests.commissioning.sensor.drives import AXES, FILE, GYRO, Drive, machine
 
 ROBUST = FILE.parent / "j1939-sensor.yaml"
@@ -25,13 +25,17 @@ def judge(drive: Drive, case: Sequence[float], part: float = 1.0) -> Finding:
         f"{drive.axis} {case}: {finding.invert} {1000 * finding.delay_s.value:.0f} ms"
         f" {finding.offset.value:.2f} {finding.noise:.3f} {finding.problems}"
     )
-    assert not finding.problems
+    # In the most noise a swing of a degree says the delay to a little more than is asked.
+    unsure = finding.delay_s.half > WIDEST_DELAY_S and noise >= max(NOISES_DEG)
+    assert len(finding.problems) == unsure
+    assert finding.delay_s.half < 1.2 * WIDEST_DELAY_S
     assert finding.invert == (sign < 0.0) ^ (drive.axis == "slew")
     assert abs(finding.delay_s.value - delay_s) < 0.015
     assert abs(finding.offset.value - offset) < 0.2
     # 0.01 degrees of the signal besides.
     assert finding.noise == pytest.approx(noise, rel=0.25)
-    assert abs(finding.delay_s.value - delay_s) < finding.delay_s.half
+    # A case in twenty is outside of an interval of 95 %, none by much.
+    assert abs(finding.delay_s.value - delay_s) < 1.5 * finding.delay_s.half
     return finding
 
 
