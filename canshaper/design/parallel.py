@@ -18,7 +18,7 @@ from canshaper.errors import CampaignError
 
 # A piece whose process dies so often is what kills it.
 MOST_DEATHS = 3
-# How soon Ctrl-C is seen.
+# Time until Ctrl-C is seen, s.
 WAIT_S = 0.2
 # A process of the pool is a child of the one that began it, on every Python.
 _CONTEXT = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
@@ -82,7 +82,7 @@ class Processes:
                         ends = yield from self._drain(pool, work, queue, interrupted)
                     except BaseException:
                         for process in multiprocessing.active_children():
-                            process.kill()  # what was forked may have a handler for SIGTERM
+                            process.kill()  # a forked process may have a handler for SIGTERM
                         pool.shutdown(cancel_futures=True)
                         raise
 
@@ -101,7 +101,7 @@ class Processes:
                 try:
                     doing[pool.submit(work, item[0])] = item
                 except BrokenProcessPool:
-                    queue.put_back(item[0], item[1] - 1)  # it never began
+                    queue.put_back(item[0], item[1] - 1)  # this job never began
                     dead = True
             if not doing:
                 return not dead
@@ -144,7 +144,7 @@ def _begin(parent: int) -> None:
         parent: number of the process that started it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
-    end_with_parent(signal.SIGKILL)  # which may have no time for it
+    end_with_parent(signal.SIGKILL)  # the parent may have no time to end it
     # Not by the pipe of multiprocessing: a sibling that was forked later holds its other end too.
     if os.getppid() != parent:
         sys.exit(1)

@@ -65,7 +65,7 @@ __all__ = ["BusDrive", "Crew", "DriveError", "Transport", "choose_transport", "d
 # Processes import and open their buses; slow virtual machines take many times as long as a PC.
 START_LIMIT_S = 60.0
 STOP_LIMIT_S = 10.0
-# How often the children are looked after while nothing is on the buses.
+# Period of the checks of the children while nothing is on the buses, s.
 LISTEN_STEP_S = 0.1
 
 

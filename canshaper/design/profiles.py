@@ -14,7 +14,7 @@ from canshaper.report.metrics import AxisMetrics, axis_metrics
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import Script, Stroke
 
-# Of the pendulum length; the profiles are compared where the sway data is as wrong as is usual.
+# Error of the pendulum length at which profiles are compared: a usual error of sway data.
 LENGTH_PCT = 15
 _PRESS = (0.5, 3.0, 1.0, 0.1)  # start, duration, level, ramp
 _DRIVE_S = 10.0

@@ -20,7 +20,7 @@ class Edit:
         self._place = place
         self._name = name
         self._spans: list[tuple[int, int, str]] = []
-        self._removed: list[int] = []  # which pairs are taken out
+        self._removed: list[int] = []  # indices of the removed pairs
         try:
             root = yaml.compose(text, Loader=yaml.SafeLoader)
         except yaml.YAMLError as error:

@@ -140,12 +140,12 @@ def _data(words: list[str]) -> list[str]:
 # on the file names them.
 COLUMNS: Mapping[str, str] = {"1.0": "NOILD", "1.1": "NOTILD", "1.2": "NOBTILD", "1.3": "NOBTIRLD"}
 NAMED = ("2.0", "2.1")
-_EPOCH = datetime(1899, 12, 30, tzinfo=UTC)  # of Delphi's dates, and of spreadsheets
+_EPOCH = datetime(1899, 12, 30, tzinfo=UTC)  # day 0 of Delphi's dates and of spreadsheets
 # Kinds of lines that are frames, and kinds that are left out by name; others are events.
 _FD = frozenset(("FD", "FB", "FE", "BI"))
 _DATA = frozenset(("Rx", "Tx", "DT")) | _FD
 _LEFT_OUT = {**dict.fromkeys(("Error", "ER"), "error"), "RR": "remote"}
-_NO_ID = "FFFFFFFF"  # of a warning, in version 1.0
+_NO_ID = "FFFFFFFF"  # id of a warning, in version 1.0
 
 
 def trc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:

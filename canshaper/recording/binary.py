@@ -97,7 +97,7 @@ def _reason(error: Exception) -> str:
 
 
 MOST_NAMED = 5
-# What mcap raises at a damaged file besides its own.
+# Errors that mcap raises for a damaged file, besides its own ones.
 DAMAGED = (
     ArithmeticError,
     LookupError,

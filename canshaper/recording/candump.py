@@ -24,7 +24,7 @@ _CANDUMP = re.compile(
     rb"(?:((?:[0-9A-Fa-f]{2}){0,8})(?:_[0-9A-Fa-f])?|(R[0-9]?(?:_[0-9A-Fa-f])?)"
     rb"|#[0-9A-Fa-f]((?:[0-9A-Fa-f]{2}){0,64}))(?: [RTrt])?\s*"
 )
-# As it stands on the screen, with -t a, A or z; the length of CAN FD has two digits.
+# A line on the screen, with -t a, A or z; the length of CAN FD has two digits.
 _SCREEN = re.compile(
     rb"\s*(?:\(([^)]*)\)\s+)?(\S+)\s+(?:[RT]X [B -] [E -]\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
     rb"\s+\[(\d{1,2})\]\s*(remote request|(?:[0-9A-Fa-f]{2}(?:\s+|$))*)(.*)",
@@ -38,7 +38,7 @@ TIMES = "times before the frames: candump -L, or candump -t a"
 # candump's times of -t d, and of -t z.
 _PADDED = re.compile(rb"(\s*\()(\d{3,6})\.(\d{6})(?=\))")
 LEAST_STAMPS, MOST_STAMPS = 8, 400
-# Below an error frame, with -e.
+# The lines below an error frame, with -e.
 _OF_ERROR = re.compile(rb"\s+[a-z][a-z-]+(?:[{,].*)?\s*")
 _DROPPED = re.compile(rb"DROPCOUNT: dropped (\d{1,10}) CAN frames? on .*\s*")
 
@@ -89,7 +89,7 @@ def _are_differences(head: bytes) -> bool:
         return False
     half = len(stamps) // 2
     latest = max(stamps[:half])
-    # Two logs in one file go back once; those of two sockets by little.
+    # Two logs in one file go back once; the times of two sockets go back by little.
     back = sum(after < before for before, after in pairwise(stamps))
     same = len(set(stamps[1:])) == 1
     return (same or 8 * back >= half) and 4 * sum(t <= latest for t in stamps[half:]) >= 3 * half
@@ -144,7 +144,7 @@ def _screen(line: bytes, place: Place) -> TimedFrame | None:
     if source is None or data.startswith(b"remote"):
         place.left_out["error" if source is None else "remote"] += 1
         return None
-    # What looks like bytes behind them is the text of -a.
+    # Further words that look like bytes are the text of -a.
     payload = bytes.fromhex(data.decode("ascii"))[: int(length)]
     day, seconds, fraction = time.groups()
     whole = int(datetime.fromisoformat(day).timestamp()) if day else int(seconds)
@@ -189,7 +189,7 @@ def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
             )
             if minus or "R" in flags:
                 place.left_out["before the start" if minus else "remote"] += 1
-            elif direction != "TxRq":  # its Tx follows
+            elif direction != "TxRq":  # a Tx line follows it
                 time_ns = int(whole) * SECOND_NS + int(part.ljust(9, "0"))
                 fd = "F" in flags and int(count) < len(FD_LENGTHS)
                 length = FD_LENGTHS[int(count)] if fd else int(count)

@@ -18,7 +18,7 @@ from canshaper.recording.channels import MOST_BYTES, Place, TimedFrame
 _new = tuple.__new__  # TimedFrame(...) in half the time
 # The start of every object, containers too: LOBJ, size of the header, its version, length, kind.
 _OBJECT = struct.Struct("<4sHHLL")
-# What follows it in both versions, the unit of the time and the time; and where a frame begins.
+# In both versions unit and value of the time follow; by version, the offset of the frame.
 _TIME = struct.Struct("<L4xQ")
 _FRAME_AT = {1: 32, 2: 40}
 _CAN_KINDS = _CAN, _CAN_2 = 1, 86
@@ -37,18 +37,18 @@ _REMOTE, _IS_FD = 0x80, 0x01
 _REMOTE_64, _IS_FD_64 = 0x10, 0x1000
 _EXTENDED = 0x80000000
 _TEN_MICROSECONDS = 1
-# How far from the end of an object the next one may begin, because of its padding.
+# Largest distance from the end of an object to the next one, because of padding.
 _PADDING = 8
 
 
 def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     """Yield the frames of Vector's BLF; times to the ns or to ten us, as the logger wrote them."""
-    wrong = cut_off(file)  # which python-can passes over in silence
+    wrong = cut_off(file)  # python-can ignores this silently
     file.seek(0)
     try:
         frames: Iterable[Any] = _Reader(file, place)
         yield from frames
-    except Exception as error:  # of many kinds, where the file is damaged
+    except Exception as error:  # many kinds, if the file is damaged
         if not wrong:
             got = f"{type(error).__name__} {error}".rstrip()
             raise place.error(got, "a BLF log that is whole") from error
@@ -129,7 +129,7 @@ def _fd(
         remote, is_fd = flags & _REMOTE_64, flags & _IS_FD_64
         at = body + _FD_64_FRAME.size
         end = begin + more_at if more_at else end
-    # It may have less than its length says: the loggers leave out zeros.
+    # The data may be shorter than its length: loggers leave out zeros.
     content = data[at : min(at + count, end)].ljust(count, b"\0")
     return channel, remote, MOST_BYTES if is_fd else CLASSICAL_BYTES, number, content
 
@@ -157,8 +157,8 @@ def cut_off(file: BinaryIO) -> str:
         return f"it ends within the part that begins at byte {at}"
 
 
-SOCKETCAN = 227  # its link type
-UNITS_NS = {0xA1B2C3D4: 1000, 0xA1B23C4D: 1}  # by the first number of a pcap
+SOCKETCAN = 227  # link type of SocketCAN
+UNITS_NS = {0xA1B2C3D4: 1000, 0xA1B23C4D: 1}  # unit by the first number of a pcap
 SECTION, INTERFACE, PACKET = b"\n\r\r\n", 1, 6
 NAME, RESOLUTION = 2, 9  # options of an interface
 MOST_BLOCK = 1 << 24

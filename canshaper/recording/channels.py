@@ -72,7 +72,7 @@ class Sorter:
         self._buses = deployment.routing.buses
         # Other interfaces hand out all there is before the valves have their frames.
         self._raw = {n: b.interface == "socketcan" for n, b in deployment.config.buses.items()}
-        # It carries the digest of the program that ran, which need not be this one.
+        # This message carries the digest of the recording program, which may be another one.
         identity = deployment.identity_status
         self._kinds = {identity.message.key: Kind.IGNORED} if identity else {}
 
@@ -96,9 +96,9 @@ class Sorter:
         return Kind.OTHER if self._raw[bus] else Kind.RECEIVED
 
 
-# No clock is there, whether it counts from 1970 or from the start of the log: the year 2286.
+# Later than any clock, from 1970 or from the start of the log: the year 2286.
 LATEST_S = 10_000_000_000
-MOST_BYTES = 64  # of a frame, which is one of CAN FD where it has more than 8
+MOST_BYTES = 64  # in a frame; a frame with more than 8 is one of CAN FD
 
 
 class TimedFrame(NamedTuple):

@@ -28,7 +28,7 @@ from canshaper_sim.machines import AXES_OF, build_machine, machine_for
 from canshaper_sim.parameters import changed_parameters
 
 PICTURE_NS = 40_000_000  # between two poses: a film has no more
-MOST_CODE_BITS = 8  # of a signal whose values are names
+MOST_CODE_BITS = 8  # longest signal whose values are names
 
 
 @contextmanager
@@ -174,7 +174,7 @@ class _Decoder:
 
     def _found(self, frame: ReceivedFrame) -> _Known | None:
         name = self._names.get((frame.can_id, frame.extended))
-        if name is None and frame.extended:  # of J1939, from any address
+        if name is None and frame.extended:  # a J1939 frame from any address
             name = self._names.get((with_source(frame.can_id, NULL), True))
         entry = self._messages.find(name) if name else ""
         if isinstance(entry, str):

@@ -29,11 +29,11 @@ from canshaper.errors import BusError
 
 # Frames read from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
-# So many errors of an interface with no frame and no silence between them: the bus is gone.
+# After this many errors in a row, without a frame or silence between them, the bus is gone.
 MOST_ERRORS = 10 * MOST_FAILURES
-# Of every signal that asks us to end, the next one must not wait for a frame.
+# A signal that asks us to end must not wait for the next frame.
 LOOK_S = 0.2
-# How often an interface is polled that has no file to wait for.
+# Polling period of an interface without a file descriptor, s.
 POLL_S = 0.01
 
 
@@ -88,7 +88,7 @@ class Listener:
     def __init__(self, buses: Iterable[tuple[str, Bus]]) -> None:
         self.lost, self.last_error = 0, ""
         self.errors: Counter[str] = Counter()
-        self._failing: Counter[str] = Counter()  # those without anything since, by bus
+        self._failing: Counter[str] = Counter()  # errors since the last frame, by bus
         self._sockets: dict[Any, tuple[str, str]] = {}
         self._files: list[Any] = []
         for name, bus in buses:

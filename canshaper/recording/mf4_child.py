@@ -54,7 +54,7 @@ def read(path: str) -> Iterator[list[Any] | dict[str, Any]]:
                 yield part
     except ModuleNotFoundError as error:
         fault = error.name or str(error), ""
-    except Exception as error:  # of many kinds, where the file is damaged
+    except Exception as error:  # many kinds, if the file is damaged
         fault = f"{type(error).__name__} {error}".rstrip(), WHOLE
     yield {"left out": dict(left_out), "fault": fault}
 

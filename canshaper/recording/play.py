@@ -15,7 +15,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import TimedFrame
 from canshaper.recording.ticks import Difference, Result, Tick, Timed, rows_of
 
-# What the daemon may call between two frames of one tick.
+# Calls that the daemon may make between two frames of one tick.
 WITHIN = frozenset((Kind.FAILED, Kind.WITHHELD, Kind.FAULT))
 SENT = frozenset((Kind.TX,))
 OF_A_FRAME = frozenset((Kind.RX, Kind.TX, Kind.FAILED, Kind.WITHHELD))
@@ -85,7 +85,7 @@ class Player:
                     tick.now_ns += since_1970_ns
                     tick.received = [(at + since_1970_ns, frame) for at, frame in tick.received]
                     yield tick, result
-            except Exception as error:  # what the state of another program lacks shows anywhere
+            except Exception as error:  # the state of another version fails anywhere
                 if not (self._other or isinstance(error, ValueError | LookupError)):
                     raise
                 text = f"{box.path}: segment {index + 1}: {error}{self._other}"
@@ -94,7 +94,7 @@ class Player:
 
 
 class _Played:
-    """A controller that gets the calls that the daemon made to its own."""
+    """A controller that receives the recorded calls of the daemon to its own controller."""
 
     def __init__(self, guarded: Guarded, controller: Controller, buses: list[str]) -> None:
         self._guarded, self._controller, self._buses = guarded, controller, buses

@@ -28,7 +28,7 @@ class _Look(NamedTuple):
     style: Any
 
 
-# Of Okabe and Ito, as in the other pictures.
+# Colours of Okabe and Ito, as in the other pictures.
 LOOKS = (
     _Look(style.SHAPED_COLOUR, 2.2, "solid"),
     _Look(style.RAW_COLOUR, 1.0, style.DASHED),
@@ -52,7 +52,7 @@ _NUMBERS = (
     ("run-on", "run_on_s", " s"),
 )
 _MOVES = 1e-6
-_LATE = 0.8  # of the time axis: a reason from here on ends where its state does
+_LATE = 0.8  # of the time axis: a later reason is aligned to the end of its state
 
 
 def figure(replays: Sequence[Replayed]) -> Figure:

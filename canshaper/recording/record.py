@@ -85,7 +85,7 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
     except OSError as error:
         text = f"expected a bundle that can be read, got {error.strerror or error}"
         raise LogError(f"{where}: {text}") from None
-    except Exception as error:  # of many kinds, where the file is damaged
+    except Exception as error:  # many kinds, if the file is damaged
         text = f"expected a file of canshaper record, got {type(error).__name__} {error}"
         raise LogError(f"{where}: not a bundle: {text}") from None
     for one in (log, file):
@@ -139,7 +139,7 @@ def time_text(time_ns: int) -> str:
     return datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")
 
 
-# What a computer that is switched off may lose.
+# Longest part of the log that a power cut may lose, s.
 FLUSH_S = 1.0
 
 

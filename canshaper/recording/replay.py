@@ -19,7 +19,7 @@ from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick,
 from canshaper.shaping.reasons import REASON_TEXTS
 from canshaper.shaping.states import Reason, State
 
-# What is looked at before a replay, to know the channels.
+# Frames read before a replay, to find the channels.
 LOOKED_AT = 20_000
 EXAMPLES = 5
 MOST_NAMED = 8

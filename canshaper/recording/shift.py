@@ -32,7 +32,7 @@ from canshaper_sim.cranes import cranes
 FIRST_DAY_NS = 1_000_000_000 * 1_000_000_000
 # A status comes several times a second; for so long the last one counts.
 STATUS_NS = 2_000_000_000
-# Of a pause of the log: then any swing is over.
+# Ticks computed in a pause of the log: after these any swing is over.
 MOST_TICKS = 15_000
 
 
@@ -70,7 +70,7 @@ class Shifts:
     def __init__(self, by: str, gap_s: float) -> None:
         self._by, self._gap_ns = by, round(1e9 * gap_s)
         self._figures = defaultdict[tuple[str, ...], Figures](Figures)
-        self._end_ns: dict[str, int] = {}  # of each machine, what is counted so far
+        self._end_ns: dict[str, int] = {}  # by machine, the end of the counted time
         self._shift: dict[str, str] = {}
 
     def rows(self) -> list[dict[str, Any]]:
@@ -172,7 +172,7 @@ class _Axis:
     def step(self, row: Row, now_ns: int, ticks: int) -> None:
         """Advance by this number of ticks to the replay's row of the last one."""
         self.velocity, self.state, self.foreign = row.applied, row.state, False
-        if self.valve_ns >= 0:  # it closes by itself
+        if self.valve_ns >= 0:  # a silent valve closes by itself
             silent = now_ns - self.valve_ns > 1_000_000 * self.bound.config.valve.timeout_ms
             self.velocity = 0.0 if silent else self._logged
             if 0 <= self._status_ns >= now_ns - STATUS_NS:

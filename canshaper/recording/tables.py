@@ -42,7 +42,7 @@ _UNITS = {"ms": 6, "us": 3, "µs": 3, "ns": 0}
 FORMAT = re.compile(r"format of (id|data) field\W+(hex|dec)", re.IGNORECASE)  # Kvaser's
 _TRUE = frozenset(("1", "true", "wahr"))
 _REMOTE, _EXTENDED, _ERROR = 1, 4, 0x20  # Kvaser's flags
-WRAP_NS = (1 << 32) * 1000  # of a clock of 32 bits that counts microseconds
+WRAP_NS = (1 << 32) * 1000  # period of a 32-bit clock in microseconds
 _new = tuple.__new__  # TimedFrame(...) in half the time
 MOST_KNOWN = 10_000
 MOST_ABOVE = 30  # lines above the header
@@ -163,7 +163,7 @@ class Table:
                 return name
         if not (word := row["id"]):
             return "without id"
-        if row.get("direction") == "txrq":  # its Tx follows
+        if row.get("direction") == "txrq":  # a Tx row follows it
             return "asked for"
         if self._packed and not word.startswith("0x"):
             raise ValueError

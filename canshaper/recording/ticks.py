@@ -175,7 +175,7 @@ class LogPort:
         """Yield every waiting frame."""
         waiting, self._received = self._received, []
         for time_ns, frame in waiting:
-            # Without stamps a port knows only when it was read before.
+            # Without stamps a port knows only the time of its last reading.
             self.arrived_ns = time_ns if frame.bus in self._stamped else self._before_ns
             yield frame
 

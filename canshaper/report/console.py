@@ -14,7 +14,7 @@ from rich.text import Text
 from canshaper.errors import printable
 from canshaper.report.metrics import HORIZONTAL_DEG, MIN_RAW_DEG
 
-MOST_COLUMNS = 10_000  # of a terminal that takes any table
+MOST_COLUMNS = 10_000  # of a terminal wide enough for any table
 
 
 class SafeConsole(Console):
@@ -204,7 +204,7 @@ def _pair_cell(axis: Mapping[str, Any], key: str, scale: float, digits: int, arr
     if values == [None, None]:
         return Text(NOTHING, style="dim")
     numbers = [_number(None if v is None else scale * v, digits) for v in values]
-    if key == STILL_S:  # of a drive that ended before only a lower bound is known
+    if key == STILL_S:  # a drive that ended earlier has only a lower bound
         on = (axis[drive]["swings_on"] for drive in ("raw", "shaped"))
         numbers = [f">{one}" if more else one for one, more in zip(numbers, on, strict=True)]
     return Text(f" {arrow} ".join(numbers))

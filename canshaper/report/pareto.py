@@ -14,8 +14,8 @@ from canshaper.report import style
 
 LIMIT_COLOUR = "#555555"
 _HEIGHT_PX = 2040
-_RECT = (0.0, 0.022, 1.0, 0.978)  # of the figure: the stamp is below
-# Of the labels: width of a character and height of a line, and places to try next to a dot.
+_RECT = (0.0, 0.022, 1.0, 0.978)  # part of the figure: the stamp is below
+# Labels: width of a character, height of a line, and places to try next to a dot.
 _CHARACTER_PX, _LINE_PX, _DOT_PX = 16.0, 30.0, 20.0
 _HEIGHTS = tuple(1.1 * sign * k for k in range(10) for sign in ((1, -1) if k else (1,)))
 _ASIDE_PX = tuple(float(sign * px) for px in (24, 90, 170, 260) for sign in (1, -1))
@@ -136,7 +136,7 @@ def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> No
         tries = [_Try(x, y, dx, h * _LINE_PX, point.name) for h in _HEIGHTS for dx in _ASIDE_PX]
         tries.sort(key=lambda one: len(one.line) and math.hypot(one.dx, one.dy))
         covered = [*others, dots[i]]
-        # Where there is no room, two lines may cross.
+        # Without enough room two lines may cross.
         free = [one for one in tries if one.is_free(covered, others, lines)]
         best = (one for one in free if one.is_free(covered, lines, lines))
         chosen = next(best, (free or tries)[0])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from canshaper.report.strokes import RESIDUAL_WINDOW_MIN_S, Stroke, residual_window, rests
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
-REACHED = 0.95  # of the asked speed: the usual 5 % band of a settling time
+REACHED = 0.95  # of the demanded speed: the usual 5 % band of a settling time
 LOST_AGAIN = 0.90  # below this the speed was not reached but only passed through
 STOPPED = 0.05  # of full speed: the deadband of a common proportional valve
 STILL_DEG = 2.0  # a grapple of 1.2 m then moves by 4 cm: it can be placed

@@ -84,7 +84,7 @@ def rests(recording: Recording) -> list[range]:
     def moved(k: int) -> bool:
         return any(s.press <= k and (s.release is None or k < s.release) for s in strokes)
 
-    # Two that are released in one sample begin the same rest.
+    # Two strokes released in one sample begin the same rest.
     still = {s.rest for s in strokes if s.rest and not moved(s.rest[0])}
     return sorted(still, key=lambda rest: rest.start)
 

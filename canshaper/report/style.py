@@ -185,7 +185,7 @@ def _square(points: Sequence[Point]) -> tuple[tuple[float, float], tuple[float, 
 
 # All of a report are to stay below 2 MB; a drawing that takes more is a picture of dots there.
 MOST_SVG_BYTES = 90_000
-COLOURS = 64  # of such a picture
+COLOURS = 64  # in a PNG inside a report
 
 
 def draw(figure: Callable[[], Figure], path: Path, deployment: Deployment) -> list[Path]:

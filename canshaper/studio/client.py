@@ -137,7 +137,7 @@ class Client:
         self._filled_s = time.monotonic()
         self._pending: dict[str, float] = {}
         self._slid = asyncio.Event()
-        self._preference: Preference | None = None  # of which the settings are still to be sent
+        self._preference: Preference | None = None  # its settings are still to be sent
         self._numbers = NumbersChannel(stage.numbers, number) if stage.numbers else None
 
     async def serve(self) -> None:

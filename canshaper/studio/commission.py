@@ -48,7 +48,7 @@ class Commission:
     def close(self) -> None:
         """End the process, whatever it does."""
         if self._process:
-            with self._process as process:  # which closes its pipes
+            with self._process as process:  # the context closes its pipes
                 process.terminate()
             self._process = None
 
@@ -86,7 +86,7 @@ class Commission:
             self._busy = step or "reading"
             try:
                 self._shown = await asyncio.to_thread(self._work, what, step, answer)
-            except (OSError, ValueError) as error:  # it has ended, or said no such thing
+            except (OSError, ValueError) as error:  # the process has ended
                 self._shown = {**self._shown, "error": f"not done, its process ended: {error}"}
             finally:
                 self._busy = ""

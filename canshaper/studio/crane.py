@@ -31,7 +31,7 @@ from canshaper_sim.machines import AXES_OF, build_machine, machine_for
 if TYPE_CHECKING:
     from canshaper.studio.in_process import InProcessCrane
 
-# From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
+# From the end of a process to its restart: a Ctrl-C, which every process gets, is over by then.
 RESTART_S = 1.0
 _LATE = re.compile(r"\blate (\d+) us")
 CANSHAPER = tuple(canshaper_command())
@@ -47,7 +47,7 @@ def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
     Raises:
         ConfigError: the file is not valid.
     """
-    load_deployment(path)  # its own problems, with its own lines
+    load_deployment(path)  # problems of the file itself, with its lines
     config, source = load_config(path)
     data = dict(source.data)
     data["dbc"] = [str(path.resolve().parent / name) for name in config.dbc]
@@ -112,7 +112,7 @@ class Crane:
             "sim": Child([*CANSHAPER, *sim], directory / f"{name}-sim.log"),
             "run": Child([*program, *run], directory / f"{name}-run.log"),
         }
-        # What the daemon reports to its service manager once a second.
+        # The daemon's report to its service manager once a second.
         self._status = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         self._status_path = directory / f"{name}-notify.sock"
         self._status.bind(str(self._status_path))
@@ -232,7 +232,7 @@ class SimulatedPose:
 
 @dataclass
 class CraneSession:
-    """A crane on the page; ``hand`` is set if the page drives it, ``here`` if it runs here."""
+    """A crane that the page shows; ``hand`` moves its joysticks, ``here`` runs it locally."""
 
     view: CraneView
     ports: Mapping[str, Port]

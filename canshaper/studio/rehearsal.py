@@ -88,7 +88,7 @@ def work(
 @contextmanager
 def _procedure(path: Path, changes: list[str], answer: str) -> Iterator[Procedure]:
     """Open the rehearsal of a file, locked against other processes."""
-    check_rehearsal(load_deployment(path))  # what is wrong in it is named by its own name
+    check_rehearsal(load_deployment(path))  # messages name this file, not the copy
     files = Files(copy_for_rehearsal(path))
     with files.locked():
         state = read_state(files.state)

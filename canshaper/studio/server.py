@@ -35,7 +35,7 @@ from canshaper.studio.stage import MACHINE, RAW, Stage
 from canshaper_sim.axes import LUFFING, OVERHEAD, TOWER, kind_of
 from canshaper_sim.crane import CraneParameters
 
-# From the first byte, or from the end of the last answer, to the end of a request.
+# Time limit of a request, from its first byte or from the end of the last answer, s.
 REQUEST_S = 10.0
 # Head of a request; a browser sends some hundred bytes.
 MOST_HEAD_BYTES = 16_384

@@ -225,7 +225,7 @@ class Stage:
         for name, factor in list(self.positions.items()):
             rest = AS_IN_FILE if name == PREFERENCE else 1.0
             if factor != rest:
-                with contextlib.suppress(ControlError):  # it starts again, with those of the file
+                with contextlib.suppress(ControlError):  # a new daemon has the file's numbers
                     self.slide(name, rest)
 
     def snapshot(self) -> dict[str, Any]:
@@ -285,7 +285,7 @@ class Stage:
                     seen.view.report_lateness(late)
                 if seen.shaped and seen.crane.starts != self._starts:
                     self._starts = seen.crane.starts
-                    self.positions |= dict.fromkeys(self.sliders, 1.0)  # it has those of the file
+                    self.positions |= dict.fromkeys(self.sliders, 1.0)  # it has the file's numbers
         return not self._stop.is_set()
 
     def _view(self, name: str) -> CraneView:

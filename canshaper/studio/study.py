@@ -129,7 +129,7 @@ TARGETS_M = [(distance, width) for distance in (1.0, 2.0, 4.0) for width in (0.3
 # Two Latin squares: each setting follows each other one as often (Williams 1949).
 ORDERS = ("ABC", "BCA", "CAB", "CBA", "ACB", "BAC")
 REACH_M, AHEAD = (2.5, 7.5), 0.3  # where a target may be, from the pillar; part of it straight on
-SHOWN_S = 1.5  # so long is said whether a grip has hit
+SHOWN_S = 1.5  # time for which the page shows hit or miss
 LIMIT_S, HELD_UP_S = 60.0, 0.3  # longest placement, and standstill of this program in it
 
 
@@ -203,7 +203,7 @@ class Session:
         self._todo = [one for one in planned if (str(one.part), str(one.number)) not in done]
         self._planned, self._break_s, self._table, self._fresh = planned, break_s, table, fresh
         self.phase = "pause" if self._todo else "done"
-        self._why = ""  # of a pause, empty before a part
+        self._why = ""  # reason of a pause; empty before a part
         self._result: tuple[str, float] | None = None
         self._last = [*planned][-1]
         self._since_s = self._until_s = self._reaction_s = self._seen_s = 0.0

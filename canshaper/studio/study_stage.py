@@ -36,7 +36,7 @@ INPUTS = ("keyboard", "gamepad", "pointer")  # of a page
 WHY = ("unplugged", "picture")  # a page breaks off
 CAN = "CAN"
 _SHOWN = {"pose", "joints", "sway", "measured", "simulated", "daemon", "crane", "axes"}
-# What a crane without anti-sway does not have.
+# Keys of an axis that a crane without anti-sway does not have.
 _OF_FILTERS = ("gain_schedule", "profiles", "sway_sensor")
 
 
@@ -162,7 +162,7 @@ class StudyStage(Stage):
     def _put(self, letter: str) -> None:
         """Put a crane with this setting at the start."""
         deployment = self._settings[letter]
-        # What its daemon says would name the setting.
+        # The messages of its daemon would name the setting.
         view = CraneView(deployment, lambda _text, _level: None)
         here = InProcessCrane(deployment, self._changes, joysticks=self.joysticks)
         self._cycle_ms = here.cycle_ms

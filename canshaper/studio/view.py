@@ -24,7 +24,7 @@ SILENT_S = 0.5
 """A daemon or a crane that has sent nothing for so long is shown as silent."""
 
 _JOINTS, _TROLLEY = ("LiftAngle", "KnuckleAngle", "Extension"), ("Bridge", "Trolley", "RopeLength")
-# Of a model: it lags behind the tip, and across the boom and below a trolley that is negative.
+# Axes on which the predicted sway has the other sign: the load lags behind the tip.
 _BEHIND = (SLEW, BRIDGE, TROLLEY)
 
 
@@ -51,7 +51,7 @@ class CraneView:
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
         self.trolley: tuple[float, ...] | None = None  # along runway, bridge and rope, m
-        self.sling: tuple[float, ...] | None = None  # how it hangs below the hook, degrees
+        self.sling: tuple[float, ...] | None = None  # angles below the hook, degrees
         self.rope_m: float | None = None  # from the tip to the load
         self.aim: tuple[float, float] | None = None  # slewed, degrees, and radius, m
         self.simulated = False
@@ -109,7 +109,7 @@ class CraneView:
         entries = self._handlers.get(frame[:3])
         if joystick := self._joysticks.find(frame, round(now_s * 1e9)):
             entries = [*(entries or ()), (self._joystick, joystick, _source_of(joystick))]
-        if entries is None and frame.extended:  # of J1939, from any address
+        if entries is None and frame.extended:  # a J1939 frame from any address
             entries = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         sources = set()
         for handler, what, source in entries or ():

@@ -21,7 +21,7 @@ class EndParameters:
     Hydraulic Trainer, Rexroth).
     """
 
-    cushion_s: float = 0.0  # its length, in s of full speed; 0: none
+    cushion_s: float = 0.0  # length of the cushion, in s of full speed; 0: none
     creep: float = 0.1  # speed that it lets through at its end, fraction of full speed
 
     def __post_init__(self) -> None:

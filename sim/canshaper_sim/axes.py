@@ -33,7 +33,7 @@ TOWER: Final = "tower"
 LUFFING: Final = "luffing"
 TOWER_AXES: Final = (SLEW, NEAR_FAR, HOIST)
 LUFFING_AXES: Final = (SLEW, LIFT_CYLINDER, EXTENSION, HOIST)
-# Those whose load hangs from a rope.
+# Machines whose load hangs from a rope.
 ON_ROPE: Final = (OVERHEAD, TOWER, LUFFING)
 
 

@@ -65,7 +65,7 @@ INTERNAL_STEP_S: Final = 0.010
 
 _HORIZONTAL: Final = math.pi / 2.0
 
-# Of a crane or its joints, or of another kind of crane by its own name.
+# Names of the full speeds, in the parameters of the crane, of its joints or of its kind.
 FULL_SPEEDS: Final = {
     SLEW: "slew_full_speed_rad_s",
     NEAR_FAR: "near_far_full_speed_m_s",
@@ -112,7 +112,7 @@ class CraneParameters:
     radius_max_m: float = 8.0
     height_min_m: float = 1.5  # the grapple (1.4 m) just clears the ground
     height_max_m: float = 7.0
-    slew_min_rad: float = -math.inf  # of a tip that is moved directly; else joints.slew_min_deg
+    slew_min_rad: float = -math.inf  # for a tip moved directly; else joints.slew_min_deg
     slew_max_rad: float = math.inf
     start_theta1_rad: float = 0.0
     start_radius_m: float = 3.0
@@ -215,7 +215,7 @@ class Crane:
         self._axes = self.boom.axes
         self._bend = Bend(p.boom) if p.boom.frequency_hz else None
         self._pump = Pump(p.pump_flow, p.pump, self._axes) if p.pump_flow < math.inf else None
-        # Their flow depends on the load: of what is in the grapple besides itself.
+        # The flow of these valves depends on the load in the grapple.
         valves = [axis.valve for axis in self._axes.values()]
         self._uncompensated = [v for v in valves if v.parameters.load or v.parameters.load_per_t]
         self._empty_kg = p.grapple.m2_kg
@@ -298,7 +298,7 @@ class Crane:
         for name, command in commands.items():
             if name != ROTATOR:
                 self._axis(name).valve.set_command(command)
-            elif self.around.rotator:  # it matters to a log only
+            elif self.around.rotator:  # the rotator matters only to a log
                 self.around.rotator.axis.valve.set_command(command)
         # The smallest number of equal steps; the margin forgives rounding of dt_s.
         count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)

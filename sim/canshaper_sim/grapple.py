@@ -33,7 +33,7 @@ class TipMotion(NamedTuple):
     slew_rate_rad_s: float
     slew_acceleration_rad_s2: float
     height_acceleration_m_s2: float
-    # Where it is matters only to what stands on the ground.
+    # The place of the tip matters only to contact, carrier and wind.
     slew_rad: float = 0.0
     height_m: float = 0.0
     height_rate_m_s: float = 0.0

@@ -72,7 +72,7 @@ class _Message:
 
     def __init__(self, bound: BoundInput) -> None:
         self.cycle_ms = bound.message.cycle_time or 20
-        # Of J1939 from the address that is asked for.
+        # A J1939 message comes from the expected address.
         source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
         sent = SentMessage(bound.config.bus, bound.message, source, bound.protection)
         self._sender = sent.sender()

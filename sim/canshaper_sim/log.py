@@ -30,12 +30,12 @@ class LogParameters:
 
     grip_s: float = math.inf
     mass_kg: float = 500.0
-    below_m: float = 0.3  # its centre of mass below that of the grapple
-    # What makes the planes of the swing differ, by the rotator; 0: a point.
+    below_m: float = 0.3  # from the grapple's centre of mass down to the log's
+    # A length makes the planes of the swing differ, by the rotator; 0: a point.
     length_m: float = 0.0
-    off_centre_m: float = 0.0  # its middle from the grapple
+    off_centre_m: float = 0.0  # from the grapple to the middle of the log
     second_period_s: float = 0.0  # 0: no second swing; 0.5 to 0.8 is usual with a long log
-    second_share: float = -0.2  # of the lean; a body that hangs below swings against it
+    second_share: float = -0.2  # part of the lean; a body that hangs below swings against it
     second_damping_ratio: float = 0.04
 
     def __post_init__(self) -> None:

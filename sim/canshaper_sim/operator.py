@@ -63,7 +63,7 @@ REACH_S = {
     TROLLEY: (-20.0, 20.0),
     HOIST: (-6.0, 6.0),
 }
-# Of cranes that are larger than their speeds.
+# Reach of cranes that are large for their speeds.
 _REACH_OF = {
     TOWER: {NEAR_FAR: (-15.0, 15.0)},
     LUFFING: {LIFT_CYLINDER: (-4.0, 4.0), EXTENSION: (-4.0, 10.0)},

@@ -39,10 +39,10 @@ class Skill:
     # corrections by sight .19 to .26 s (Keele and Posner 1968); a pilot .15 to .25 s (McRuer 1967).
     reaction_s: float = 0.25
     ramp_s: float = 0.15  # neutral to full; arm and muscles lag by .1 s (McRuer and Jex 1967)
-    timing_s: float = 0.06  # of the instant it acts: some % of the wait (Lewis and Miall 2009)
-    aim_m: float = 0.04  # of where the target is taken to be
-    motor: float = 0.12  # of a tap, part of it: grows with the signal (Harris and Wolpert 1998)
-    run_on: float = 0.10  # of the learned run-on, part of it
+    timing_s: float = 0.06  # error of the instant: some % of the wait (Lewis and Miall 2009)
+    aim_m: float = 0.04  # error of the assumed target
+    motor: float = 0.12  # error of a tap, part of it (Harris and Wolpert 1998)
+    run_on: float = 0.10  # error of the learned run-on, part of it
     dead_m: float = 0.08  # a smaller error is not corrected
     catch: float = 1.0  # most of a swing that is taken at one turn; 0: waits until it has decayed
 
@@ -66,7 +66,7 @@ class Known(NamedTuple):
     # Of that speed, tick by tick, after the joystick is let go at once: so much of what the hand
     # did that long ago is still to come.
     fall: tuple[float, ...]
-    omega_rad_s: float = 1.0  # of the load's swing
+    omega_rad_s: float = 1.0  # frequency of the load's swing
 
 
 class OperatorModel:
@@ -100,7 +100,7 @@ class OperatorModel:
             _Axis(skill, known, target_m, random.Random(f"{seed} {number}"), tick_s)
             for number, (known, target_m) in enumerate(task)
         ]
-        # What was seen in the last reaction: only the oldest has arrived.
+        # States seen within the last reaction time: only the oldest has arrived.
         self._seen = deque[Sequence[tuple[float, float]]]()
         self._late = round(skill.reaction_s / tick_s)
         self._begun, self._free_s = False, 0.0
@@ -145,8 +145,8 @@ class _Axis:
         self._late_s = skill.timing_s * source.gauss()
         self.error_m = self.swing_m = self._off_m = self._rate_m_s = self._coming_m = 0.0
         self._joystick = self.wanted = self._ready_s = 0.0
-        self._until_s = math.inf  # of a tap; infinite: of a stroke that ends at the target
-        # What the hand did, the newest first, and how much of it is still to come of what is seen.
+        self._until_s = math.inf  # end of a tap; infinite for a stroke that ends at the target
+        # Past joystick positions, the newest first, and the part of each still to come.
         count = round(stretch * len(known.fall))
         fall = [known.fall[min(int(k / stretch), len(known.fall) - 1)] for k in range(count)]
         self._to_come = [1.0] * round(skill.reaction_s / tick_s) + fall
@@ -161,13 +161,13 @@ class _Axis:
         self.error_m = self._target_m - place_m - self._coming_m
 
     def let_go(self, time_s: float) -> bool:
-        """Release the joystick where a stroke or tap ends; return whether the hand was free."""
+        """Release the joystick where a stroke or tap ends; return whether a new tap may begin."""
         if not self.wanted:
             return time_s >= self._ready_s
         hand_s = 0.5 * self._joystick * abs(self._joystick) * self._skill.ramp_s
         more_m = self.known.full_m_s * (hand_s + self.wanted * self._late_s)
         there = self._until_s == math.inf and (self.error_m - more_m) * self.wanted <= 0.0
-        if there or time_s >= self._until_s:  # what comes of it is seen one reaction later
+        if there or time_s >= self._until_s:  # the effect is seen one reaction time later
             self.wanted, self._ready_s = 0.0, time_s + self._skill.reaction_s
             self._late_s = self._skill.timing_s * self._source.gauss()
         return False
@@ -181,7 +181,7 @@ class _Axis:
     def caught_m(self, time_s: float, part: float) -> float:
         """Return the way, m, of a tap due now, to be half done when the load turns; else 0."""
         omega = self.known.omega_rad_s
-        phase = math.atan2(-self._rate_m_s / omega, self._off_m)  # it turns at each pi
+        phase = math.atan2(-self._rate_m_s / omega, self._off_m)  # the swing turns at each pi
         for turn in range(math.ceil(phase / math.pi), math.ceil(phase / math.pi) + 3):
             turns_s = time_s - self._skill.reaction_s + (turn * math.pi - phase) / omega
             way_m = 0.5 * (self.error_m + part * (-self.swing_m if turn % 2 else self.swing_m))

@@ -57,7 +57,7 @@ class RopeParameters:
     rope_min_m: float = 1.5
     rope_max_m: float = 30.0
     damping_ratio: float = 0.005
-    rope_error_pct: float = 0.0  # how much more than that the length signal says
+    rope_error_pct: float = 0.0  # error of the length signal
     g_m_s2: float = 9.81
 
     def check(self, owner: str, allowed: Mapping[str, tuple[float, float]]) -> None:
@@ -79,7 +79,7 @@ class OverheadParameters(RopeParameters):
     trolley: ValveParameters = field(default_factory=drive)
     bridge_full_speed_m_s: float = 1.0
     trolley_full_speed_m_s: float = 1.0
-    runway_m: float = 100.0  # it begins in the middle of both
+    runway_m: float = 100.0  # the trolley begins in the middle of runway and span
     span_m: float = 60.0
     sling: SlingParameters = field(default_factory=SlingParameters)
 

@@ -35,7 +35,7 @@ JOINT_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointPosition": ("SlewAngle", "LiftAngle", "KnuckleAngle", "Extension"),
     "JointVelocity": ("SlewRate", "LiftRate", "KnuckleRate", "ExtensionSpeed"),
 }
-# Of an overhead crane, whose sway is that in the direction of each axis.
+# Feedback of an overhead crane, whose sway is in the directions of its axes.
 OVERHEAD_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "CranePosition": ("Bridge", "Trolley", "RopeLength"),
     "CraneVelocity": ("BridgeSpeed", "TrolleySpeed", "HoistSpeed"),
@@ -52,7 +52,7 @@ HOOK_FEEDBACK: Mapping[str, tuple[str, ...]] = {
 BOOM_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointVelocity": ("SlewRate", "LiftRate", "ExtensionSpeed"),
 }
-# By machine; every other one has joints.
+# Feedback by machine; every other machine has joints.
 _FEEDBACK_OF: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     TIP: FEEDBACK,
     OVERHEAD: OVERHEAD_FEEDBACK,
@@ -112,8 +112,8 @@ class _Measurement:
 
     Args:
         bound: the message and its signal.
-        value: the number, read off the crane.
-        first_s: when it is sent first.
+        value: returns the number for a crane.
+        first_s: time of the first message, s.
     """
 
     def __init__(
@@ -137,12 +137,12 @@ class _Measurement:
 
 
 def cycle_s(bound: BoundValue[Any]) -> float:
-    """Time between two messages, as the file or the DBC says it."""
+    """Return the time between two messages in s, from the file or the DBC; by default 0.1 s."""
     return (bound.config.cycle_ms or bound.message.cycle_time or 100) / 1000.0
 
 
 def _measurements(deployment: Deployment, sent: Mapping[str, Sender]) -> Iterator[_Measurement]:
-    """Yield what the deployment reads and the crane does not send anyway: valves, load, rope."""
+    """Yield the read messages that no feedback message covers: valves, load and rope."""
     for axis, bound in deployment.axes.items():
         if valve := bound.feedback:
             moves = deployment.coordinates.get(axis, axis)
@@ -162,7 +162,7 @@ def _opening(moves: str, full: float, crane: Crane) -> float:
 
 
 def _load(crane: Crane, *, kg: bool) -> float:
-    """Kg, or in any other unit whether there is a load."""
+    """Return the load in kg, or 1 for a load and 0 for none if the unit is not kg."""
     return crane.gripped_kg if kg else float(crane.gripped_kg > 0.0)
 
 

@@ -22,7 +22,7 @@ _ALLOWED = {
     "near_far_load": (0.0, 1.0),
     "lift_load": (0.0, 1.0),
 }
-# Below so much of a full flow nothing is asked for.
+# A demand below this part of a full flow counts as none.
 _NOTHING = 1e-9
 
 

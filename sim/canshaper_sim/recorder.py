@@ -68,9 +68,9 @@ class Recorder:
         self._hangs = crane.grapple.l1_m, crane.grapple.l2_m
         self._dwell_s = dwell_s(deployment)
         self._tip = (0.0, 0.0)  # slew angle in rad, radius in m
-        self._hook = (0.0, 0.0, 0.0)  # of an overhead crane: bridge, trolley, rope, m
+        self._hook = (0.0, 0.0, 0.0)  # bridge, trolley, rope of an overhead crane, m
         self._start_s: float | None = None
-        # Of each axis: joystick, sent, speed, sway.
+        # [joystick, sent, speed, sway] of each axis.
         self._now = {name: [0.0, 0.0, 0.0, 0.0] for name in deployment.axes}
         self._t_s: list[float] = []
         self._rows: dict[str, list[list[float]]] = {name: [] for name in deployment.axes}
@@ -109,7 +109,7 @@ class Recorder:
     def receive(self, frame: Frame, time_s: float) -> None:
         """Take a frame seen at time_s; times have any origin and increase."""
         entry = self._handlers.get(frame[:3])
-        if entry is None and frame.extended:  # of J1939, from any address
+        if entry is None and frame.extended:  # a J1939 frame from any address
             entry = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         if entry is None:
             return

@@ -30,7 +30,7 @@ class RotatorParameters:
 
     valve: ValveParameters = field(default_factory=ValveParameters)
     full_speed_rad_s: float = 1.0
-    start_deg: float = 0.0  # of the log against the boom, counter-clockwise from above
+    start_deg: float = 0.0  # from the boom to the log, counter-clockwise from above
 
     def __post_init__(self) -> None:
         check_ranges("rotator", self, _ALLOWED)

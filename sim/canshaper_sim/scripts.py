@@ -162,7 +162,7 @@ _DEMO_OVERHEAD = Script(
     52.0,
 )
 
-# Of a tower crane: a load goes round and out with both at once, comes back on a shorter rope.
+# A tower crane: a load goes round and out with both axes at once, back on a shorter rope.
 _DEMO_TOWER = Script(
     "demo-tower",
     (
@@ -177,7 +177,7 @@ _DEMO_TOWER = Script(
     68.0,
 )
 
-# Of a telehandler: up, round and out, back with a correction.
+# A telehandler: up, round and out, back with a correction.
 _DEMO_LUFFING = Script(
     "demo-luffing",
     (

@@ -13,8 +13,8 @@ from canshaper_sim.ranges import check_ranges
 
 Vector = tuple[float, float, float]
 
-PARTS = 4  # of a step: the spring of a sling with a light hook has a period of 35 ms
-_OMEGA_RAD_S, _DAMPING_RATIO = 40.0, 0.3  # of sling and ground, stretched and pressed
+PARTS = 4  # parts of a step: the spring of a sling with a light hook has a period of 35 ms
+_OMEGA_RAD_S, _DAMPING_RATIO = 40.0, 0.3  # springs of sling and ground
 _FRICTION = 0.5  # between load and ground
 _STICKS_M_S = 0.01  # below which friction falls
 _ALLOWED = {

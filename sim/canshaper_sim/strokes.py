@@ -15,7 +15,7 @@ from canshaper_sim.axes import ALL_AXES
 
 _HUMAN_RAMP_S = 0.12  # a trained hand moves a joystick from neutral to full in 0.1 .. 0.15 s
 
-# So long after its end a stroke is over, however start, duration and ramp were rounded.
+# This long after its end a stroke is over, whatever the rounding of start, duration and ramp.
 _PAST_S = 1e-6
 
 # name -> (lowest, highest) value of a stroke.
@@ -31,7 +31,7 @@ _ALLOWED = {
 class Stroke:
     """One movement of one joystick axis from neutral to `level` (-1 .. 1) and back."""
 
-    axis: str  # of the deployment, whatever its name
+    axis: str  # name in the deployment
     start_s: float
     duration_s: float  # from leaving neutral to letting go; not shorter than the ramp
     level: float

@@ -41,7 +41,7 @@ class SwaySensorParameters:
     delay_s: float = 0.02
     gain: float = 1.0  # -1: mounted the wrong way round
     resolution_deg: float = 0.0  # 0: that of the signal
-    # Of an inclinometer: accelerations correct its gyro with this time constant; 0: no gyro.
+    # Accelerations correct the gyro of an inclinometer with this time constant; 0: no gyro.
     fusion_s: float = 5.0
     seed: float = 1
     lost_s: float = math.inf  # no frame comes any more
@@ -73,7 +73,7 @@ class SwaySensor:
         kind: Kind,
     ) -> None:
         self._parameters, self._across, self._kind = parameters, across, kind
-        self._hidden = 0.0  # of the angle, by accelerations that correct a gyro
+        self._hidden = 0.0  # part of the angle lost to the correction of a gyro
         self._noise = random.Random(f"{parameters.seed:g} {name}")
         self._past: deque[tuple[float, float]] = deque()
         self._stuck: float | None = None
@@ -88,7 +88,7 @@ class SwaySensor:
         past = self._past
         if self._kind == "inclination":
             swing = self._fused(swing, time_s - past[-1][0] if past else math.inf)
-        if not past:  # it has long swung like that
+        if not past:  # assume the same swing before
             past.append((-math.inf, math.degrees(swing)))
         past.append((time_s, math.degrees(swing)))
         before_s = time_s - self._parameters.delay_s + _SAME_TIME_S

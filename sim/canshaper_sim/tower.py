@@ -43,7 +43,7 @@ class TowerParameters(RopeParameters):
     radius_min_m: float = 3.0
     radius_max_m: float = 65.0
     start_radius_m: float = 35.0
-    jib_m: float = 70.0  # of the trolley above the ground
+    jib_m: float = 70.0  # height of the trolley above the ground
     rope_m: float = 30.0
     rope_min_m: float = 4.0
     rope_max_m: float = 62.0
@@ -59,7 +59,7 @@ class TowerParameters(RopeParameters):
         jib = TipBoom(
             Actuator(self.slew, self.slew_full_speed_rad_s, 0.0, -math.inf, math.inf, ends=ends),
             Actuator(self.near_far, self.near_far_full_speed_m_s, *reach, ends=ends),
-            Actuator(drive(), 1.0, *height),  # it has no drive
+            Actuator(drive(), 1.0, *height),  # the jib has no drive for its height
         )
         return RopedBoom(jib, LIFT, self, ends)
 

@@ -18,10 +18,10 @@ from canshaper.errors import DesignError, DriveError
 from canshaper_sim.axes import LIFT, NEAR_FAR, ROTATOR, SLEW, TIP_AXES
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 
-# What the position of an axis is called.
+# Name of the position of an axis.
 POSE: Final = {SLEW: "angle", NEAR_FAR: "radius", LIFT: "height"}
 SWAY: Final = ("sway.across", "sway.along")
-_NUMBER = ("Real", "Float64")  # of FMI 2.0, 3.0
+_NUMBER = ("Real", "Float64")  # types in FMI 2.0 and 3.0
 _SAME = 1e-9
 
 
@@ -114,7 +114,7 @@ class Unit:
                 slave.setupExperiment(startTime=0.0)
             slave.enterInitializationMode()
             slave.exitInitializationMode()
-        except Exception as error:  # of a library that is another's
+        except Exception as error:  # from the library of the unit
             raise DriveError(f"{self._path}: {error} {'; '.join(said)}".rstrip()) from None
         return _Slave(self._path, slave, said)
 

@@ -42,7 +42,7 @@ class ValveParameters:
 
     dead_time_s: float = 0.0  # delay of the whole command
     deadband: float = 0.05  # fraction of full stroke in which no oil flows
-    negative_more_deadband: float = 0.0  # what negative commands need besides to open it
+    negative_more_deadband: float = 0.0  # additional deadband of negative commands
     hysteresis: float = 0.0  # play between command and spool, fraction of full stroke
     negative_gain: float = 1.0  # speed at full negative command, of that at full positive
     flow_limit: float = 1.0  # largest |speed|, fraction of full speed
@@ -51,7 +51,7 @@ class ValveParameters:
     # Pressure that boom and empty grapple take in the positive direction, and help with in the
     # negative one; fraction of the supply's. With a pressure compensator it does not count: 0.
     load: float = 0.0
-    load_per_t: float = 0.0  # what every tonne in the grapple adds to that
+    load_per_t: float = 0.0  # increase of ``load`` for each tonne in the grapple
 
     def __post_init__(self) -> None:
         check_ranges("valve", self, _ALLOWED)

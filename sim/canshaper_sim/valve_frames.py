@@ -8,7 +8,7 @@ from cantools.database.can import Signal
 
 from canshaper.machine.deployment import Deployment
 
-# Of a step: what the rounding of decimals may take.
+# Part of a step that the rounding of decimals may take.
 _ROUNDING = 1e-6
 
 
@@ -31,7 +31,7 @@ class CommandReader:
         section = deployment.axes[axis].config
         valve, command = section.valve, section.command
         entry = deployment.messages.find(valve.message)
-        assert not isinstance(entry, str)  # it is bound
+        assert not isinstance(entry, str)  # the valve's message is bound
         signals = {signal.name: signal for signal in entry[1].signals}
         # A gateway forwards the joystick's own frames: its section says what they mean.
         stick = deployment.config.joysticks[command.joystick]

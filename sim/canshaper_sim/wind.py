@@ -33,7 +33,7 @@ class WindParameters:
     speed_m_s: float = 0.0  # mean
     gust_m_s: float = 0.0  # standard deviation; gusts reach twice to three times as much
     gust_s: float = 6.0  # time constant of the gusts
-    heading_deg: float = 90.0  # that it blows to, as the slew angle: 0 is ahead of the carrier
+    heading_deg: float = 90.0  # direction it blows to, as the slew angle: 0 is ahead
     drag_m2: float = 0.6  # area times drag coefficient, 1 to 1.2; with a log of 5 m about 2
     seed: float = 1
 

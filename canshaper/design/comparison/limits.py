@@ -19,7 +19,7 @@ from canshaper_sim.crane import CraneParameters
 AXIS = "near_far"
 _DURATIONS_IN_PERIODS = (0.55, 0.64, 0.73, 0.82, 0.91, 1.0, 1.09, 1.18)
 _RANGE_PCT = 30.0
-_SIDES = 40  # of the polygon about a disc
+_SIDES = 40  # sides of the polygon around a disc
 # After the last tap the speed falls by the lag of the valve: to 5 % of full speed this takes 1.5
 # time constants where the command ends in a ramp of the valve's rate.
 _LAGS_TO_STOP = 1.5

@@ -159,14 +159,14 @@ def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
 RANDOM_SEEDS = tuple(range(1, 13))
 INITIAL_SWAY_DEG = 10.0
 LENGTH_ERRORS_PCT = (-30, -15, 0, 15, 30)
-# What a load does to the grapple: times the mass, and more length of the pendulum.
+# A load multiplies the mass of the grapple by this, and lengthens the pendulum by this, m.
 LOAD_MASS = 3.0
 LOAD_M = 0.4
-# In the loading cycle: the joysticks are neutral before it goes up, and it lies in the bunk after.
+# In the loading cycle, s: joysticks are neutral before the first; the load lies after the second.
 _LOAD_FROM_S, _LOAD_TO_S = 7.5, 17.0
-# What is left of the full speed that the file names.
+# Part of the full speed in the file that a slow valve reaches.
 SLOW_VALVE = 0.7
-# What a small pump delivers, full axis flows; from where a pulse meets the end stop at full speed.
+# Flow of a small pump, full axis flows; radius from which a pulse meets the end stop at full speed.
 PUMP_FLOW = 1.2
 END_FROM_M = 5.7
 # Near-far begins so much later than slew, where both move.

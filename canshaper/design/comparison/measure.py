@@ -26,7 +26,7 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.recording import Recording
 
-# Below this part of full speed the tip stands, and what comes after is another movement.
+# Below this part of full speed the tip stands still; the next motion is another movement.
 STANDS = 0.01
 
 
@@ -80,7 +80,7 @@ def measure(
         sway=Sway(theta6_rad=math.radians(task.initial_deg)),
         loads=() if task.load_s is None else ((task.load_s, _loaded(grapple)),),
     )
-    assert recording.crane is not None  # of a tip with both planes
+    assert recording.crane is not None  # a crane with a tip measures both planes
     tilt_deg = recording.crane.sway_deg
     quiet_s = max(s.end_s for s in task.script.strokes) + RESIDUAL_DWELL_S
     outcome = Outcome(
@@ -116,7 +116,7 @@ def _with_metrics(
 ) -> Outcome:
     """Return the outcome with the pulse's rise, run-on, dip and time until still."""
     of_axis = axis_metrics(recording, axis)
-    assert recording.crane is not None  # of a tip with both planes
+    assert recording.crane is not None  # a crane with a tip measures both planes
     of_crane = crane_metrics(recording, recording.crane, deployment.config.still_deg)
     crane = CraneParameters()
     full_m_s = crane.near_far_full_speed_m_s

@@ -43,7 +43,7 @@ from canshaper_sim.recorder import dwell_s
 from canshaper_sim.strokes import Script, Stroke
 
 ROPES_M = (2.0, 5.0, 10.0, 25.0)
-# Of a tower crane: rope and radius at the start, m.
+# (rope, radius) of a tower crane at the start, m.
 PLACES_M = ((10.0, 40.0), (30.0, 20.0), (30.0, 40.0), (30.0, 60.0), (50.0, 40.0))
 # The rope that a filter is made for which follows none.
 _FOR_M = {OVERHEAD: 8.0, TOWER: 20.0, LUFFING: 8.0}

@@ -24,7 +24,7 @@ from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import Off
 
-# Of the press and of the release: speed before it, what is sent in each tick.
+# (speed before, commands sent in each tick) of the press and of the release.
 Moves = Sequence[tuple[float, list[float]]]
 ShaperFor = Callable[[SwayModel], Shaper]
 
@@ -33,7 +33,7 @@ RISEN = 0.95
 # A response is watched until it stays this close to its end, and no longer than this.
 _AT_END, _LONGEST_S, _HELD_S = 1e-9, 120.0, 4.0
 STILL = 0.02
-_LAGS = 10.0  # of the valve, until it has followed
+_LAGS = 10.0  # lags of the valve until it has followed
 # Longer than any plateau between two taps: half of the longest swing, 12 s of most tools.
 _STILL_S, _STILL_PERIODS = 8.0, 0.6
 

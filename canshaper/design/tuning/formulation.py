@@ -25,13 +25,13 @@ POLE_DISTANCE = 5.0
 POLE_PER_RATE = 1.6
 # Poles slower than the swing leave more of it, so a slow valve may be chased up to there.
 SLOW_POLE_PER_RATE = 2.6
-# Above this damping ratio less than a seventh of a swing is left of the one before it.
+# Above this damping ratio each swing is less than a seventh of the one before.
 MOST_DAMPED = 0.3
 # The schema of the deployment file.
 SLOWEST_RAD_S, FASTEST_RAD_S = 0.1, 100.0
 # Part of full speed that the output must stay within for the run-on to be over.
 SETTLED = 0.05
-# What the response of a filter with three poles may pass the command by: no valve frame shows it.
+# Allowed overshoot of a filter with three poles: too small for a step of a valve frame.
 OVER_COMMAND = 1e-4
 
 

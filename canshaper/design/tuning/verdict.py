@@ -19,7 +19,7 @@ from canshaper.machine.filters import every_filter
 from canshaper.machine.stopping import output_limits, when
 from canshaper.shaping.sway import SwayMode
 
-# Of the swing: up to GOOD is left by a good filter, more than USELESS by one that is not written.
+# Parts of the swing: a good filter leaves up to GOOD; one that leaves more than USELESS is refused.
 GOOD, USELESS = 0.10, 0.50
 _FASTER = (1.5, 2.0, 3.0, 5.0)  # times the rate of the valve
 # A change is worth naming that leaves less than this part.
