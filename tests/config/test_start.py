@@ -33,7 +33,7 @@ def test_a_key_says_what_it_is_for() -> None:
     )
     assert Accept.description("residual_deg_p99") == (
         "most of the p99 quantile: largest swing that is left later than 2.5 s after the last"
-        " release, deg"
+        " release, or than the longest tail_s where that is more than 5 s, deg"
     )
     assert AxisSection.description("wrong") is None
 

@@ -120,7 +120,7 @@ def test_packages_of_checksums_and_filters_are_named(
 
     monkeypatch.setattr("canshaper.machine.binding.filter_lines", lines)
     monkeypatch.setattr(
-        "canshaper.machine.binding.package_line",
+        "canshaper.checksums.kinds.package_line",
         lambda kind: None if kind == "xor" else f"checksum {kind}",
     )
     signals = ' SG_ Check : 40|8@1+ (1,0) [0|255] "" SHAPER\n'
