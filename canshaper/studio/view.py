@@ -93,15 +93,13 @@ class CraneView:
             ("SlingSway", partial(self._measured, "sling", ("SlingBridge", "SlingTrolley"))),
             ("HookPosition", self._hook),
         ):
-            message = self._message(message_name)
-            if message is not None:
-                for bus in deployment.config.buses:
-                    key = (bus, message.frame_id, message.is_extended_frame)
-                    self._on(key, handler, message, message_name)
-
-    def _message(self, name: str) -> Message | None:
-        entry = self.deployment.messages.find(name)
-        return None if isinstance(entry, str) else entry[1]
+            entry = deployment.messages.find(message_name)
+            if isinstance(entry, str):
+                continue
+            _, message = entry
+            for bus in deployment.config.buses:
+                key = (bus, message.frame_id, message.is_extended_frame)
+                self._on(key, handler, message, message_name)
 
     def _on(self, key: Key, handler: Any, what: Any, message: str) -> None:
         self._handlers.setdefault(key, []).append((handler, what, message))

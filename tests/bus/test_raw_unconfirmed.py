@@ -69,14 +69,6 @@ def test_passive_is_seen_without_an_echo(silent: Line) -> None:
     assert silent.port.state is BusState.PASSIVE
 
 
-def test_with_an_echo_bus_off_ends_as_before(line: Line) -> None:
-    line.error(BUS_OFF)
-    line.received()
-    line.error(CONTROLLER, ERROR_ACTIVE)
-    line.received()
-    assert line.port.state is BusState.UP
-
-
 def test_valve_frames_are_confirmed_when_each_came_back(line: Line) -> None:
     assert (line.port.confirmed, line.port.why) == (True, "")
     line.port.send(VALVE)
