@@ -10,7 +10,7 @@ from tests.rigs.files import CONFIG, Machine
 
 SHIPPED = (
     *("forwarder", "forwarder-gff", "forwarder-joints", "forwarder-robust"),
-    *("excavator", "multicopter"),
+    *("excavator", "multicopter", "bridge-crane-hook"),
 )
 Change = Callable[[dict[str, Any], Machine], None]
 
