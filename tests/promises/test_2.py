@@ -18,7 +18,7 @@ def rounding(axis: Axis) -> float:
 def tail(axis: Axis) -> int:
     """Periods for which a demand counts; in a motion also its partner's, and one more."""
     partner = axis.moves_with
-    return max(axis.tail, partner.tail) + 1 if partner else axis.tail
+    return max(axis.tail, partner.tail if partner else 0) + bool(partner or axis.slews)
 
 
 def run_on(axis: Axis) -> int:
