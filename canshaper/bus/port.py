@@ -136,7 +136,7 @@ class ListeningPort:
 
     @property
     def confirmed(self) -> bool | None:
-        """No valve frame is sent."""
+        """None: this port sends no valve frame that could be confirmed."""
         return None
 
     @property

@@ -109,7 +109,7 @@ class Stop:
 def engine(
     processes: int | None, scheduler: str | None, cluster: Literal["slurm"] | None = None
 ) -> "Engine":
-    """Who does much work: processes of this machine, workers of a scheduler, or jobs of Slurm."""
+    """Return the engine of parallel work: processes here, a Dask scheduler, or jobs of Slurm."""
     from canshaper.campaign.engine import Cluster, Slurm
     from canshaper.design.parallel import Processes
 

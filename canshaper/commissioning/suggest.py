@@ -43,7 +43,7 @@ def axes(message: Message) -> list[Signal]:
 
 
 def velocities(message: Message) -> list[Signal]:
-    """Return signals as ``axes``, and those that can be one with a scaling of the file."""
+    """Return the signals that are a two-sided velocity, also with a scaling of the file."""
     return [s for s in message.signals if two_sided(s)]
 
 

@@ -131,7 +131,7 @@ class Input(ABC):
         self._last_frame_ns, self._refused_ns = before._last_frame_ns, before._refused_ns
 
     def lost(self, now_ns: int) -> Reason | None:
-        """Why nothing is known now; None while the last good frame is fresh."""
+        """Reason for which the message is lost; None while its last good frame is fresh."""
         if self._received_ns is not None and now_ns - self._received_ns <= self._timeout_ns:
             return None
         if self._refused_ns is not None and now_ns - self._refused_ns <= self._timeout_ns:
@@ -193,7 +193,7 @@ class SwitchInput(Input):
     """A message with switches.
 
     Attributes:
-        switches: them, by name.
+        switches: its switches, by name.
     """
 
     def __init__(self, bound: BoundInput, switches: Mapping[str, tuple[str, int]]) -> None:

@@ -52,7 +52,7 @@ class JoystickInput(Input):
         return self._switches.setdefault(signal, Switch(self, signal, 1))
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Note since when each joystick is where it is; codes that are no measurement are a fault.
+        """Note when each deflection last changed; a code that is no measurement is a fault.
 
         Any frame can show a released enable, however short; only an accepted one ends it.
         """

@@ -21,7 +21,7 @@ class EnableGate:
     When they agree again, that is no press: it resets nothing.
 
     Args:
-        switches: them.
+        switches: those that have to be on.
     """
 
     def __init__(self, switches: Sequence[Switch]) -> None:

@@ -48,7 +48,7 @@ Seen = Mapping[tuple[int, ...], tuple[Bins, Bins]]
 
 
 def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[Direction]:
-    """Measure what a pump delivers, in each direction of both axes; first where it is least.
+    """Measure the flow of the pump for each pair of directions, sorted by flow, least first.
 
     Args:
         drives: of each axis alone, and of both at once.

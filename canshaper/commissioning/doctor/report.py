@@ -29,7 +29,7 @@ TIMES = {
 def as_dict(
     deployment: Deployment, seconds: float, runs: dict[str, Run], findings: list[Finding]
 ) -> dict[str, Any]:
-    """Everything as plain data; times in us."""
+    """Return the report as JSON data; times in microseconds."""
     return {
         "file": str(deployment.path),
         "fit": fit(findings),

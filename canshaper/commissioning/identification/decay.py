@@ -81,7 +81,7 @@ class DecayProblem:
         return np.concatenate(parts)
 
     def solve(self, x: Sequence[float], *, roughly: bool = False) -> Array:
-        """Parameters of least squares, from a start; roughly, to some parts in a thousand."""
+        """Fit frequency, decay and friction from a start; ``roughly`` to a tolerance of 1e-4."""
         omega = float(x[0])
         low = np.array([0.6 * omega, -0.2 * omega, -np.inf])[: len(x)]
         high = np.array([1.6 * omega, omega, np.inf])[: len(x)]

@@ -83,7 +83,7 @@ def _advise(axis: str, findings: Sequence[Finding], deployment: Deployment | Non
 
 
 def _values(finding: Finding, speed_m_s: float | None) -> SwayNumbers:
-    """SwayNumbers data of a finding as it is written."""
+    """Return the sway values of a finding as they are written."""
     assert finding.period_s and finding.damping_ratio
     values = {
         "period_s": round(finding.period_s.value, 4),
@@ -96,7 +96,7 @@ def _values(finding: Finding, speed_m_s: float | None) -> SwayNumbers:
 
 
 def _middle(values: Sequence[SwayNumbers]) -> tuple[SwayNumbers, float]:
-    """SwayNumbers data in the middle of several, and how far their lengths are from it, +- %."""
+    """Return the mean sway of several findings, and how far their lengths are from it, +- %."""
     lengths = [v["period_s"] ** 2 for v in values]
     low, high = min(lengths), max(lengths)
     ratio = sum(v["damping_ratio"] for v in values) / len(values)

@@ -31,7 +31,10 @@ class Run(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """A free swing, with frequency and decay of its own, and the stretch that it was cut from."""
+    """A free swing: ``segment`` is the fitted part of ``whole``.
+
+    omega (rad/s) and sigma (1/s) are its own; worth is energy times duration, to rank swings.
+    """
 
     segment: Segment
     omega: float

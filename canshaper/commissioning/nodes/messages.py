@@ -113,7 +113,7 @@ def _signals(node: Node, one: Mapped, name: str, receiver: str, *, split: bool) 
 
 
 def labels(objects: Sequence[Mapped]) -> list[str]:
-    """A word for each object: its own name, or where others have it too with what is around it."""
+    """Return a unique name for each object: its own, else with its parent's, else numbered."""
     own = [_word(one.name) for one in objects]
     longer = [_word(f"{one.parent} {one.name}") for one in objects]
     once, once_longer = Counter(own), Counter(longer)

@@ -145,7 +145,7 @@ class _Reader:
 
 
 def possible_joysticks(deployment: Deployment) -> list[Message]:
-    """Messages that are, or look like, those of joysticks, and are nothing else to the machine."""
+    """Return the joysticks' messages, and unused ones with a velocity and a switch."""
     own = [joystick.message for joystick in deployment.joysticks.values()]
     used = {bound.message.name for bound in deployment.inputs()}
     used |= {axis.valve_message.name for axis in deployment.axes.values()}
