@@ -179,7 +179,7 @@ class InputSection(Protected):
     )
     """J1939: address of the sender; by default that of the DBC, where FE (254) is any."""
     timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
-    """Age at which the message is lost; for a joystick at least two cycles and two ticks."""
+    """Age at which it is lost; of a joystick at least two cycles and two ticks."""
     alive_max_step: (
         Annotated[
             int, number(1, 255, "", "largest step of the alive counter that is still the next one")
