@@ -8,17 +8,17 @@ from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, CrcBase
 
 
 class Place(Protocol):
-    """Where the checksum of a message lies."""
+    """Position of the checksum in a message."""
 
     @property
     def byte(self) -> int:
-        """Where it begins."""
+        """First byte of the checksum, counted from 0."""
 
 
 def _numbers(library: type[CrcBase]) -> tuple[int, int, tuple[int, ...]]:
-    """Register before the first byte, what it is changed by after the last, and its table.
+    """Return (start register, final XOR, table) of a CRC.
 
-    The table has the register after one byte, by what the byte and the register's are together.
+    The table holds the register after one byte, by (register byte XOR data byte).
     """
     end: int = library.calc(b"", initvalue=0)
     start: int = library.calc(b"") ^ end
@@ -26,14 +26,14 @@ def _numbers(library: type[CrcBase]) -> tuple[int, int, tuple[int, ...]]:
 
 
 class KernelSum:
-    """Computed here and, from the same numbers, by the kernel: see ``codec.kernel_check``."""
+    """A checksum that we compute, and the kernel from the same numbers (``codec.kernel_check``)."""
 
     def of(self, data: bytes) -> int:
         """Checksum of these bytes."""
         raise NotImplementedError
 
     def __call__(self, _can_id: int, place: Place, data: bytes) -> int:
-        """Return the checksum of a frame: over the bytes but the one that it lies in."""
+        """Return the checksum over all bytes of a frame except the checksum's own byte."""
         at = place.byte
         return self.of(data[:at] + data[at + 1 :])
 
@@ -42,24 +42,24 @@ class Xor(KernelSum):
     """Exclusive or of all bytes.
 
     Attributes:
-        start: what it begins with.
+        start: value before the first byte.
     """
 
     def __init__(self, start: int = 0) -> None:
         self.start = start
 
     def of(self, data: bytes) -> int:
-        """Exclusive or of ``data`` and the start."""
+        """Return the exclusive or of ``start`` and every byte of ``data``."""
         return reduce(xor, data, self.start)
 
 
 class Crc8(KernelSum):
-    """The CRC of a class of crccheck that reflects bytes and result, or neither.
+    """A CRC of 8 bits: that of a crccheck class that reflects both bytes and result, or neither.
 
     Attributes:
-        start: the register before the first byte.
-        end: what the register is changed by after the last.
-        table: the register after one byte, by what both are together.
+        start: register before the first byte.
+        end: value that is XORed into the register after the last byte.
+        table: register after one byte, by (register XOR byte).
     """
 
     def __init__(self, library: type[Crc8Base]) -> None:
@@ -67,14 +67,14 @@ class Crc8(KernelSum):
         self.table = bytes(table)
 
     def run(self, value: int, data: bytes) -> int:
-        """The register after ``data``, where it was ``value`` before."""
+        """Return the register after ``data``, starting from ``value``."""
         table = self.table
         for byte in data:
             value = table[value ^ byte]
         return value
 
     def of(self, data: bytes) -> int:
-        """CRC of ``data`` with the start value and the final inversion of the algorithm."""
+        """Return the CRC of ``data`` with the algorithm's start value and final XOR."""
         return self.run(self.start, data) ^ self.end
 
 
@@ -85,7 +85,7 @@ AUTOSAR = Crc8(Crc8Autosar)
 
 
 class ReflectedCrc:
-    """The CRC of a class of crccheck that reflects bytes and result, of 16 bits or more."""
+    """A CRC of 16 bits or more: that of a crccheck class that reflects bytes and result."""
 
     def __init__(self, library: type[CrcBase]) -> None:
         self._start, self._end, self._table = _numbers(library)
@@ -99,7 +99,7 @@ class ReflectedCrc:
 
 
 class Crc16:
-    """The CRC of a class of crccheck that reflects neither, of 16 bits."""
+    """A CRC of 16 bits: that of a crccheck class that reflects neither bytes nor result."""
 
     def __init__(self, library: type[CrcBase]) -> None:
         self._start, self._end, self._table = _numbers(library)

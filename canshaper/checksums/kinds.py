@@ -1,8 +1,8 @@
-"""Checksums: one row for each kind, those of other packages too.
+"""Checksums: one row for each kind, ours and those that other packages add.
 
-A row is all that there is of a kind. From it come the names that a deployment file may have, the
-JSON schema, the table in docs/checksums.md, what is verified and what is sent, and what can-gw of
-the kernel may send instead of us.
+A row defines a kind completely. From it come the names that a deployment file may use, the JSON
+schema, the table in docs/checksums.md, the check of received frames and the checksum of sent ones,
+ours and those that can-gw of the kernel sends instead of us.
 """
 
 import binascii
@@ -20,19 +20,20 @@ from crccheck.crc import Crc8Base, Crc16Arc, Crc16Base, CrcBase
 from canshaper.checksums.algorithms import AUTOSAR, SAE_J1850, Crc8, Crc16, ReflectedCrc, Xor
 
 GROUP = "canshaper.checksums"
-"""Entry points of packages: the name of a kind, and the ``ChecksumKind`` that it is."""
+"""Group of the entry points of packages: the name of a kind, and its ``ChecksumKind``."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checksum:
-    """The checksum of one message, as it is bound.
+    """The checksum of one message of the deployment, with its position.
 
     Attributes:
-        kind: its row in ``CHECKSUMS``.
-        byte: where it begins.
-        shift: its lowest bit in that byte: 4 in the upper half, else 0.
-        order: of its bytes, where it has two.
-        can_id: identifier of the message; two messages are never compared, only two deployments.
+        kind: name of its row in ``CHECKSUMS``.
+        byte: first byte of the checksum.
+        shift: lowest bit of the checksum in that byte: 4 in the upper half, else 0.
+        order: byte order of a checksum of two bytes.
+        can_id: identifier of the message. It does not enter ``==``, which compares one message in
+            two deployments, never two messages.
     """
 
     kind: str
@@ -42,20 +43,20 @@ class Checksum:
     can_id: int = field(default=0, compare=False)
 
     def __reduce__(self) -> tuple[Callable[..., "Checksum"], tuple[object, ...]]:
-        """Pickled with what its row is made of: a reload reads it in a process of its own."""
+        """Pickle the numbers of the row too: a reload binds the deployment in another process."""
         bound = (self.kind, self.byte, self.shift, self.order, self.can_id)
         return _handed_over, (_NUMBERS.get(self.kind), bound)
 
     def others(self, data: bytes) -> bytes:
-        """The bytes of a frame in which no bit of it lies."""
+        """Return the bytes of a frame that hold no bit of the checksum."""
         return data[: self.byte] + data[self.byte + (CHECKSUMS[self.kind].bits + 7) // 8 :]
 
     def verify(self, data: bytes) -> bool:
-        """Whether a frame has the checksum that it should."""
+        """Return whether the checksum in a frame is right."""
         return self.protect(data, 0) == data
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """Return the frame with its checksum; the counter is one of its signals."""
+        """Return the frame with its checksum; ``count`` is unused, as the data hold the counter."""
         row, first, order = CHECKSUMS[self.kind], self.byte, self.order
         bits = row.bits
         size = (bits + 7) // 8
@@ -67,10 +68,10 @@ class Checksum:
 
 
 Algorithm = Callable[[int, Checksum, bytes], int]
-"""Checksum of a frame by its CAN id, the place of the checksum, and its data.
+"""Computes the checksum of a frame from CAN id, place of the checksum, and data.
 
-The bits of the checksum are 0 in the data. Of the result the lowest bits count. It runs in every
-tick: it waits for nothing, keeps nothing and raises nothing.
+The bits of the checksum are 0 in the data. As many low bits of the result count as the checksum
+has. An algorithm runs in every tick: it waits for nothing, keeps nothing and raises nothing.
 """
 
 
@@ -79,13 +80,13 @@ class ChecksumKind:
     """How a checksum is computed.
 
     Attributes:
-        text: what it is, for people.
-        bits: its width: 4, 8 or 16.
-        algorithm: what computes it. An ``Xor`` or a ``Crc8`` computes it in the kernel too.
-        needs_id: whether the CAN id counts: the sender of such a message has to be known.
+        text: description for people.
+        bits: width of the checksum: 4, 8 or 16.
+        algorithm: computes the checksum. The kernel can compute an ``Xor`` or a ``Crc8`` too.
+        needs_id: whether the CAN id enters the checksum, so that the file has to name the sender.
 
     Raises:
-        ValueError: another width, or one that the kernel computes and has not 8 bits.
+        ValueError: the width is another one, or is not 8 for an ``Xor`` or ``Crc8``.
 
     Examples:
         A package adds one by an entry point of the group ``canshaper.checksums`` that names it:
@@ -111,24 +112,24 @@ class ChecksumKind:
 
     @property
     def kernel(self) -> Xor | Crc8 | None:
-        """Algorithm by which can-gw of the kernel computes the same; None where it cannot."""
+        """The algorithm if can-gw of the kernel can compute it too; else None."""
         algorithm = self.algorithm
         return algorithm if isinstance(algorithm, Xor | Crc8) else None
 
 
 CRC_WIDTHS: Mapping[int, type[CrcBase]] = {8: Crc8Base, 16: Crc16Base}
-"""Bits that a CRC by its polynomial may have."""
+"""Widths (bits) that a CRC by its polynomial may have, with the crccheck class of each."""
 
 
 def crc_kind(bits: int, polynomial: int, start: int, end: int, *, reflected: bool) -> str:
-    """The name of a CRC by its numbers, which is in ``CHECKSUMS`` from now on.
+    """Add the CRC with these numbers to ``CHECKSUMS``, and return its name there.
 
     Args:
-        bits: one of ``CRC_WIDTHS``.
-        polynomial: without its highest bit.
+        bits: width, one of ``CRC_WIDTHS``.
+        polynomial: polynomial without its highest bit.
         start: register before the first byte.
-        end: what the register is changed by after the last.
-        reflected: the lowest bit of each byte comes first, and of the register.
+        end: value that is XORed into the register after the last byte.
+        reflected: whether the lowest bit of each byte, and of the register, comes first.
     """
     name = f"crc{bits} {polynomial:#x} start {start:#x} end {end:#x}{' reflected' * reflected}"
     if name not in CHECKSUMS:
@@ -154,7 +155,7 @@ def _handed_over(
     numbers: tuple[int, int, int, int, bool] | None,
     bound: tuple[str, int, int, Literal["little", "big"], int],
 ) -> Checksum:
-    """A checksum of another process; its kind may be in the table of that one only."""
+    """Restore a pickled checksum; add its kind where only the other process has it."""
     if numbers is not None:
         crc_kind(*numbers[:4], reflected=numbers[4])
     elif bound[0] not in CHECKSUMS:
@@ -163,7 +164,7 @@ def _handed_over(
 
 
 def _of_others(crc: ReflectedCrc | Crc16) -> Algorithm:
-    """A CRC over the bytes in which no bit of the checksum lies."""
+    """Return the algorithm of a CRC over the bytes that hold no bit of the checksum."""
     return lambda _can_id, place, data: crc.of(place.others(data))
 
 
@@ -196,22 +197,22 @@ CHECKSUMS: dict[str, ChecksumKind] = {
         "CRC 0x8005, reflected, start 0", 16, _of_others(ReflectedCrc(Crc16Arc))
     ),
 }
-"""Every kind by its name, over all bytes of a frame but its own. Those of packages join it when a
-deployment names them."""
+"""Every kind by its name, each over all bytes of a frame but its own. The kind of a package joins
+the table when a deployment names it."""
 
 _OURS = frozenset(CHECKSUMS)
 _NUMBERS: dict[str, tuple[int, int, int, int, bool]] = {}
-"""Numbers from which ``crc_kind`` made a row, by its name."""
+"""Arguments from which ``crc_kind`` made a row, by the name of the row."""
 _SHA256: dict[str, str] = {}
-"""SHA-256 of the modules that added a kind, by kind."""
+"""SHA-256 of the module that added a kind, by kind."""
 
 
 def known_checksum(kind: object) -> str:
-    """The name of a kind, which is in ``CHECKSUMS`` from now on.
+    """Check the name of a kind, load its package into ``CHECKSUMS`` if it has one, and return it.
 
     Raises:
-        ValueError: there is no such kind, or two have the name, or its package cannot be loaded;
-            one line for the person who wrote the deployment file.
+        ValueError: there is no such kind, or two have the name, or its package cannot be loaded.
+            The message is one line for the person who wrote the deployment file.
     """
     name = kind if isinstance(kind, str) else ""
     entries = _packages().get(name, [])
@@ -228,12 +229,12 @@ def known_checksum(kind: object) -> str:
 
 
 def checksum_names() -> list[str]:
-    """Names of all kinds, ours first; no package is loaded for it."""
+    """Return the names of all kinds, ours first, without loading a package."""
     return list(dict.fromkeys([*(n for n in CHECKSUMS if n in _OURS), *_packages()]))
 
 
 def package_line(kind: str) -> str | None:
-    """Which package added a kind, with the SHA-256 of the module; None for one of ours."""
+    """Return a log line: package of a kind and its module's SHA-256; None for a kind of ours."""
     if kind not in _SHA256:
         return None
     return f"checksum=sha256:{_SHA256[kind]} kind={kind} package={_owner(_packages()[kind][0])}"

@@ -1,12 +1,12 @@
-"""Profiles of AUTOSAR E2E: 1, 2, 5, 6, 11 and 22 of any frame, 4 and 7 of CAN FD.
+"""Profiles of AUTOSAR E2E: 1, 2, 5, 6, 11 and 22 for any frame, 4 and 7 for CAN FD.
 
 Source: AUTOSAR PRS_E2EProtocol (FO R20-11), whose protocol examples are in the tests. Start and end
 values of the CRCs, order of the bytes of the data ID and counter positions are those of the
 MIT-licensed Python package autosar-e2e and of torsko/autosar-e2e, which agree.
 
-All lay a header over the first bytes of a message. In profiles 1 and 2 the CRC fills byte 0, the
-counter the lower half of byte 1; 11 and 22 are the same with fewer variants. Other positions are
-not supported. Profiles 4 and 7 have headers of 12 and 20 bytes, which only frames of CAN FD hold.
+Every profile puts a header into the first bytes of a message. In profiles 1 and 2 the CRC fills
+byte 0, the counter the lower half of byte 1; 11 and 22 are the same with fewer variants. Other
+positions are not supported. The headers of profiles 4 and 7 (12, 20 bytes) fit into CAN FD only.
 """
 
 import binascii
@@ -25,8 +25,8 @@ class E2e:
     """Common part of all profiles.
 
     Attributes:
-        counts: values of the counter.
-        bits: how many of the first bits of a message are the header.
+        counts: number of values of the counter.
+        bits: length of the header at the beginning of a message, bits.
     """
 
     counts: int
@@ -37,14 +37,14 @@ class E2e:
         return data[1] & COUNTER
 
     def __eq__(self, other: object) -> bool:
-        """Whether that is the same profile with the same data ID."""
+        """Return whether ``other`` is the same profile with the same data ID."""
         return type(other) is type(self) and vars(other) == vars(self)
 
     def __hash__(self) -> int:
         return hash(type(self))
 
     def verify(self, data: bytes) -> bool:
-        """Whether a frame of two bytes or more has the header that it should."""
+        """Return whether the header of a frame of two bytes or more is right."""
         count = self.count(data)
         return count < self.counts and data[0] == self.crc(data, count)
 
@@ -54,7 +54,7 @@ class E2e:
         return bytes((self.crc(data, count),)) + data[1:]
 
     def second(self, byte: int, count: int) -> int:
-        """Byte 1 with this counter; ``byte`` is what the signals of the message make of it."""
+        """Return byte 1 with this counter; ``byte`` is byte 1 as the signals encode it."""
         return byte & ~COUNTER | count
 
     def crc(self, data: bytes, count: int) -> int:
@@ -67,16 +67,16 @@ class Profile1(E2e):
 
     Args:
         data_id: 16 bits that distinguish this message from all others.
-        mode: bytes of it that enter the CRC. ``both``: the low one, then the high one. ``low``: the
-            low one. ``alternating``: the low one with even counters, the high one with odd ones.
-            ``nibble``: the low one, then a zero; four bits of the high one are sent in the upper
-            half of byte 1.
+        mode: bytes of the data ID that enter the CRC. ``both``: the low byte, then the high one.
+            ``low``: the low byte. ``alternating``: the low byte with even counters, the high byte
+            with odd ones. ``nibble``: the low byte, then a zero; four bits of the high byte are
+            sent in the upper half of byte 1.
 
     Attributes:
         starts: register of the CRC after the data ID, for even and for odd counters.
 
-    The profile starts the CRC with 0 and does not invert its result, unlike the algorithm of that
-    name in catalogues.
+    The profile starts the CRC with 0 and does not invert its result, unlike the CRC-8 SAE J1850 of
+    catalogues.
     """
 
     counts = 15
@@ -96,13 +96,13 @@ class Profile1(E2e):
         self.bits = 12 if self._nibble is None else 16
 
     def verify(self, data: bytes) -> bool:
-        """Whether header and sent part of the data ID are what they should be."""
+        """Return whether the header, and the part of the data ID that is sent, are right."""
         if self._nibble is not None and data[1] & 0xF0 != self._nibble:
             return False
         return super().verify(data)
 
     def second(self, byte: int, count: int) -> int:
-        """Byte 1 with this counter, and the part of the data ID that is sent."""
+        """Return byte 1 with this counter and the part of the data ID that is sent."""
         return super().second(byte if self._nibble is None else self._nibble, count)
 
     def crc(self, data: bytes, count: int) -> int:
@@ -117,7 +117,7 @@ class Profile2(E2e):
         data_ids: 16 data IDs of 8 bits, by the counter.
 
     Attributes:
-        ids: them as bytes.
+        ids: the data IDs as bytes.
     """
 
     counts = 16
@@ -158,7 +158,7 @@ class Profile5(E2e):
         return self.crc(data, count).to_bytes(2, self._order) + data[2:]
 
     def crc(self, data: bytes, count: int) -> int:
-        """CRC of a frame, whose counter is among its bytes."""
+        """CRC of a frame; ``count`` is unused, as the counter is among the bytes."""
         return binascii.crc_hqx(data[2:] + self._id, 0xFFFF)
 
 
@@ -173,7 +173,7 @@ class Profile6(Profile5):
         return data[4]
 
     def verify(self, data: bytes) -> bool:
-        """Whether header and length are what they should be."""
+        """Return whether the header and the length in it are right."""
         return data[2:4] == len(data).to_bytes(2, "big") and super().verify(data)
 
     def protect(self, data: bytes, count: int) -> bytes:

@@ -52,11 +52,11 @@ class FrameFault(IntEnum):
 
 
 class BusState(Enum):
-    """State of a bus, as far as it is seen from our sockets."""
+    """State of a bus, as far as our sockets show it."""
 
     UP = "up"
     UNCONFIRMED = "unconfirmed"
-    """Up, as far as known: its interface does not say whether a frame of ours got onto the bus."""
+    """Up as far as we know: the interface does not confirm that our frames reach the bus."""
     PASSIVE = "passive"
     """The controller counts many errors."""
     BUS_OFF = "bus-off"
@@ -82,9 +82,9 @@ SFF_MASK, EFF_MASK = 0x7FF, 0x1FFFFFFF
 
 
 def id_of(word: int) -> tuple[int, bool]:
-    """The id in a word of SocketCAN, and whether it has 29 bits.
+    """Return the id in a SocketCAN word, and whether it has 29 bits.
 
-    Bits beyond those of the id, which another program may have set, never reach a bus.
+    Other bits of the word, which another program may have set, are dropped: they never reach a bus.
     """
     if word & EFF_FLAG:
         return word & EFF_MASK, True
@@ -101,30 +101,30 @@ _GROUP_OF_PDU2 = 0x03FFFF00
 
 
 def has_destination(can_id: int) -> bool:
-    """Whether messages of its group are sent to one node, or to all where that says so."""
+    """Return whether the group is PDU1: its identifiers hold a destination, one node or all."""
     return (can_id >> 16) & 0xFF < 240
 
 
 def group_mask(can_id: int) -> int:
-    """Bits of an identifier that give its group."""
+    """Return the mask of the bits of an identifier that give its group."""
     return _PAGES_AND_FORMAT if has_destination(can_id) else _GROUP_OF_PDU2
 
 
 def group_of(can_id: int) -> int:
-    """Group of an identifier of 29 bits."""
+    """Return the bits of an identifier of 29 bits that give its group (PGN << 8)."""
     return can_id & group_mask(can_id)
 
 
 def identifier(
     pgn: int, source: int, destination: int = GLOBAL, priority: int = DEFAULT_PRIORITY
 ) -> int:
-    """Identifier of a message.
+    """Return the J1939 identifier (29 bits) of a message.
 
     Args:
         pgn: parameter group number.
         source: source address.
-        destination: only for groups that have one.
-        priority: 0 to 7, the lower the sooner.
+        destination: destination address; unused for groups without one.
+        priority: 0 (highest) to 7 (lowest).
     """
     specific = 0 if (pgn >> 8) & 0xFF >= 240 else destination << 8
     return priority << 26 | pgn << 8 | specific | source
@@ -141,7 +141,7 @@ def with_source(can_id: int, source: int) -> int:
 
 
 def at_every_priority(can_id: int) -> list[int]:
-    """The identifiers that a message may come with: its priority says nothing of what it is."""
+    """Return the identifier with each of the 8 priorities: a message is the same at all of them."""
     return [priority << 26 | can_id & WITHOUT_PRIORITY for priority in range(8)]
 
 
@@ -149,7 +149,7 @@ NMT = 0x000
 EMERGENCY = 0x080  # and the node id
 HEARTBEAT = 0x700  # and the node id
 
-# Identifiers of 11 bits of its other services, as (id, mask, name): no PDO may have one.
+# CANopen's other identifiers of 11 bits, as (id, mask, name of service): no PDO may use one.
 SERVICES = (
     (0x000, 0x7FF, "NMT"),
     (0x080, 0x7FF, "SYNC"),
@@ -163,7 +163,7 @@ SERVICES = (
 
 
 def service_of(can_id: int) -> str | None:
-    """Service that an identifier of 11 bits belongs to; None where that is no such one."""
+    """Return the CANopen service of an identifier of 11 bits; None where no service uses it."""
     return next((name for base, mask, name in SERVICES if can_id & mask == base), None)
 
 
@@ -172,7 +172,7 @@ NO_EMERGENCY = 0x0000
 GENERIC_ERROR = 0x1000
 
 STATE_MASK = 0x7F
-"""State bits of a heartbeat; the bit above is that of node guarding."""
+"""State bits of a heartbeat; the bit above them is the toggle bit of node guarding."""
 
 
 class NodeState(IntEnum):
@@ -185,7 +185,8 @@ class NodeState(IntEnum):
 
 
 class ValveState(IntEnum):
-    """Low four bits of the control word that asks for a state, and of the status word in it."""
+    """State of a valve: low four bits of the control word that requests it, and of the status
+    word."""
 
     INIT = 0x8
     DISABLED = 0x9
@@ -194,7 +195,7 @@ class ValveState(IntEnum):
 
 
 STATE_BITS = 4
-"""State bits of control and status word."""
+"""Number of state bits in control and status word."""
 READY_BIT = 0x8
 """Bit of the status word that a valve with a fault clears."""
 RESET_FAULT = 0x3
@@ -210,12 +211,12 @@ DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
 
 
 def claims_of(address: int) -> list[int]:
-    """Identifiers of what a node says about its address: that it claims it, or cannot."""
+    """Return the identifiers of "address claimed" and "cannot claim" of a node."""
     return [identifier(CLAIMED, source) for source in (address, NULL)]
 
 
 def sent_by(address: int) -> list[int]:
-    """Identifiers of what a node sends besides its claims, commands and status."""
+    """Return the identifiers that a node sends besides claims, commands and status."""
     low = LOWEST_PRIORITY
     return [
         identifier(ACKNOWLEDGE, address),
@@ -226,10 +227,9 @@ def sent_by(address: int) -> list[int]:
 
 
 def name_bytes(name: "J1939Name") -> bytes:
-    """The NAME as it is sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
+    """Return the NAME as sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
 
-    The bit for a node that may choose another address stays 0: our address is the one that
-    valves are set to listen to.
+    The bit "arbitrary address capable" stays 0: valves are set to listen to our one address.
     """
     fields = (
         (name.identity_number, 21),

@@ -19,7 +19,10 @@ FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
 
 def layout_fault(message: Message) -> str | None:
-    """Why the bits of a message cannot be read, or None; cantools reports it with a frame only."""
+    """Return why the bits of a message cannot be read, or None.
+
+    cantools would report these faults only when it decodes a frame.
+    """
     if not isinstance(message.cycle_time, int | None) or (message.cycle_time or 0) < 0:
         return f"GenMsgCycleTime: expected a whole number of ms, got {message.cycle_time!r}"
     multiplexors = {signal.name for signal in message.signals if signal.is_multiplexer}
@@ -34,7 +37,7 @@ def layout_fault(message: Message) -> str | None:
 
 
 def _number_fault(signal: Signal) -> str | None:
-    """Why a signal is no number, or None."""
+    """Return which number of a signal's definition is unusable, or None."""
     first = signal.raw_initial or 0
     if not isinstance(first, int | float) or not math.isfinite(first):
         return f"GenSigStartValue of {signal.name}: expected a number, got {first!r}"
@@ -47,12 +50,12 @@ def _number_fault(signal: Signal) -> str | None:
 
 
 class Chosen(NamedTuple):
-    """Which frames of a multiplexed message are meant.
+    """The frames of a multiplexed message that the deployment uses.
 
     Attributes:
-        signal: the multiplexor.
-        value: raw, of the frames that are meant.
-        alone: whether alive counter or checksum are in these only.
+        signal: name of the multiplexor.
+        value: raw value of the multiplexor in these frames.
+        alone: whether only these frames have the alive counter or checksum.
     """
 
     signal: str
@@ -61,11 +64,10 @@ class Chosen(NamedTuple):
 
 
 class Layout:
-    """Where the signals of a message lie.
+    """Encodes and decodes the raw values of the signals of a message.
 
-    For messages that were loaded strictly, so that no signals overlap, that are not multiplexed and
-    have no ``layout_fault``. In encoded messages of J1939 the bits that no signal has are 1, in all
-    others 0.
+    The message has been loaded strictly (no signals overlap), is not multiplexed and has no
+    ``layout_fault``. Bits that no signal has are encoded as 1 in messages of J1939, else as 0.
     """
 
     def __init__(self, message: Message) -> None:
@@ -90,7 +92,7 @@ class Layout:
         self.length = message.length
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        """Raw value of every signal, by name.
+        """Return the raw value of every signal, by name.
 
         Args:
             data: exactly as many bytes as the message has.
@@ -101,13 +103,13 @@ class Layout:
         return values
 
     def encode(self, raw: dict[str, Any]) -> bytes:
-        """Bytes of the message.
+        """Return the bytes of the message.
 
         Args:
             raw: raw value of every signal, by name; a whole number where the signal is no float.
 
         Raises:
-            OverflowError: a value is not within the bits of its signal (bitstruct.Error where
+            OverflowError: a value does not fit into the bits of its signal (bitstruct.Error where
                 bitstruct has no compiled part).
         """
         data: bytes = self._intel.pack(raw)[::-1]
@@ -119,19 +121,19 @@ class Layout:
 
 
 def is_fd(message: Message) -> bool:
-    """Whether a message is sent in frames of CAN FD: by the DBC, or for its length."""
+    """Return whether a message is sent in CAN FD: the DBC says so, or its length demands it."""
     return message.is_fd or (message.length > CLASSICAL_BYTES and not is_j1939(message))
 
 
 def frame_length(message: Message) -> int:
-    """Bytes of its frames: CAN FD has few lengths beyond 8, and what is shorter is filled up."""
+    """Return the bytes of the frames of a message: CAN FD pads to the next length it has."""
     if not is_fd(message):
         return message.length
     return next((n for n in FD_LENGTHS if n >= message.length), message.length)
 
 
 def is_j1939(message: Message) -> bool:
-    """Whether the DBC says that it is a message of J1939 (VFrameFormat J1939PG)."""
+    """Return whether the DBC marks a message as J1939 (VFrameFormat J1939PG)."""
     return message.protocol == "j1939"
 
 
@@ -140,7 +142,7 @@ def _ones(count: int) -> int:
 
 
 def _compiled(places: dict[int, Signal], bits: int) -> Any:
-    """Format of bitstruct for the signals at their first bits; the bits between are padding."""
+    """Compile a bitstruct format: signals by their first bit, padding between them."""
     text, names, at = "", [], 0
     for first, signal in sorted(places.items()):
         if first > at:

@@ -1,8 +1,8 @@
-"""A message with its protection: the frames that we send of it, and the check of those received.
+"""A message with its protection: building the frames that we send, checking those received.
 
-Protection is an alive counter and a checksum, or a profile of AUTOSAR E2E. The rule of the counter
-is that of E2E: a step of 1 up to a largest one is good (some were lost), 0 is a repetition and no
-news, a larger one is a wrong sequence.
+Protection is an alive counter and a checksum, or a profile of AUTOSAR E2E. The counter is judged by
+the rule of E2E: a step of 1 up to a largest step is good (frames may be lost), a step of 0 is a
+repetition without news, a larger step is a wrong sequence.
 """
 
 from collections.abc import Mapping
@@ -26,12 +26,12 @@ GOOD = FrameFault.NONE  # by way of the class it takes ten times as long
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """Protection of one message, as it is bound.
+    """Protection of one message of the deployment.
 
     Attributes:
-        counter: signal of the alive counter, where it is one.
-        counts: values of the counter, of that signal or of E2E; 0 where there is no counter.
-        check: what protects the content.
+        counter: name of the alive counter's signal; None without one, and for E2E.
+        counts: number of values of the counter, the signal's or E2E's; 0 without a counter.
+        check: checksum or E2E profile that protects the content.
     """
 
     counter: str | None = None
@@ -43,14 +43,14 @@ UNPROTECTED = Protection()
 
 
 class FieldSet:
-    """Physical values to the raw fields of one message; what is not set keeps its start value.
+    """Converts physical values to raw values of one message; unset signals keep their start value.
 
-    That is GenSigStartValue; without one 0, in messages of J1939 all bits 1: not available.
+    The start value is GenSigStartValue; without one 0, in J1939 all bits 1 (not available).
 
     Attributes:
         message: the message.
-        layout: where its signals lie.
-        start: raw start value of every signal.
+        layout: encodes and decodes its signals.
+        start: raw start value of every signal, by name.
     """
 
     def __init__(self, message: Message) -> None:
@@ -65,7 +65,7 @@ class FieldSet:
 
     @staticmethod
     def _start(signal: Signal, all_ones: bool) -> int | float:
-        """GenSigStartValue (a raw value), within the bits of the signal."""
+        """Return GenSigStartValue (a raw value), clamped to the bits of the signal."""
         if signal.is_float:
             return float(signal.raw_initial or 0.0)
         low, high = raw_limits(signal)
@@ -74,34 +74,34 @@ class FieldSet:
         return min(max(int(signal.raw_initial or 0), low), high)
 
     def raw(self, name: str, value: float) -> int:
-        """Raw value nearest to a physical one, held within the bits of the signal.
+        """Return the raw value nearest to a physical one, clamped to the bits of the signal.
 
-        Held, not refused: a status beyond its range shall still be seen.
+        It is clamped, not refused: a status beyond its range shall still be seen.
         """
         scale, offset, low, high = self._fields[name]
         return min(max(round((value - offset) / scale), low), high)
 
     def value(self, name: str, raw: float) -> float:
-        """Physical value of a raw one."""
+        """Return the physical value of a raw value."""
         scale, offset, _, _ = self._fields[name]
         return raw * scale + offset
 
 
 class SentMessage:
-    """One message as it is bound; nothing of it changes afterwards.
+    """One message that we send; it does not change after the deployment is bound.
 
     Args:
         bus: name of the bus.
-        message: its definition.
-        source: source address, for messages of J1939 instead of that of the DBC.
-        protection: that of its frames.
+        message: definition of the message in the DBC.
+        source: source address of a J1939 message, instead of that of the DBC.
+        protection: protection of its frames.
 
     Attributes:
-        key: bus, id and whether that is extended.
-        fields: its signals.
-        protection: that of its frames.
-        rewrites: whether they are a joystick's on their way through a gateway.
-        start: raw value of every signal at first; valve codecs put neutral in while they are bound.
+        key: bus, id, and whether the id is extended.
+        fields: signals of the message.
+        protection: protection of its frames.
+        rewrites: whether its frames are a joystick's on their way through a gateway.
+        start: initial raw value of every signal; binding a valve codec puts neutral in.
     """
 
     rewrites = False
@@ -122,17 +122,17 @@ class SentMessage:
         self.start: dict[str, Any] = dict(self.fields.start)
 
     def sender(self) -> "Sender":
-        """Make its sender, with the counter at the beginning."""
+        """Return a new sender of this message, with the counter at its first value."""
         return Sender(self)
 
 
 class Sender:
-    """Sends one message: every frame is the next one, protected.
+    """Builds the successive frames of one message, each with the next count and its checksum.
 
     Attributes:
-        key: bus, id and whether that is extended.
-        fields: its signals.
-        raw: raw value of every signal, changed by those who put values in.
+        key: bus, id, and whether the id is extended.
+        fields: signals of the message.
+        raw: raw value of every signal; valve codecs and other writers change it in place.
     """
 
     def __init__(self, message: SentMessage) -> None:
@@ -152,7 +152,7 @@ class Sender:
             values: raw values for this frame alone, by signal.
 
         Raises:
-            OverflowError: a value is not within the bits of its signal.
+            OverflowError: a value does not fit into the bits of its signal.
         """
         raw = {**self.raw, **values} if values else self.raw
         if self._counts:
@@ -169,26 +169,26 @@ class Sender:
         self._count = (self._count - 1) % self._counts if self._counts else 0
 
     def instead(self, frame: Frame) -> Frame:
-        """Make the frame in the place of the last one, which was not sent: with the same count."""
+        """Return a frame that replaces the last one, which was not sent: with the same count."""
         self.take_back()
         return self.frame()
 
     def copy_state(self, before: Self) -> None:
-        """Go on with the counter where ``before`` stands; from 0 where it is another counter."""
+        """Continue the count of ``before`` if it has the same counter; else stay at 0."""
         if (self._counter, self._counts) == (before._counter, before._counts):
             self._count = before._count
 
 
 class SequenceChecker:
-    """Checks the sequence and the content of the frames of one message that is received.
+    """Checks the sequence and the content of the received frames of one message.
 
     Args:
-        protection: that of the message.
-        max_step: largest step of the counter that is still the next one; None for the usual one.
+        protection: protection of the message.
+        max_step: largest good step of the counter; None for the default.
         qualify: good frames in a row that are needed at the start and after a wrong one.
 
     Attributes:
-        qualified: whether the last frame, found good, may be used: enough have come in a row.
+        qualified: whether the last good frame may be used: enough have come in a row.
     """
 
     def __init__(self, protection: Protection, max_step: int | None, qualify: int) -> None:
@@ -196,7 +196,7 @@ class SequenceChecker:
         self._range = protection.counts
         self._max_step = max_step or min(USUAL_MAX_STEP, protection.counts // 2)
         self._check = protection.check
-        # Without a signal for it, the counter is that of E2E, in its header.
+        # Without a signal of its own, the counter is the one in the header of E2E.
         self._header: Any = None if protection.counter else protection.check
         self._qualify = qualify
         self._last: int | None = None
@@ -205,13 +205,13 @@ class SequenceChecker:
         self.qualified = False
 
     def copy_state(self, before: Self) -> None:
-        """Continue the sequence of the same message, where its protection is the same."""
+        """Continue the sequence of ``before``, if the protection of the message is unchanged."""
         if self._protection == before._protection:
             self._last, self._resynced, self._good = before._last, before._resynced, before._good
             self.qualified = self._good >= self._qualify
 
     def resync(self) -> None:
-        """Accept any counter but the last one next, because the sender was silent."""
+        """Accept every count but a repeated one in the next frame: the sender was silent."""
         self._resynced = True
         self._requalify()
 
@@ -219,8 +219,8 @@ class SequenceChecker:
         """Check a frame of the right length, and return its fault.
 
         Args:
-            data: its bytes.
-            count: value of its alive counter; E2E has one of its own, which counts instead.
+            data: bytes of the frame.
+            count: value of the alive counter's signal; unused with E2E, whose header has a counter.
         """
         if self._check is not None and not self._check.verify(data):
             self._requalify()

@@ -17,20 +17,20 @@ class RewrittenMessage(SentMessage):
     """The message of a joystick as it leaves on the other bus.
 
     Args:
-        bus: name of that bus.
-        message: its definition.
-        source: its source address, where it is one of J1939.
-        protection: that of its frames, computed again.
-        enable: name of its enable switch.
-        ours: names of the signals that the axes put in.
+        bus: name of the other bus.
+        message: definition of the message in the DBC.
+        source: source address of a J1939 message.
+        protection: protection of its frames, which we compute again.
+        enable: name of the signal of its enable switch.
+        ours: names of the signals that the axes write.
 
     Attributes:
         start: raw value of every signal in a frame of our own: neutral for the axes, rest or "not
             available" for all others.
-        enable: name of its enable switch.
-        ours: names of the signals that the axes put in.
-        ours_mask: bits of the velocities, byte 0 the lowest.
-        mask_of_all: ``ours_mask`` with the bits of the alive counter.
+        enable: name of the signal of its enable switch.
+        ours: names of the signals that the axes write.
+        ours_mask: mask of the bits of the velocities, byte 0 the lowest.
+        mask_of_all: ``ours_mask`` and the bits of the alive counter.
     """
 
     rewrites = True
@@ -54,7 +54,7 @@ class RewrittenMessage(SentMessage):
         self.mask_of_all = self.ours_mask | (self._mask({counter}) if counter else 0)
 
     def _mask(self, names: frozenset[str] | set[str]) -> int:
-        """Bits of these signals."""
+        """Return the mask of the bits of these signals, byte 0 the lowest."""
         zeros: dict[str, Any] = dict.fromkeys(self.start, 0)
         message, layout = self.fields.message, self.fields.layout
         ones = {
@@ -66,16 +66,16 @@ class RewrittenMessage(SentMessage):
         return int.from_bytes(low, "little") ^ int.from_bytes(high, "little")
 
     def neutral_bits(self) -> int:
-        """The velocities of a machine that stands, byte 0 the lowest."""
+        """Return the bits of all velocities at neutral, byte 0 the lowest."""
         return int.from_bytes(self.fields.layout.encode(self.start), "little") & self.ours_mask
 
     def sender(self) -> "RewritingSender":
-        """Make its sender, with the counter at the beginning."""
+        """Return a new sender of this message, with the counter at its first value."""
         return RewritingSender(self)
 
 
 class RewritingSender(Sender):
-    """Sender of the rewritten message: in place of joystick frames, and where none comes."""
+    """Sends the rewritten message: in place of each joystick frame, and alone where none comes."""
 
     def __init__(self, message: RewrittenMessage) -> None:
         super().__init__(message)
@@ -83,7 +83,7 @@ class RewritingSender(Sender):
         self._enable, self._start = message.enable, message.fields.start[message.enable]
 
     def onto(self, data: bytes) -> Frame:
-        """Return the next frame: the joystick's with our velocities, protected again."""
+        """Return the next frame: the joystick's ``data`` with our velocities and protection."""
         ours = int.from_bytes(self.frame().data, "little") & self._mask
         word = int.from_bytes(data, "little") & ~self._mask | ours
         changed = word.to_bytes(self._length, "little")
@@ -92,18 +92,18 @@ class RewritingSender(Sender):
         return new_frame(Frame, (*self.key, changed))
 
     def instead(self, frame: Frame) -> Frame:
-        """Return the frame again, with the axes' present velocities and the same count."""
+        """Return ``frame``, which was not sent, with the axes' present velocities and its count."""
         self.take_back()
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:
-        """Return a frame without one of the joystick: nothing in it is older than the axes."""
+        """Return a frame without joystick data: present velocities, start values, enable switch."""
         self.raw[self._enable] = 1 if enabled else self._start
         return self.frame()
 
 
 def _at_rest(signal: Signal, start: Any) -> Any:
-    """Raw value that asks for nothing: the start value, and no velocity but 0."""
+    """Return a raw value that demands nothing: 0 for a velocity, else the start value."""
     low, high = signal.minimum, signal.maximum
     name = str((signal.choices or {}).get(start, ""))
     if low is None or high is None or not low < 0 < high or named_fault(name):
@@ -116,12 +116,12 @@ def _at_rest(signal: Signal, start: Any) -> Any:
 CS_XOR, CS_CRC8 = 5, 6
 _XOR = struct.Struct("=bbbB")  # cgw_csum_xor
 _CRC8 = struct.Struct("=bbbBB256sB20s")  # cgw_csum_crc8
-# linux/can/gw.h: no more than the bytes; a byte by the low half of byte 1 after them.
+# linux/can/gw.h: CRC over the bytes only; or also over a byte chosen by the low half of byte 1.
 PLAIN, BY_COUNTER = 0, 2
 
 
 def neutral_fault(protection: Protection, length: int) -> str | None:
-    """Why the kernel cannot protect a frame of so many bytes again that it has changed, or None."""
+    """Return why can-gw cannot protect a changed frame of ``length`` bytes again, or None."""
     check = protection.check
     if isinstance(check, Checksum):
         kernel = CHECKSUMS[check.kind].kernel
@@ -137,7 +137,10 @@ def neutral_fault(protection: Protection, length: int) -> str | None:
 
 
 def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, bytes], ...], int]:
-    """The check as can-gw computes it, and bits that have to be 0 before; no ``neutral_fault``."""
+    """Return the check as attributes of a can-gw rule, and the bits that must be 0 before it.
+
+    ``neutral_fault`` has found nothing.
+    """
     check = protection.check
     last = length - 1
     if check is None:
@@ -145,7 +148,7 @@ def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, 
     if isinstance(check, Checksum):
         kernel = CHECKSUMS[check.kind].kernel
         if isinstance(kernel, Xor):
-            # Over all bytes, its own among them, which therefore is 0 before.
+            # can-gw includes the checksum's own byte, which therefore must be 0 before.
             return ((CS_XOR, _XOR.pack(0, last, check.byte, kernel.start)),), 0xFF << 8 * check.byte
         assert kernel is not None
         first = 1 if check.byte == 0 else 0

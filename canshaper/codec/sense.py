@@ -1,4 +1,5 @@
-"""Sense of a switch or code by its name in the DBC: on or off, stop or free, a move or rest."""
+"""Guesses what a switch or code means from its name in the DBC: on or off, stop or free, a move
+or rest."""
 
 import re
 from collections.abc import Mapping
@@ -41,18 +42,18 @@ _RAW = re.compile(r"\b(off|bypass|disabled?|raw|manual|direct)\b")
 
 
 def words(name: str) -> str:
-    """The words of a name in small letters: GripReleased is "grip released"."""
+    """Return the words of a name in small letters: GripReleased becomes "grip released"."""
     return " ".join(filter(None, _GAP.split(name))).lower()
 
 
 def on(name: str) -> bool | None:
-    """Whether a name says that a switch is on; None where it says neither."""
+    """Return whether a name says that a switch is on; None where it says neither on nor off."""
     text = words(name)
     return False if _OFF.search(text) else True if _ON.search(text) else None
 
 
 def free(name: str) -> bool | None:
-    """Whether a name says that an emergency stop is free; None where it says neither."""
+    """Return whether a name says that an emergency stop is free; None for neither free nor stop."""
     text = words(name)
     if _NOT_FREE.search(text):
         return False
@@ -60,7 +61,7 @@ def free(name: str) -> bool | None:
 
 
 def of_signal(name: str, *, stop: bool = False) -> bool | None:
-    """Sense of the 1 of a signal by the last word of its name, as ``on``, or as ``free``."""
+    """Return what value 1 means by the last word of the signal's name: ``on``, or ``free``."""
     last = words(name).rpartition(" ")[2]
     if last == "no":  # SwitchNo1
         return None
@@ -68,18 +69,18 @@ def of_signal(name: str, *, stop: bool = False) -> bool | None:
 
 
 def shows_sway_control(name: str) -> bool:
-    """Whether the 1 of a signal says that anti-sway is on, not off."""
+    """Return whether, by a signal's name, its value 1 says that anti-sway is on, not off."""
     return bool(_SWAY.search(name)) and not _RAW.search(words(name))
 
 
 def direction_fault(name: str, *, moves: bool) -> bool:
-    """Whether the name of a direction code says that it is for rest, or else for a move."""
+    """Return whether a direction code's name contradicts it: rest for a move, a move for rest."""
     text = words(name)
     return bool(_REST.search(text) if moves else _MOVE.search(text) or "care" in text)
 
 
 def turned(positive: str, negative: str) -> bool:
-    """Whether each of two names says the direction of the other."""
+    """Return whether two direction codes seem swapped: each name says the other's direction."""
     one, other = words(positive), words(negative)
     contrary = _BACK.search(one) and _FORTH.search(other)
     return bool(contrary) and not (_FORTH.search(one) or _BACK.search(other))
@@ -88,13 +89,13 @@ def turned(positive: str, negative: str) -> bool:
 def contrary(
     names: Mapping[int, str], signal: str, *, stop: bool = False, known: bool = False
 ) -> str | None:
-    """Where a switch is, by its names, when it does what it should not; None where they agree.
+    """Return the state, by the names, in which a switch wrongly permits motion; None if all agree.
 
     Args:
-        names: of its raw values 0 and 1, where the DBC has some.
-        signal: its own name, which counts where the names of its values say neither.
-        stop: of an emergency stop, whose 0 is free; of every other switch 1 is on.
-        known: whether a name that says neither, which may be that of a fault, does not agree.
+        names: DBC names of the raw values 0 and 1, as far as there are any.
+        signal: name of the signal, which counts where the names of its values say neither.
+        stop: True for an emergency stop, free at 0; every other switch is on at 1.
+        known: whether a permitting value disagrees if its name, perhaps of a fault, says neither.
     """
     sense = free if stop else on
     acts, rests = (names.get(raw, "") for raw in ((0, 1) if stop else (1, 0)))
@@ -107,7 +108,7 @@ def contrary(
 
 
 def flag_fault(key: str, name: str) -> bool:
-    """Whether the name of a flag says neutral where ``key`` is a direction, or the contrary."""
+    """Return whether a flag's name says neutral where ``key`` is a direction, or vice versa."""
     text = words(name)
     neutral = bool(_NEUTRAL.search(text))
     return neutral not in (bool(_SIGN.search(text)), key == "neutral")

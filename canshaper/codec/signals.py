@@ -1,7 +1,7 @@
-"""Signals of a DBC message: raw codes are tested first, then scaled.
+"""Signals of a DBC message: whether a signal suits its use, and which raw values are codes.
 
-cantools scales whatever it finds: an error code of 1022 at 0.1 % per bit becomes 102.2 %. So
-everything here is decoded raw (``Layout``) and judged raw.
+cantools scales whatever it finds: an error code of 1022 at 0.1 % per bit becomes 102.2 %. So we
+decode raw values (``Layout``), test them for codes, and scale only the others.
 """
 
 import math
@@ -13,14 +13,14 @@ from cantools.database.can import Message, Signal
 
 from canshaper.shaping.states import Reason
 
-# Part of a raw step: what the rounding of decimals may take.
+# Tolerance for the rounding of decimals, as part of a raw step.
 STEP_ROUNDING = 1e-6
-# Of full scale; covers the rounding of scale and offset, and is less than any resolution.
+# Tolerance for the rounding of scale and offset, as part of full scale; below any resolution.
 ROUNDING = 1e-6
 LEAST_STEPS = 10
-"""Raw steps to full command that a valve can be moved with."""
+"""Fewest raw steps from zero to full command with which a valve can be moved."""
 FULL_SET_POINT = 0x4000
-"""Full set point of a valve of CiA 408; +-0x7FFF would be float, in which it drops its load."""
+"""Full setpoint of a valve of CiA 408; +-0x7FFF would be its float position, which drops a load."""
 
 # Names that the tables of a DBC give to raw values, as words in small letters: SensorError is
 # "sensor error". In a name without any gap, such as sensorerror, those of an error are found too,
@@ -41,19 +41,19 @@ _NEUTRAL = re.compile(r"neutral|neutral position|cent(er|re)|zero|released")
 
 
 def find_signal(message: Message, name: str) -> Signal | None:
-    """Signal of that name, or None."""
+    """Return the signal of that name, or None."""
     return next((s for s in message.signals if s.name == name), None)
 
 
 def raw_limits(signal: Signal) -> tuple[int, int]:
-    """Smallest and largest raw value that the bits of an integer signal hold."""
+    """Return the smallest and largest raw value that the bits of an integer signal hold."""
     if signal.is_signed:
         return -(1 << (signal.length - 1)), (1 << (signal.length - 1)) - 1
     return 0, (1 << signal.length) - 1
 
 
 def symmetrical_range(signal: Signal) -> str | None:
-    """Why the DBC range of a velocity signal cannot serve as full scale, or None when it can."""
+    """Return why the DBC range of a velocity signal cannot serve as full scale, or None."""
     if fault := _no_range(signal):
         return fault
     low, high = signal.minimum or 0.0, signal.maximum or 0.0
@@ -65,13 +65,13 @@ def symmetrical_range(signal: Signal) -> str | None:
 
 
 def full_scale(signal: Signal) -> float:
-    """Value at full command: the end of its range, of one off by a step the nearer end."""
+    """Return the value at full command: the end of the range; the nearer to 0 if they differ."""
     low, high = signal.minimum or 0.0, signal.maximum or 0.0
     return min(-low, high) if low < 0.0 else high
 
 
 def magnitude_range(signal: Signal) -> str | None:
-    """Why the DBC range of a magnitude cannot serve as full scale, or None; it begins at 0."""
+    """Return why the DBC range of a magnitude cannot be full scale, or None; it begins at 0."""
     if fault := _no_range(signal):
         return fault
     if signal.minimum != 0.0:
@@ -87,7 +87,7 @@ def _no_range(signal: Signal) -> str | None:
 
 
 def ends_fault(signal: Signal, use: str) -> str | None:
-    """Why the ends of a range are none, or None; ``use`` is what it is for."""
+    """Return why a signal has no usable range, or None; ``use`` says what the range is for."""
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or high == low:
         return f"{signal.name} has no range in the DBC; {use}"
@@ -97,7 +97,7 @@ def ends_fault(signal: Signal, use: str) -> str | None:
 
 
 def _not_reached(signal: Signal) -> str | None:
-    """Why the bits of a signal do not reach the ends of its range."""
+    """Return why the bits of a signal do not reach the ends of its range, or None."""
     if signal.is_float:
         return None
     low, high = signal.minimum or 0.0, signal.maximum or 0.0
@@ -113,12 +113,12 @@ def _not_reached(signal: Signal) -> str | None:
 
 
 def neutral_fault(signal: Signal, band: float, listed: Container[str] = ()) -> str | None:
-    """Why a joystick is never in neutral, so that its axis is never ready, or None.
+    """Return why a joystick is never in neutral, so that its axis is never ready, or None.
 
     Args:
-        signal: with its full scale (``symmetrical_range``, ``magnitude_range``).
-        band: what counts as neutral, part of full scale.
-        listed: names of values of which the file says what they are.
+        signal: signal of the velocity (``symmetrical_range``, ``magnitude_range`` find no fault).
+        band: deflection that counts as neutral, part of full scale.
+        listed: names of values whose meaning the deployment file states.
     """
     if signal.is_float:
         return None
@@ -136,7 +136,7 @@ def neutral_fault(signal: Signal, band: float, listed: Container[str] = ()) -> s
 
 
 def few_steps(signal: Signal, full: float) -> str | None:
-    """Why a signal cannot be read finely enough, or None; ``full`` is its value at full."""
+    """Return why the resolution of a signal is too coarse, or None; ``full``: its full scale."""
     steps = full / abs(signal.scale)
     if signal.is_float or signal.length <= 4 or steps + STEP_ROUNDING >= LEAST_STEPS:
         return None
@@ -144,12 +144,12 @@ def few_steps(signal: Signal, full: float) -> str | None:
 
 
 def valve_steps(full: float, scale: float) -> int:
-    """Raw steps from zero to full command; rounded down so that full is never passed."""
+    """Return the raw steps from zero to full command, rounded down so that full is not passed."""
     return int(full / scale + STEP_ROUNDING)
 
 
 def command_fault(signal: Signal) -> str | None:
-    """Why a valve cannot be commanded with a signal of symmetrical range, or None."""
+    """Return why a signal of symmetrical range cannot command a valve, or None."""
     if valve_steps(full_scale(signal), abs(signal.scale)) < LEAST_STEPS:
         return f"{signal.name} has fewer than {LEAST_STEPS} steps to full command"
     zero = signal.offset / signal.scale
@@ -159,7 +159,7 @@ def command_fault(signal: Signal) -> str | None:
 
 
 def set_point_fault(signal: Signal) -> str | None:
-    """Why a command signal cannot be the set point of a valve of CiA 408, or None."""
+    """Return why a command signal cannot be the setpoint of a valve of CiA 408, or None."""
     if signal.offset:
         return f"{signal.name} has the offset {signal.offset:g}; a set point of CiA 408 has none"
     if (steps := valve_steps(full_scale(signal), abs(signal.scale))) > FULL_SET_POINT:
@@ -173,7 +173,7 @@ def _words(name: str) -> str:
 
 
 def named_fault(name: str) -> Reason | None:
-    """Why a value is no measurement, where its name in the DBC says so."""
+    """Return why a value is no measurement by its name in the DBC; None for any other name."""
     words = _words(name)
     if _NOT_AVAILABLE.search(words):
         return Reason.JOYSTICK_NOT_AVAILABLE
@@ -181,18 +181,18 @@ def named_fault(name: str) -> Reason | None:
 
 
 def names_broken(name: str) -> bool:
-    """Whether a code is that of a broken switch, sensor or wire by its name in the DBC."""
+    """Return whether a name in the DBC is that of a broken switch, sensor or wire."""
     return named_fault(name) is not None or _BROKEN.search(name) is not None
 
 
 def is_neutral(signal: Signal, raw: float, name: str) -> bool:
-    """Whether a named value is neutral by its name and exactly 0, so that it moves nothing."""
+    """Return whether a value has a name for neutral and is exactly 0, so that it moves nothing."""
     at_zero = math.isclose(raw * signal.scale, -signal.offset)
     return at_zero and _NEUTRAL.fullmatch(_words(name)) is not None
 
 
 def in_range(signal: Signal, value: float) -> bool:
-    """Whether a value can be a measurement by the range of its signal; without one every value."""
+    """Return whether a value is within the range of its signal; any value if it has no range."""
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or high <= low:
         return True
@@ -201,7 +201,7 @@ def in_range(signal: Signal, value: float) -> bool:
 
 
 def code_fault(signal: Signal, raw: int) -> str | None:
-    """Why a signal can never have a code that is waited for: by its bits, or by its range."""
+    """Return why a signal can never have the code ``raw``, by its bits or its range; else None."""
     if signal.is_float:
         return None  # noted as no integer
     low, high = raw_limits(signal)
@@ -215,7 +215,7 @@ def code_fault(signal: Signal, raw: int) -> str | None:
 
 
 def raw_fault(signal: Signal) -> str | None:
-    """Why the values of a switch are others in the DBC than its raw values, which count."""
+    """Return the fault of a switch that the DBC scales, as its raw value counts; else None."""
     if (signal.scale, signal.offset) == (1, 0):
         return None
     text = f"{signal.name}: expected (1,0) in the DBC, as the raw value of a switch counts, got"
@@ -223,10 +223,10 @@ def raw_fault(signal: Signal) -> str | None:
 
 
 def special_codes(signal: Signal) -> dict[Any, Reason]:
-    """Raw values that are no measurement, with the reason: all that the DBC names, but neutral.
+    """Return every raw value that the DBC names, but neutral, and why it is no measurement.
 
-    Which named values are measurements stands in the deployment file: in a message that is bound
-    they have no name (``Listing.without_values``). Words choose the reason only.
+    The deployment file says which named values are measurements: in a bound message they have no
+    name any more (``Listing.without_values``). The words of a name only select the reason.
     """
     return {
         raw: named_fault(str(name)) or Reason.JOYSTICK_ERROR
@@ -236,20 +236,20 @@ def special_codes(signal: Signal) -> dict[Any, Reason]:
 
 
 def special_name(signal: Signal, value: float) -> str | None:
-    """Name in the DBC of a value that is no measurement, or None; ``value`` is in its unit."""
+    """Return the DBC name of a value (in its unit) that is no measurement; None of any other."""
     special = special_codes(signal)
     codes = {raw * signal.scale + signal.offset: raw for raw in special}
     return str((signal.choices or {})[codes[value]]) if value in codes else None
 
 
-# Unit of a length in a DBC file; many have none.
+# Units that a length may have in a DBC file; many files give none.
 LENGTHS = (None, "", "m")
 # Largest radius of a crane, with room; a range in mm or cm is far beyond.
 FARTHEST_M = 120.0
 
 
 def radius_range(signal: Signal) -> str | None:
-    """Why a signal is no radius, or its range does not say what is one; None where it does."""
+    """Return why a signal, or its range, cannot be that of a radius in m; None where it can."""
     if signal.unit not in LENGTHS:
         return f"{signal.name}: expected a radius in m, got a signal in {signal.unit}"
     if fault := ends_fault(signal, "what lies outside is no radius"):

@@ -1,8 +1,8 @@
 """Status messages: which fields they have, and how each is encoded and decoded.
 
-A field is declared once, in a table below; a message carries those that it has in its DBC. Who
-wants to send another one adds a line to the table: it is sent where a DBC has the signal, decoded
-by all who read status messages, and required by no one.
+A field is declared once, in a table below; a message carries those fields that its DBC has. To send
+another field, add a line to the table: it is then sent where a DBC has the signal, decoded by every
+reader of status messages, and required by none.
 """
 
 from collections.abc import Callable, Iterable
@@ -29,11 +29,11 @@ class StatusField(Generic[Source]):
     """One field of a status message.
 
     Attributes:
-        name: of its signal in the DBC.
-        encode: its value from what is reported: in the unit of the DBC, or a code.
-        decode: what is shown, from that value.
-        required: whether a message without it is refused.
-        largest: largest code of a field that is sent as its raw value; None for a measurement.
+        name: name of its signal in the DBC.
+        encode: returns the value for a source (such as an axis): in the DBC's unit, or a code.
+        decode: converts that value to the one that is shown.
+        required: whether a message without this signal is refused.
+        largest: largest code of a field whose raw value is a code; None for a measurement.
     """
 
     name: str
@@ -43,18 +43,18 @@ class StatusField(Generic[Source]):
     largest: int | None = None
 
     def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
-        """Pickled by its name: a reload reads the deployment in a process of its own."""
+        """Pickle only the name: a reload binds the deployment in a process of its own."""
         return _field, (self.name,)
 
     def shown(self, value: object) -> str:
-        """A decoded value for people: codes by their name, where they have one."""
+        """Return a decoded value as text: the name of a code, "unknown" for codes without one."""
         if isinstance(value, IntEnum):
             return value.name
         return f"unknown ({value})" if isinstance(self.decode, _Code) else f"{value:g}"
 
 
 class _Code:
-    """Decodes a code to a member; one that this program does not know stays a number."""
+    """Decodes a code to a member of an enum; a code that this program does not know stays int."""
 
     def __init__(self, kind: type[IntEnum]) -> None:
         self._kind = kind
@@ -71,19 +71,19 @@ class ReportedAxis(Protocol):
 
     @property
     def axis(self) -> ShapedAxis:
-        """State, reason, commands."""
+        """The shaped axis: state, demand and applied command."""
 
     @property
     def reason(self) -> Reason:
-        """Why it is in its state, or what holds it back."""
+        """Why the axis is in its state, or what holds it back."""
 
     @property
     def sway_deg(self) -> float:
-        """Predicted swing of the load."""
+        """Predicted swing of the load, degrees."""
 
     @property
     def active_set(self) -> int:
-        """Number of the parameter set that is chosen; 0 where there is no choice."""
+        """Number of the selected parameter set; 0 where there is no choice."""
 
     @property
     def trust(self) -> Trust:
@@ -91,7 +91,7 @@ class ReportedAxis(Protocol):
 
     @property
     def swing_length_m(self) -> float:
-        """Length of the pendulum, as the sway sensor shows it; 0 where it is not known."""
+        """Pendulum length estimated from the sway sensor, m; 0 where it is not known."""
 
 
 class ReportedAim(Protocol):
@@ -99,11 +99,11 @@ class ReportedAim(Protocol):
 
     @property
     def slew_deg(self) -> float:
-        """Angle that it still turns."""
+        """Angle by which the crane still turns, degrees."""
 
     @property
     def radius_m(self) -> float:
-        """Way of its tip out or in."""
+        """Distance by which the tip still moves out (or in, negative), m."""
 
     @property
     def known(self) -> bool:
@@ -118,7 +118,7 @@ def _applied_pct(one: ReportedAxis) -> float:
     return 100.0 * one.axis.sent
 
 
-# Nothing here may be a lambda: a deployment is handed over by the process that has read it.
+# Nothing here may be a lambda: a deployment is pickled by the process that has read it.
 AXIS_STATUS: list[StatusField[ReportedAxis]] = [
     StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State)),
     StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason)),
@@ -154,25 +154,25 @@ AIM: list[StatusField[ReportedAim]] = [
     StatusField("AimReach", attrgetter("radius_m"), required=True),
     StatusField("AimKnown", attrgetter("known"), bool, True, 1),
 ]
-"""Way that the tip still goes if the joysticks are let go now."""
+"""How far the tip still travels if the joysticks are released now."""
 
 
 def _field(name: str) -> StatusField[Any]:
-    """The field of that name, of the tables of this process."""
+    """Return the field of that name from the tables of this process."""
     fields: list[StatusField[Any]] = [*AXIS_STATUS, *SERVICE_STATUS, *IDENTITY, *AIM]
     return next(field for field in fields if field.name == name)
 
 
 class StatusCodec(Generic[Source]):
-    """Status message with the fields that its frames carry.
+    """Encodes and decodes the fields of one status message.
 
     Args:
-        message: where it is sent.
-        fields: those that such a message may have.
+        message: message that carries the status.
+        fields: fields that such a message may have.
 
     Attributes:
-        message: where it is sent.
-        fields: those that it has in its DBC.
+        message: message that carries the status.
+        fields: fields that the message has in its DBC.
     """
 
     def __init__(self, message: SentMessage, fields: Iterable[StatusField[Source]]) -> None:
@@ -180,7 +180,7 @@ class StatusCodec(Generic[Source]):
         self.fields = [one for one in fields if one.name in message.fields.start]
 
     def values(self, source: Source) -> dict[str, int]:
-        """Raw values by signal; those beyond the bits of their signal are held at its end."""
+        """Return the raw values by signal; measurements are clamped to the bits of their signal."""
         raw: dict[str, int] = {}
         for one in self.fields:
             value = one.encode(source)
@@ -189,7 +189,7 @@ class StatusCodec(Generic[Source]):
         return raw
 
     def decode(self, data: bytes) -> dict[str, Any] | None:
-        """Values of a frame by the names of its fields; None where its length is wrong."""
+        """Return the values of a frame by field name; None where its length is wrong."""
         fields = self.message.fields
         if len(data) != fields.layout.length:
             return None
@@ -203,7 +203,7 @@ class StatusCodec(Generic[Source]):
 
 
 def status_faults(message: Message, fields: Iterable[StatusField[Source]]) -> list[str]:
-    """Why a message cannot carry a status."""
+    """Return the reasons why a message cannot carry a status with these fields."""
     signals = {signal.name: signal for signal in message.signals}
     missing = [one.name for one in fields if one.required and one.name not in signals]
     faults = [f"lacks the signals {', '.join(missing)}"] if missing else []
@@ -220,5 +220,5 @@ def status_faults(message: Message, fields: Iterable[StatusField[Source]]) -> li
 
 
 def required_names(fields: Iterable[StatusField[Source]]) -> set[str]:
-    """Names of the signals that a message needs to carry a status."""
+    """Return the names of the signals that a status message must have."""
     return {one.name for one in fields if one.required}

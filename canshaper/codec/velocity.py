@@ -1,4 +1,4 @@
-"""Velocities in frames: what the signals of a joystick say, and what those of a valve are given."""
+"""Velocities in frames: decodes the signals of a joystick, encodes the signals of a valve."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,12 +11,12 @@ from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import ROUNDING, full_scale, special_codes, valve_steps
 from canshaper.shaping.states import Reason
 
-# The position that may stand next to the neutral flag, as a part of full: neutral switch and
-# position sensor are two parts and do not meet at one angle. More is a sensor that is broken.
+# Largest position that the neutral flag permits, as part of full scale: neutral switch and position
+# sensor are two parts and do not switch at one angle. More means a broken sensor.
 SMALL_IN_NEUTRAL = 0.05
-# (neutral, negative, positive) to sign and largest position; every other set is contradictory. No
-# flag at all is none while the position is 0: a joystick may stand between the neutral switch and
-# the switch of a direction, and 0 moves nothing whatever the direction.
+# Flags (neutral, negative, positive) to sign and largest position; every other set is
+# contradictory. No flag at all means neutral while the position is 0: a joystick may stand between
+# the neutral switch and a direction's switch, and 0 moves nothing whatever the direction.
 _DIRECTIONS = {
     (0, 0, 1): (1.0, 1.0),
     (0, 1, 0): (-1.0, 1.0),
@@ -29,7 +29,11 @@ _NOT_AVAILABLE = 3
 
 @dataclass(frozen=True, slots=True)
 class VelocitySignal:
-    """Signed velocity of a joystick: raw value to command or fault."""
+    """Reads the signed velocity of a joystick: raw value to command or fault.
+
+    ``full`` is the value at full command, in the signal's unit; ``low`` and ``high`` bound the
+    accepted parts of full scale, and ``special`` has the reason of each code.
+    """
 
     name: str
     scale: float
@@ -41,9 +45,9 @@ class VelocitySignal:
 
     @classmethod
     def of(cls, signal: Signal) -> "VelocitySignal":
-        """Return the reader of a DBC signal as a part of full scale.
+        """Return the reader of a DBC signal.
 
-        Its range has to be one of ``symmetrical_range`` or ``magnitude_range``.
+        ``symmetrical_range`` or ``magnitude_range`` has found no fault in its range.
         """
         full = full_scale(signal)
         low, high = (signal.minimum or 0.0) / full, (signal.maximum or 0.0) / full
@@ -51,7 +55,7 @@ class VelocitySignal:
         return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal), *ends)
 
     def read(self, raw: dict[str, Any]) -> float | Reason:
-        """Part of full scale in [-1, 1] from the raw values of a frame, or why there is none."""
+        """Return the part of full scale in [-1, 1] from a frame's raw values, or its fault."""
         code: float = raw[self.name]
         fault = self.special.get(code)
         if fault is not None:
@@ -88,9 +92,9 @@ class FlaggedVelocity:
         return self.magnitude.name
 
     def read(self, raw: dict[str, Any]) -> float | Reason:
-        """Command in [-1, 1] from the raw values of a frame, or why there is none.
+        """Return the command in [-1, 1] from a frame's raw values, or why it has none.
 
-        Position and flags come from sensors of their own: where they do not agree, neither counts.
+        Position and flags come from separate sensors: where they disagree, neither counts.
         """
         size = self.magnitude.read(raw)
         if isinstance(size, Reason):
@@ -113,7 +117,7 @@ class RockerVelocity:
 
     Attributes:
         positive: signal of the positive direction (``magnitude_range``).
-        negative: signal of the negative one.
+        negative: signal of the negative direction.
     """
 
     positive: VelocitySignal
@@ -125,9 +129,9 @@ class RockerVelocity:
         return self.positive.name
 
     def read(self, raw: dict[str, Any]) -> float | Reason:
-        """Command in [-1, 1] from the raw values of a frame, or why there is none.
+        """Return the command in [-1, 1] from a frame's raw values, or why it has none.
 
-        One part cannot be pressed both ways: then neither counts.
+        A rocker cannot be pressed both ways: where both signals say so, neither counts.
         """
         positive, negative = self.positive.read(raw), self.negative.read(raw)
         if isinstance(positive, Reason):
@@ -142,7 +146,7 @@ class RockerVelocity:
 
 
 def _fault(flags: tuple[int, int, int]) -> Reason:
-    """Why these flags show no direction."""
+    """Return the reason why these flags show no direction."""
     codes = {flag for flag in flags if flag > 1}
     if not codes:
         return Reason.JOYSTICK_CONTRADICTORY
@@ -155,11 +159,11 @@ Velocity = VelocitySignal | FlaggedVelocity | RockerVelocity
 
 @dataclass(frozen=True, slots=True)
 class DirectionCodec:
-    """Signal that carries the direction of a magnitude, as the valve state of ISO 11783-7 does.
+    """Signal with a code for the direction of a magnitude, such as the valve state of ISO 11783-7.
 
     Attributes:
-        signal: its name.
-        codes: raw codes of neutral, of positive and of negative commands, in this order.
+        signal: name of the signal.
+        codes: raw codes of neutral, positive and negative commands, in this order.
     """
 
     signal: str
@@ -170,7 +174,7 @@ class DirectionCodec:
         raw[self.signal] = self.codes[sign]  # the last one is that of -1
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """Return the sign; None where the code is no direction."""
+        """Return the sign: 0, 1 or -1; None where the code is no direction."""
         return dict(zip(self.codes, (0, 1, -1), strict=True)).get(raw[self.signal])
 
 
@@ -190,7 +194,7 @@ class FlagsCodec:
             raw[name] = int(of == sign)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """Return the sign; None where the flags are no direction."""
+        """Return the sign: 0, 1 or -1; None unless exactly one flag is set."""
         signs = [of for n, of in zip(self.signals, (0, 1, -1), strict=True) if raw[n] == 1]
         return signs[0] if len(signs) == 1 else None
 
@@ -200,15 +204,15 @@ Direction = DirectionCodec | FlagsCodec
 
 
 class ValveCodec:
-    """Command of one axis: a whole number of steps, to its signals and back.
+    """Writes the command of one axis, a whole number of steps, into its signals, and reads it.
 
     Args:
-        message: the message it is sent in.
-        signal: the command; with a direction its magnitude.
-        direction: where the direction stands, if not by the sign.
-        negative: magnitude of negative commands, where they have a signal of their own, which is
-            like that of the positive ones.
-        also: signals that carry the same in another resolution.
+        message: the message that carries the command.
+        signal: signal of the command; with ``direction`` or ``negative`` of its magnitude.
+        direction: signals that carry the direction; None where the command is signed.
+        negative: signal of the magnitude of negative commands, scaled as ``signal``, where each
+            direction has a signal of its own.
+        also: signals that carry the same command in another resolution.
 
     Attributes:
         steps: steps from zero to full command.
@@ -240,7 +244,7 @@ class ValveCodec:
             steps: the command; negative for the negative direction.
 
         Raises:
-            ValueError: it is beyond full command.
+            ValueError: the command is beyond full command.
         """
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command: expected up to +-{self.steps} steps, got {steps}")
@@ -259,7 +263,7 @@ class ValveCodec:
             raw[name] = zero + round(full * size / self.steps)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """Return the steps of a command from raw values; None where they are no command."""
+        """Return the steps of the command in raw values; None where these are no valid command."""
         steps = self._sign * (int(raw[self._signal]) - self._zero)
         if self._direction is not None:
             sign = self._direction.read(raw)

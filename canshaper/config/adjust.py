@@ -1,4 +1,4 @@
-"""Numbers of an axis by their keys: which may be changed while it runs, and the result."""
+"""Numbers of an axis by their keys: which ones may change while the axis runs, and the result."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -19,7 +19,7 @@ _KEY = re.compile(r"axes\.(.+)\.(\w+)\.(\w+)")
 
 
 class Key(NamedTuple):
-    """Where a number stands: ``axes.AXIS.SECTION.NAME``."""
+    """Key of a number in the deployment file: ``axes.AXIS.SECTION.NAME``."""
 
     axis: str
     section: str
@@ -27,7 +27,7 @@ class Key(NamedTuple):
 
     @classmethod
     def parsed(cls, text: str) -> Self | None:
-        """A key by its text; None where it cannot be one of an axis."""
+        """Parse the text of a key; return None where it cannot be the key of an axis."""
         match = _KEY.fullmatch(text)
         return cls(*match.groups()) if match else None
 
@@ -36,24 +36,24 @@ class Key(NamedTuple):
 
 
 def value(config: AxisSection, key: Key) -> float | None:
-    """The number at a key; None where none stands."""
+    """Return the number at a key; None where the section has no number of that name."""
     section = getattr(config, key.section, None) if key.section in _SECTIONS else None
     number = getattr(section, key.name, None)
     return number if isinstance(number, float) else None
 
 
 def adjusted(config: AxisSection, values: Mapping[Key, float], file: AxisSection) -> AxisSection:
-    """The configuration of an axis with other numbers.
+    """Return the configuration of an axis with some numbers changed.
 
-    A filter that is made for one period is drawn out to another one, always from that of the file.
+    A changed period stretches a filter that is made for one period, always from the file's filter.
 
     Args:
-        config: as it is now.
-        values: the other numbers.
-        file: as it stands in the file.
+        config: the present configuration of the axis.
+        values: the new numbers, by key.
+        file: the configuration of the axis in the file.
 
     Raises:
-        ValueError: that is no valid configuration; the message says where and why.
+        ValueError: the result is no valid configuration; the message says where and why.
     """
     parts: dict[str, Any] = {}
     for name in {key.section for key in values}:
@@ -72,7 +72,7 @@ def adjusted(config: AxisSection, values: Mapping[Key, float], file: AxisSection
 
 
 def _with(section: S, name: str, new: Mapping[str, Any]) -> S:
-    """The section with other values, checked."""
+    """Return the section with some values replaced and validated."""
     try:
         return type(section).model_validate(section.model_dump(exclude_none=True) | {**new})
     except ValidationError as error:
@@ -82,7 +82,7 @@ def _with(section: S, name: str, new: Mapping[str, Any]) -> S:
 
 
 def faults(key: Key, config: AxisSection, low: float, high: float) -> Iterator[str]:
-    """Why a number of an axis cannot be adjustable within a range."""
+    """Yield the reasons why a number of an axis cannot be adjustable within [low, high]."""
     now = value(config, key)
     if now is None:
         yield "expected a number in the axis' sway, filter or limits, got none of that name"
@@ -104,6 +104,6 @@ def faults(key: Key, config: AxisSection, low: float, high: float) -> Iterator[s
                     section.model_dump(exclude_none=True) | {key.name: end}
                 )
             except ValidationError as error:
-                # Whether two numbers go together is known when both are changed.
+                # Rules between two numbers are checked later, when both have their new values.
                 if any(one["loc"] == (key.name,) for one in error.errors()):
                     yield f"expected both ends within the range of this key, got {end:g}"

@@ -65,7 +65,7 @@ class Canopen(Section):
 
 
 class Match(Section):
-    """The device that a bus of SocketCAN is; all that stands here has to be so."""
+    """The device that a SocketCAN bus must be: it has to match every key that is given."""
 
     serial: str | None = Field(None, min_length=1)
     """Serial number of the USB adapter, in quotes."""
@@ -87,7 +87,10 @@ class Match(Section):
         return self
 
     def may_be(self, other: "Match") -> bool:
-        """Whether both may mean one device: the same adapter, its channels not distinguished."""
+        """Return whether both may match one device: they share serial or path, and no key differs.
+
+        An adapter whose channels are not distinguished by ``port`` counts as one device.
+        """
         keys = ("serial", "path", "port")
         both = [(getattr(self, key), getattr(other, key)) for key in keys]
         return any(one is not None and one == two for one, two in both[:2]) and all(
@@ -119,8 +122,8 @@ class Bus(Section):
     data_bitrate: (
         Annotated[int, number(10_000, 10_000_000, "bit/s", "bit rate of the data of CAN FD")] | None
     ) = None
-    """Bit rate of their data: with it they are sent with bit rate switch (BRS), without it at one
-    bit rate; received ones count with and without."""
+    """Bit rate of the data of CAN FD: with it frames are sent with bit rate switch (BRS), without
+    it at one bit rate; received frames count with and without BRS."""
     options: dict[str, Scalar] = Field({})
     """Further options with which python-can opens the interface, such as
     { host: 10.0.0.5, port: 29536 } for socketcand."""
@@ -141,7 +144,7 @@ class Bus(Section):
 
     @property
     def is_virtual(self) -> bool:
-        """Whether no machine can be on it: it is in this computer, or of UDP."""
+        """Return whether no machine can be on the bus: it is in this computer, or runs over UDP."""
         if self.interface == "socketcan":
             return self.channel.startswith(("vcan", "vxcan"))
         return self.interface in ("virtual", "udp_multicast")
@@ -177,7 +180,7 @@ class Gateway(Section):
         return self
 
     def other(self, bus: str) -> str | None:
-        """The bus on the other side; None for one that is not of the gateway."""
+        """Return the bus on the other side; None where ``bus`` is not one of the gateway's two."""
         if bus not in self.between:
             return None
         return self.between[1 - self.between.index(bus)]
@@ -197,13 +200,13 @@ class Control(Section):
 
     socket: str | None = Field(None, description="path of the socket")
     """Where the daemon listens, by default /run/canshaper/NAME/control.sock, NAME of the file; the
-    option --control PATH of run and set is another place."""
+    option --control PATH of run and set names another path."""
     mode: str = Field("0600", pattern="^0[0-7]{3}$")
     """File mode of the socket, octal, in quotes: who may write to it may change the numbers."""
     adjustable: dict[str, Annotated[list[End], Field(min_length=2, max_length=2)]] = Field({})
-    """Least and most of each number of sway and filter in the file, and of max_pct, rise_per_s,
-    fall_per_s of limits, by its keys with dots between. Not on axes with gain_schedule or
-    profiles."""
+    """Least and most of each adjustable number, by its keys with dots between: those of sway and
+    filter in the file, and max_pct, rise_per_s, fall_per_s of limits. Not on axes with
+    gain_schedule or profiles."""
     rehearse_faults: bool = Field(False, description="let canshaper fault make faults of inputs")
     """For commissioning: canshaper fault may make faults of the inputs while the machine runs. Only
     at reduced speed: with max_pct of every axis and motion up to 40."""
@@ -223,5 +226,5 @@ class Control(Section):
         return self
 
     def path(self, file: Path) -> Path:
-        """Where the socket is, for a deployment file."""
+        """Return the path of the socket for this deployment file."""
         return Path(self.socket) if self.socket else RUNTIME / file.stem / "control.sock"

@@ -17,7 +17,7 @@ class _Crane(Section):
 
     @property
     def moved(self) -> dict[str, str]:
-        """Axis by the coordinate that it moves."""
+        """Name of the axis that moves each coordinate, by coordinate."""
         return self.model_dump(exclude={"kind", "drawn", "simulated"}, exclude_none=True)
 
 
@@ -63,11 +63,11 @@ _BY_NAME: Final = ("slew", "near_far", "lift", "lift_cylinder", "knuckle", "exte
 def coordinates(
     crane: CylindricalCrane | CartesianCrane | JointCrane | None, axes: Iterable[str]
 ) -> Mapping[str, str]:
-    """Return the coordinate that each axis moves, by its name; those that move none are not in it.
+    """Return the coordinate that each axis moves, by axis; axes that move none are left out.
 
     Args:
-        crane: what the file says; without it the names of the axes say it.
-        axes: their names.
+        crane: section of the file; without one, an axis named as a coordinate moves that.
+        axes: names of the axes.
     """
     if crane is None:
         return {name: name for name in axes if name in _BY_NAME}
@@ -85,15 +85,15 @@ class Radius(Position):
 
 
 class Motion(Section):
-    """Two-axis motion: velocities that two axes add for each other, see ``TwoAxisMotion``.
+    """Two-axis motion: each of two axes adds velocities for the other's sway (``TwoAxisMotion``).
 
-    Without a radius, or without a near-far axis, slew gets what needs neither.
+    Without a radius or a near-far axis, slew adds only the terms that need neither.
     """
 
     slew: str = Field(description="the axis that turns; it needs sway and slewing")
     near_far: str | None = None
-    """The axis that moves the tip in and out; it needs sway. Without it slew gets what needs no
-    radius. A single joint of the boom is none."""
+    """The axis that moves the tip in and out; it needs sway. Without it slew adds only what needs
+    no radius. A single joint of the boom does not qualify."""
     radius: Radius | None = None
     """Radius of the tip, where it is measured."""
     radius_m: Annotated[float, number(0.5, 120, "m", "radius of the grapple")] | None = None
@@ -114,9 +114,9 @@ class Motion(Section):
     is that of the tip inwards. It adds to its own commands only."""
     luffing_rad_s: Annotated[float, number(0.01, 3, "rad/s", "its full speed")] | None = None
     aim: Status | None = None
-    """Message with the way that the tip still goes if the joysticks are let go now."""
+    """Message with how far the tip still travels if the joysticks are released now."""
     waits: bool = Field(False, description="as if it were not there; commission takes this out")
-    """As if it were not there, on the first day; the step motion of commission takes this out."""
+    """Disables the motion on the first day; the step motion of commission removes this key."""
 
     @model_validator(mode="after")
     def _one_radius(self) -> Self:

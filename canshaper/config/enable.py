@@ -9,8 +9,8 @@ class Condition(NamedTuple):
     """A switch that enables a joystick.
 
     Attributes:
-        joystick: whose message has it; None for one of ``switches``.
-        name: of the signal, or of the switch.
+        joystick: joystick whose message has the switch; None for one of ``switches``.
+        name: name of the signal, or of the switch in ``switches``.
     """
 
     joystick: str | None
@@ -18,24 +18,24 @@ class Condition(NamedTuple):
 
 
 def named_by(config: DeploymentConfig, joystick: str) -> tuple[Condition, ...]:
-    """The switches in the list of a joystick itself."""
+    """Return the switches that the joystick's own ``enable`` lists, not those of ``enable_of``."""
     return tuple(_condition(config, joystick, n) for n in config.joysticks[joystick].enable or ())
 
 
 def conditions(config: DeploymentConfig, joystick: str) -> tuple[Condition, ...]:
-    """The switches that enable a joystick, all needed; the first is the one that is pressed."""
+    """Return the switches that enable a joystick: all are needed, the first is pressed first."""
     of = config.joysticks[joystick].enable_of or joystick
     return named_by(config, of) if of in config.joysticks else ()
 
 
 def own_switch(config: DeploymentConfig, joystick: str) -> str | None:
-    """The signal of its own message that alone enables a joystick; None where there is more."""
+    """Return the only switch of a joystick if its own message has it; None otherwise."""
     switches = conditions(config, joystick)
     return switches[0].name if len(switches) == 1 and switches[0].joystick == joystick else None
 
 
 def slowest_ms(config: DeploymentConfig, joystick: str) -> int:
-    """How long it takes at most to see that a joystick, or a switch that enables it, is lost."""
+    """Return the longest age limit (ms) of a joystick and of the switches that enable it."""
     timeouts = [config.joysticks[joystick].timeout_ms]
     for of, name in conditions(config, joystick):
         one = config.switches.get(name) if of is None else config.joysticks.get(of)

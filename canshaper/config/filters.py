@@ -15,12 +15,12 @@ from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 from canshaper.shaping.sway import SwayMode
 
-# Lists of the filters that are longer than this may have runs of equal numbers as one entry.
+# A list parameter that may be longer than this may write a run of equal numbers as one entry.
 _FEW = 8
 
 
-# A filter still does what it was designed for where the file's swing differs by no more than this:
-# length, where it covers no range of its own (a stopwatch is not better), and damping ratio.
+# A filter still fits where the file's swing differs from its design by no more than this: length,
+# where it covers no range of its own (a stopwatch is no more exact), and damping ratio.
 _LENGTH_PCT = 5.0
 _DAMPING = 0.03
 
@@ -59,12 +59,12 @@ class DesignedFor(Section):
     def faults(
         self, mode: SwayMode, valve_rate_per_s: float, tail_s: float
     ) -> Iterator[tuple[str, str]]:
-        """Keys of what does not fit, and why.
+        """Yield (key, reason) for each design value that does not fit the axis.
 
         Args:
             mode: sway mode of the axis.
             valve_rate_per_s: rate of its valve, full speeds per second.
-            tail_s: how long its limits let the output run on.
+            tail_s: how long its limits let the output run on, seconds.
         """
         low, high = _periods(self.period_s, self.length_range_pct or 0.0)
         if not low <= mode.period_s <= high:
@@ -87,9 +87,9 @@ class DesignedFor(Section):
             yield "duration_s", text
 
     def reversal_s(self, limits: Limits) -> float | None:
-        """Time that a reversal needs, where these limits cut the response off; else None.
+        """Return the ``reversal_s`` (s) needed where these limits cut the response off; else None.
 
-        What makes good for a cut knows the first mode alone: a second one swings on.
+        The compensation of a cut knows the first mode only; a second mode swings on.
         """
         out = limits.output_limits()
         needed_s = (self.duration_s or 0.0) + out.maximum / out.fall_per_s
@@ -97,9 +97,9 @@ class DesignedFor(Section):
         return None if enough else math.ceil(10.0 * needed_s) / 10.0
 
     def stretch_fault(self, factor: float) -> str | None:
-        """Why its response cannot be drawn out in time by a factor, or None.
+        """Return why the response cannot be stretched in time by a factor, or None.
 
-        The second mode stays where it is, and has to stay within the range that is covered.
+        The second mode of the tool keeps its period, which the stretched filter has to cover.
         """
         if self.second is None:
             return None
@@ -113,13 +113,13 @@ class DesignedFor(Section):
 
 
 def _periods(period_s: float, length_range_pct: float) -> tuple[float, float]:
-    """Shortest and longest period of a range of lengths: it grows with the root of the length."""
+    """Shortest and longest period over a range of lengths: period grows with root of length."""
     share = max(length_range_pct, _LENGTH_PCT) / 100.0
     return period_s * math.sqrt(1.0 - share), period_s * math.sqrt(1.0 + share)
 
 
 class FilterSection(Section):
-    """A filter: its ``kind`` and its parameters by the names the registry takes."""
+    """A filter: its ``kind``, and its parameters by their names in the registry."""
 
     kind: str
 
@@ -130,15 +130,15 @@ class FilterSection(Section):
         return self
 
     def parameters(self) -> dict[str, Any]:
-        """Parameters for ``build_shaper``."""
+        """Return the parameters for ``build_shaper``, by name."""
         return self.model_dump(exclude={"kind", "designed_for"}, exclude_none=True)
 
     def design(self) -> DesignedFor | None:
-        """Return the swing and valve that it was designed for, where the file has them."""
+        """Return the swing and valve that the filter was designed for, where the file has them."""
         return getattr(self, "designed_for", None)
 
     def __reduce__(self) -> Any:
-        # The class of a kind is in no module; another process has made its own from the same row.
+        # No module holds the class of a kind; the other process made its own from the same row.
         return restored_filter, (self.kind, self.model_fields_set, self.__dict__)
 
 
@@ -178,7 +178,7 @@ def _field(parameter: Parameter) -> tuple[Any, Any]:
 
 
 def _with_runs(schema: dict[str, Any]) -> None:
-    """Runs into the JSON schema of a list, when that is made."""
+    """Allow runs of equal numbers in the JSON schema of a list."""
     text = "so many equal numbers"
     run = {"type": "string", "pattern": f"^{RUN}$", "description": text}
     schema["items"] = {"anyOf": [schema["items"], run]}
@@ -195,7 +195,7 @@ SECTIONS = {name: _section(kind) for name, kind in KINDS.items()}
 
 
 def restored_filter(kind: str, given: set[str], values: dict[str, Any]) -> FilterSection:
-    """Make the section of a filter again that was taken apart with ``pickle``."""
+    """Restore the section of a filter that ``pickle`` took apart."""
     return SECTIONS[kind].model_construct(given, **values)
 
 
@@ -217,21 +217,21 @@ else:
 
 
 def filter_of(kind: str, **parameters: Any) -> Filter:
-    """A filter as it would stand in a deployment file.
+    """Return the section of a filter, as in a deployment file.
 
     Raises:
-        ValidationError: the file would be refused.
+        ValidationError: a file with this filter would be refused.
     """
     return SECTIONS[kind].model_validate({"kind": kind, **parameters})
 
 
 def designed(mode: SwayMode) -> dict[str, float]:
-    """Return the values of ``designed_for`` that give the swing of a filter."""
+    """Return the keys of ``designed_for`` that state the swing: period (s) and damping ratio."""
     return {"period_s": round(mode.period_s, 4), "damping_ratio": round(mode.damping_ratio, 4)}
 
 
 class Breakpoint(Section):
-    """Sway and filter at one value of the load state; between two values interpolated."""
+    """Sway and filter at one value of the load state; between two values both are interpolated."""
 
     breakpoint: Annotated[float, number(-1e6, 1e6, "", "value of the load state")]
     sway: Sway = Field(description="sway data at this value")
@@ -239,7 +239,7 @@ class Breakpoint(Section):
 
 
 class Profile(Section):
-    """Response of an axis while the operator has chosen it."""
+    """Filter of an axis while the operator has chosen this profile."""
 
     filter: Filter = Field(description="filter of the axis")
     gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
@@ -269,7 +269,7 @@ class ProfileSwitch(InputSection):
 
 
 def schedule_fault(kind: str, sets: Sequence[Breakpoint]) -> str | None:
-    """Why a gain schedule cannot stand next to a filter of this kind, or None."""
+    """Return why a gain schedule does not fit a filter of this kind, or None."""
     if not sets:
         return None
     if not KINDS[kind].needs_sway:

@@ -12,7 +12,7 @@ from canshaper.shaping.sway import Measured
 
 
 def _kinds(schema: dict[str, Any]) -> None:
-    """Names of the kinds into the JSON schema, when that is made."""
+    """Put the names of all kinds into the JSON schema, when the schema is made."""
     from canshaper.checksums.kinds import checksum_names
 
     schema["enum"] = checksum_names()
@@ -57,10 +57,10 @@ class Profile(NamedTuple):
     """A profile of AUTOSAR E2E.
 
     Attributes:
-        needs: keys that say which message it is.
-        header: where CRC, counter and all else stand.
-        counter: its values.
-        crc: how it is computed.
+        needs: keys of the data ID, which identifies the message.
+        header: where CRC, counter and other parts lie in the frame.
+        counter: values of the counter.
+        crc: how the CRC is computed.
     """
 
     needs: tuple[str, ...]
@@ -226,19 +226,19 @@ class NamedCodes(Section):
     """A signal that is read as a number."""
 
     codes: dict[str, Meaning] = Field({})
-    """By their names, values that the DBC names (VAL_): value for a measurement like every other
-    number, fault for none, as without an entry."""
+    """Meaning of each value that the DBC names (VAL_), by its name: value for a measurement like
+    every other number, fault for no measurement, as without an entry."""
 
 
 Kind = Literal["angle", "inclination", "rate"]
 
 
 class SwaySensorSection(NamedCodes, InputSection):
-    """Measures the swing of the tool in the plane of the axis.
+    """A sensor that measures the swing of the tool in the plane of the axis.
 
-    An angle is that of a joint, an inclination that of the tool against the vertical, a rate that
-    of a gyro. Several axes may read the same message. An offset, noise or a largest offset is in
-    degrees, of a rate in degrees per second.
+    Kind angle is the angle of a joint, inclination the tool's against the vertical, rate a gyro's.
+    Several axes may read the same message. Offset, noise and largest offset are in degrees, those
+    of a rate in degrees per second.
     """
 
     node: str | None = Field(None, description="name of its node on a bus of CANopen")
@@ -284,12 +284,12 @@ class SwaySensorSection(NamedCodes, InputSection):
 
     @property
     def measured(self) -> Measured:
-        """Quantity that it measures."""
+        """Quantity that the sensor measures."""
         return Measured.RATE if self.kind == "rate" else Measured.ANGLE
 
     @property
     def noise(self) -> float:
-        """Standard deviation, degrees or degrees per second."""
+        """Standard deviation of the noise, degrees or degrees per second."""
         if self.noise_deg is not None:
             return self.noise_deg
         return 0.1 if self.measured is Measured.ANGLE else 0.3

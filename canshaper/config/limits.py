@@ -29,7 +29,7 @@ class Position(NamedCodes, InputSection):
 
 
 class Ends(Position):
-    """End stops of an axis by a measured position, in the unit of its signal; see ``EndStops``."""
+    """End stops of an axis by a measured position, in the unit of its signal (``EndStops``)."""
 
     signal: str = Field(description="signal with the position: a radius, an angle or a length")
     lowest: Annotated[float, number(-1e6, 1e6, "units", "position of the one end stop")]
@@ -124,7 +124,7 @@ class Limits(Section):
         return min(self.rise_per_s, self.fall_per_s)
 
     def curve(self) -> ValveCurve | None:
-        """The measured valve, where it is.
+        """Return the measured curve of the valve; None where the file has none.
 
         Raises:
             ValueError: the points are no curve of a valve.
@@ -165,10 +165,10 @@ class Hydraulics(Section):
     others: Annotated[
         float, number(0, 100, "full axis flows", "what functions take that are not ours")
     ] = 0.0
-    """Flow of functions that are not ours. With others_measured it counts while that is lost: 0
-    for as if they took nothing, as much as flow for no motion."""
+    """Flow of functions that are not ours. With others_measured it counts while that is lost: 0 as
+    if they took nothing, as much as flow to stop all motion."""
     others_measured: OtherFlow | None = None
-    """Where that is measured: by signal, in the unit of which full is one full axis flow."""
+    """Measured flow of these functions: a signal, whose value full is one full axis flow."""
     shares: dict[str, Annotated[float, number(0, 100, "full axis flows", "of an axis")]] = Field(
         {}, description="what an axis takes at full speed, by name; without an entry 1"
     )
@@ -191,8 +191,8 @@ class RopeSection(Position):
     lowest_m: Annotated[float, number(0.3, 150, "m", "shortest pendulum")]
     highest_m: Annotated[float, number(0.3, 150, "m", "longest pendulum")]
     lost: Lost = "longest"
-    """While the length is lost, or has jumped: the filter of the longest pendulum, hold that of the
-    last one, or neutral: stop, and wait for it."""
+    """Filter while the length is lost or has jumped: longest, that of the longest pendulum; hold,
+    that of the last length; neutral, stop and wait for the length."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -229,7 +229,7 @@ class Sway(Section):
         Annotated[float, number(0, 0.99, "", "part of the amplitude lost over a full swing")] | None
     ) = None
     length: RopeSection | None = None
-    """Where the length of the rope is measured: the filter of the axis is then drawn out to it."""
+    """Measured length of the rope: the filter of the axis is then stretched to that length."""
     origin: Origin | None = Field(None, description="where these numbers come from")
 
     @model_validator(mode="after")
@@ -238,7 +238,7 @@ class Sway(Section):
         return self
 
     def mode(self) -> SwayMode:
-        """Sway mode of this data.
+        """Return the sway mode that these data describe.
 
         Raises:
             ValueError: the data is incomplete, given twice, or makes no sense.
@@ -254,10 +254,10 @@ class Sway(Section):
         )
 
     def at_length(self, length_m: float) -> SwayMode:
-        """Sway mode of a rope of another length."""
+        """Return the sway mode of a rope of this length."""
         return SwayMode.from_length(length_m, self.mode().damping_ratio)
 
     def ends(self) -> list[SwayMode]:
-        """Modes of the shortest and the longest rope; without a measured length none."""
+        """Return the modes of the shortest and longest rope; none without a measured length."""
         rope = self.length
         return [self.at_length(end) for end in (rope.lowest_m, rope.highest_m)] if rope else []

@@ -16,8 +16,8 @@ from canshaper.config.source import Place, Source
 from canshaper.errors import ConfigError, Problem, did_you_mean
 from canshaper.shaping.registry import FAULTS
 
-# Where a key stood (| between other names of a place, * for any) and its name in version 1. What is
-# inside another key comes before that one.
+# Former place of a key (* for any name, | between alternatives) and its name in version 1. A key
+# inside another moved key comes before that one.
 MOVED: Mapping[str, str] = {
     "axes.*.stick|command.lever": "joystick",
     "axes.*.stick": "command",
@@ -32,17 +32,17 @@ MOVED: Mapping[str, str] = {
     "grapple": "load_state",
     "feel": "profile",
 }
-# What is a section of its own now, of two axes.
+# A former key of an axis that is now a section of its own, for two axes.
 GONE = "radial_compensation"
 
 
 def moved_keys(source: Source) -> list[Problem]:
-    """Give every key that moved its new name in the data, and return one problem for each.
+    """Rename every key that moved in the data, and return one problem for each.
 
-    All else in the file can then be checked as if it had the new names.
+    The rest of the file can then be checked as if it had the new names.
 
     Raises:
-        ConfigError: the file is of a later version; nothing else can be said of it.
+        ConfigError: the file is of a later version, so nothing else in it can be checked.
     """
     version = source.data.get("version") if isinstance(source.data, dict) else None
     if type(version) is int and version > VERSION:
@@ -77,7 +77,7 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
 
     Raises:
         ConfigError: with every problem of the file, each with its line; or a package that adds
-            filters has a fault, and which filters there are is not sure.
+            filters has a fault, so that the list of filters is not certain.
     """
     check_packages()
     source = Source(path)
@@ -113,7 +113,7 @@ def load_section(path: Path, schema: type[_S]) -> tuple[_S, Source]:
 
 
 def _validated(source: Source, schema: type[_S]) -> tuple[_S | None, list[Problem]]:
-    """The section that a file is; None with every problem where it is none."""
+    """Return the section and no problem, or None and every problem of the file."""
     try:
         return schema.model_validate(source.data), []
     except ValidationError as error:
@@ -121,7 +121,7 @@ def _validated(source: Source, schema: type[_S]) -> tuple[_S | None, list[Proble
 
 
 def limits(schema: type[Section], key: str) -> tuple[float, float]:
-    """Least and most of a number of a section, in its own unit."""
+    """Return the smallest and largest permitted value of a number, in the unit of its key."""
     limits = _Place.of((key,), schema).limits
     assert limits is not None, key
     return limits
@@ -164,7 +164,7 @@ class _Place:
 
     @classmethod
     def of(cls, location: tuple[int | str, ...], schema: type[Section]) -> Self:
-        """The place of a location of pydantic, which also names branches of unions."""
+        """Return the place of a pydantic location, which also names branches of unions."""
         place = cls(schema)
         for part in location:
             place._enter(part)
@@ -185,7 +185,7 @@ class _Place:
             self._is(arguments[-1])  # of a value of a dict, or of an entry of a list
 
     def _is(self, annotation: Any, field: FieldInfo | None = None) -> None:
-        """Note the type of this place, without ``Annotated`` and ``None`` around it."""
+        """Store the type of this place, stripped of ``Annotated`` and ``None``."""
         self._metadata = [field] if field else []
         while annotation is not None:
             arguments = get_args(annotation)
@@ -210,7 +210,7 @@ class _Place:
 
     @property
     def limits(self) -> tuple[float, float] | None:
-        """Least and most of the number that may stand here; None where it is none."""
+        """Smallest and largest number permitted here; None where the type is no number."""
         marks: list[Any] = [mark for field in self._fields for mark in field.metadata]
         low: Any = next((m.ge for m in marks if isinstance(m, annotated_types.Ge)), None)
         high: Any = next((m.le for m in marks if isinstance(m, annotated_types.Le)), None)

@@ -1,4 +1,4 @@
-"""By what ``canshaper tune`` chose the poles of a G_FF, as it stands in a deployment file."""
+"""Objective by which ``canshaper tune`` chose the poles of a G_FF, in a deployment file."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from canshaper.config.section import Section, number
 
 PoleDistance = Literal["text", "printed", "off"]
-"""Sense of Eq. 14e: "text", at least five times as far out as the sway pole; "printed", at most."""
+"""Reading of Eq. 14e, pole distance against five times the sway pole's: "text" at least that,
+"printed" at most that; "off" ignores it."""
 
 States = Literal["sway", "deviation", "companion", "none"]
 """Quantity that Q weighs, of v = u / (a2 s^2 + a1 s + 1): "sway" (v'/w, v''/w^2), which is swing
@@ -48,15 +49,15 @@ class Objective(Section):
 
 
 def matrix(q: Sequence[float]) -> tuple[float, float, float]:
-    """Q as q11, q12, q22, of one number, its diagonal, or the matrix by rows."""
+    """Return (q11, q12, q22) of a Q given as one number, as its diagonal, or by rows."""
     return q[0], q[1] if len(q) == 4 else 0.0, q[-1]
 
 
 def weights_fault(q: Sequence[float], r: float, s: float) -> str | None:
-    """Why these are no weights of Eq. 15, or None.
+    """Return why Q, R and S cannot be weights of Eq. 15, or None.
 
-    Q has to be symmetric and positive semi-definite. Without R and S the best filter would be one
-    that never moves.
+    Q has to be symmetric and positive semi-definite. With R and S both 0 the best filter would
+    never move.
     """
     if len(q) not in (1, 2, 4):
         return f"weight Q: expected 1 number, 2 of the diagonal or 4 of the rows, got {len(q)}"

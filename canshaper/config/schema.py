@@ -73,7 +73,7 @@ class StatusWord(InputSection):
 
 
 class Cia408(Section):
-    """State machine of a CANopen valve (CiA 408): it is brought to work, and watched."""
+    """State machine of a CANopen valve (CiA 408), which we bring to ACTIVE and supervise."""
 
     control: str = Field(description="signal of the valve message with object 6040h")
     status: StatusWord = Field(description="message of the valve with its status word")
@@ -81,13 +81,13 @@ class Cia408(Section):
 
 
 class EmergencyStop(InputSection):
-    """An emergency stop that comes on the bus. It is no replacement for the one that is wired."""
+    """An emergency stop that is reported on the bus. It does not replace the wired one."""
 
     signal: str = Field(description="signal of the stop: raw 0 is free, every other value stops")
 
 
 class DirectionFlags(Section):
-    """Signals of the direction of a joystick, as in J1939-71: 1 yes, 0 no, all else invalid."""
+    """Direction flags of a joystick, as in J1939-71: 1 yes, 0 no, every other value invalid."""
 
     neutral: str = Field(description="signal that the joystick is in neutral")
     negative: str = Field(description="signal that the velocity is negative")
@@ -108,12 +108,12 @@ class Scaling(Section):
 
     @property
     def corrects(self) -> bool:
-        """Whether it says anything."""
+        """Return whether any key corrects the DBC."""
         return self.full is not None or self.zero is not None or self.invert
 
 
 class Command(NamedCodes, Scaling):
-    """Where an axis gets its command from."""
+    """Signal of a joystick from which an axis gets its demand."""
 
     joystick: str = Field(description="name of a joystick")
     signal: str = Field(description="signal with the velocity; its DBC range is full deflection")
@@ -136,7 +136,7 @@ class Command(NamedCodes, Scaling):
 
 
 class DirectionCodes(Section):
-    """Direction of a valve command by codes, as the valve state of ISO 11783-7 does."""
+    """Direction of a valve command as a code, such as the valve state of ISO 11783-7."""
 
     signal: str = Field(description="signal that carries the direction")
     neutral: Annotated[int, number(0, 255, "", "code of no command")]
@@ -153,13 +153,13 @@ class DirectionCodes(Section):
 
 
 class Valve(Scaling, Protected):
-    """Valve command message of an axis; its GenMsgCycleTime is the period it is sent at."""
+    """Valve command message of an axis; we send it every GenMsgCycleTime of the DBC."""
 
     signal: str = Field(description="signal with the command; its DBC range is full command")
     direction: DirectionCodes | None = None
     """Codes of the direction, only where the command has no sign of its own."""
     also: list[str] = Field([])
-    """Signals that carry the same in another resolution; their DBC ranges begin at 0."""
+    """Signals that carry the same command in another resolution; their DBC ranges begin at 0."""
     timeout_ms: Annotated[
         int,
         number(10, 5000, "ms", "silence after which the valve closes by itself (see its manual)"),
@@ -167,7 +167,8 @@ class Valve(Scaling, Protected):
     cia408: Cia408 | None = None
     """State machine of a valve of CANopen."""
     node: str | None = None
-    """Its CANopen node without CiA 408, such as a drive: its heartbeats and emergencies count."""
+    """CANopen node of a valve without CiA 408, such as a drive: its heartbeats and emergencies
+    count."""
 
     @model_validator(mode="after")
     def _one_node(self) -> Self:
@@ -229,7 +230,7 @@ class AxisSection(Section):
 
     @property
     def damps(self) -> bool:
-        """Whether a sway sensor damps its swing."""
+        """Return whether a sway sensor damps the swing of the axis."""
         return self.sway_sensor is not None and self.sway_sensor.use == "damp"
 
     @model_validator(mode="after")
@@ -242,7 +243,7 @@ class AxisSection(Section):
 
 
 class Tick(Section):
-    """Where the ticks are in time."""
+    """Timing of the ticks: the joystick that they follow."""
 
     follow: str = Field(description="joystick after whose frames the ticks are to come")
 
@@ -275,7 +276,7 @@ class DeploymentConfig(Section):
     emergency_stop: EmergencyStop | None = None
     """An emergency stop that is reported on the bus."""
     load_state: LoadState | None = None
-    """Load of the crane; it chooses in the gain schedules of the axes."""
+    """Load of the crane; it selects the breakpoint in the gain schedules of the axes."""
     profile: ProfileSwitch | None = None
     """The operator's choice among the profiles of the axes."""
     status: Status | None = None

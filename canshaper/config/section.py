@@ -43,14 +43,14 @@ class Section(BaseModel):
 
     @classmethod
     def documentation(cls, key: str) -> str | None:
-        """All that is said of a key: the docstring that stands behind it, or of its field."""
+        """Return the full text on a key: the docstring behind it, else its short description."""
         return _docstrings(cls).get(key) or cls.description(key)
 
     @classmethod
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """JSON schema; an optional key without a description has that of what may stand there."""
+        """Return the JSON schema; a key without a description gets that of its section."""
         built = handler(schema)
         for name, key in handler.resolve_ref_schema(built).get("properties", {}).items():
             texts = [one["description"] for one in key.get("anyOf", ()) if "description" in one]
@@ -61,9 +61,9 @@ class Section(BaseModel):
 
 @cache
 def _docstrings(section: type[Section]) -> dict[str, str]:
-    """Docstrings of the keys of a section, from its source; of one that has none, none.
+    """Return the docstring behind each key of a section, read from the source of its class.
 
-    ``use_attribute_docstrings`` of pydantic reads all of them at each start of the daemon.
+    pydantic's ``use_attribute_docstrings`` would read those of all sections at every start.
     """
     texts: dict[str, str] = {}
     for one in reversed(section.__mro__):
@@ -86,7 +86,7 @@ def _docstrings(section: type[Section]) -> dict[str, str]:
 
 
 def sections(part: Any, place: Place = ()) -> Iterator[tuple[Place, Section]]:
-    """Every section in a part of a file with where it stands; itself too, where it is one."""
+    """Yield every section in a part of a file with its place; the part too if it is one."""
     if isinstance(part, Section):
         yield place, part
         below: Iterable[tuple[str | int, Any]] = part
@@ -100,11 +100,11 @@ def sections(part: Any, place: Place = ()) -> Iterator[tuple[Place, Section]]:
 
 RUN = r"([1-9][0-9]{0,3}) x ([0-9]+(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?)"
 _RUN = re.compile(RUN)
-_MOST = 10_000  # far above any list's own limit: what a few runs could make is not made
+_MOST = 10_000  # far above any list's own limit: a few runs must not make a list without end
 
 
 def expanded(entries: Any) -> Any:
-    """The list as it is meant; what is no run of a number stays for others to judge."""
+    """Return the list with each run ("3 x 0.5") written out; other entries are not checked."""
     if not isinstance(entries, list):
         return entries
     numbers: list[Any] = []
@@ -117,7 +117,7 @@ def expanded(entries: Any) -> Any:
 
 
 class Origin(Section):
-    """Where numbers come from; written with them."""
+    """Origin of measured numbers, which a verb writes next to them."""
 
     date: str = Field(
         description="day on which they were written", json_schema_extra={"format": "date"}
@@ -140,7 +140,7 @@ class Origin(Section):
 
 
 def simulated(part: Any, place: Place = ()) -> Iterator[Place]:
-    """Where a part of a deployment has numbers that were measured on a simulated crane."""
+    """Yield the places of numbers in a deployment that were measured on a simulated crane."""
     for where, section in sections(part, place):
         if isinstance(section, Origin) and section.source == "simulated":
             yield where

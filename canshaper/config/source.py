@@ -16,10 +16,11 @@ from canshaper.errors import ConfigError, Problem
 
 
 def read_bounded(path: Path, most_bytes: int) -> bytes:
-    """Content of a file.
+    """Return the content of a file.
 
     Raises:
-        OSError: it cannot be read, is a device, a pipe or a directory, or has more bytes.
+        OSError: the file cannot be read, is a device, pipe or directory, or is longer than
+            ``most_bytes``.
     """
     number = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # no one need write to a pipe
     try:
@@ -40,20 +41,20 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
 
 
 def encoding_of(head: bytes) -> str:
-    """Encoding of a text, by its first bytes: a byte order mark, or UTF-16 without; else empty."""
+    """Return the encoding of a text with a byte order mark, or of UTF-16 without one; else ""."""
     if head.startswith(BOM_UTF8):
         return "utf-8-sig"
     if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         return "utf-16"
-    # The first sign of what is read here is one of ASCII.
+    # Every text that is read here begins with an ASCII character.
     little, big = head[1:2] == b"\0", head[:1] == b"\0"
     return "utf-16-le" if little else "utf-16-be" if big else ""
 
 
 Place = tuple[str | int, ...]
 
-# Far beyond any machine: the shipped files have 5 kB and 500 nodes at most. A file that others made
-# must not take the memory or the time of who reads it.
+# Far beyond any machine: the shipped files have 5 kB and 500 nodes at most. A foreign file must not
+# exhaust the memory or the time of its reader.
 MOST_BYTES = 262_144
 MOST_NODES = 10_000  # anchors within anchors can make a few lines grow without end
 MOST_NESTED = 50
@@ -64,17 +65,17 @@ _WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]{0,17})")
 _HEX = re.compile(r"0x[0-9a-fA-F]{1,8}")
 _DECIMAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
-# Escapes can put them into text. No name has any, and no path with a NUL can be opened.
+# Escapes can put control characters into text. No name has any; no path with NUL can be opened.
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 class _Loader(yaml.SafeLoader):
-    """Gives up early: where the file nests without end each token takes longer than the last."""
+    """YAML loader with limits on nodes and nesting: deep nesting slows down every further token."""
 
     _nodes = _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """The next node of the file."""
+        """Compose the next node; refuse too many, too deep or self-containing nodes."""
         self._nodes += 1
         if self._nodes > MOST_NODES:
             raise yaml.MarkedYAMLError(None, None, "too large", self.get_mark())
@@ -93,7 +94,7 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def fetch_flow_collection_start(self, token: type[yaml.Token]) -> None:
-        """An opening bracket."""
+        """Scan an opening bracket; refuse more than ``MOST_NESTED`` open ones."""
         if self.flow_level >= MOST_NESTED:
             raise yaml.MarkedYAMLError(None, None, "nested too deeply", self.get_mark())
         super().fetch_flow_collection_start(token)
@@ -103,8 +104,8 @@ class Source:
     """A YAML file as data, with the line of every key.
 
     Attributes:
-        content: its bytes.
-        sha256: of them, in hexadecimal digits.
+        content: bytes of the file.
+        sha256: SHA-256 of the content, in hexadecimal digits.
 
     Raises:
         ConfigError: the file cannot be read or is not YAML, or a key stands twice.
@@ -135,7 +136,7 @@ class Source:
             raise ConfigError(self._problems)
 
     def problem(self, path: Place, message: str) -> Problem:
-        """A problem at a place of this file, such as ("axes", "slew", "filter")."""
+        """Return a problem at a place of this file, such as ("axes", "slew", "filter")."""
         near = path
         while near and near not in self._lines:
             near = near[:-1]
@@ -144,7 +145,7 @@ class Source:
         )
 
     def places(self, pattern: Sequence[str]) -> Iterator[Place]:
-        """Places of the file that a pattern fits: names with | between, * for any."""
+        """Yield the places that fit a pattern: * fits any name, | separates alternatives."""
         for place in self._lines:
             if len(place) == len(pattern) and all(
                 names == "*" or part in names.split("|")
@@ -153,7 +154,7 @@ class Source:
                 yield place
 
     def rename(self, place: Place, name: str) -> None:
-        """Give a key of the data another name; it keeps its value, and its line in problems."""
+        """Rename a key in the data; the key keeps its value, and its line in problems."""
         *inside, old = place
         section = self.data
         for part in inside:
@@ -166,7 +167,7 @@ class Source:
                 del self._lines[one]
 
     def _build(self, node: yaml.Node, path: Place) -> Any:
-        """Data of a node; only what is named here can come out, whatever tags the file has."""
+        """Return the data of a node: only dict, list and scalars, whatever tags the file has."""
         self._lines.setdefault(path, node.start_mark.line + 1)
         self._count += 1
         if self._count > MOST_NODES:
@@ -208,7 +209,7 @@ class Source:
 
 
 def _line(error: Exception, content: str) -> int | None:
-    """Line of what is no YAML, where the error knows it: by a mark, or by how far it came."""
+    """Return the line of a YAML error, from its mark or its position; None where it has neither."""
     if isinstance(error, UnicodeDecodeError):
         return error.object.count(b"\n", 0, error.start) + 1
     if isinstance(error, yaml.reader.ReaderError):
@@ -218,10 +219,10 @@ def _line(error: Exception, content: str) -> int | None:
 
 
 def _scalar(node: yaml.ScalarNode) -> str | int | float | bool | None:
-    """Value of a scalar as YAML 1.2 and its readers see it.
+    """Return the value of a scalar by the rules of YAML 1.2.
 
-    PyYAML follows YAML 1.1, where off is false, 010 is 8, 1:30 is 90 and 1e3 is text. The first
-    is the name of a filter here; the others would be numbers that no one meant.
+    PyYAML follows YAML 1.1, where off is false, 010 is 8, 1:30 is 90 and 1e3 is text. Here off is
+    the name of a filter, and no one means the other three so.
     """
     text: str = node.value
     plain = node.style is None
@@ -245,7 +246,7 @@ class Diagnostics:
         source: the deployment file.
 
     Attributes:
-        problems: what is wrong so far; those of DBC files are added with file and line of these.
+        problems: the problems so far; those of a DBC file carry the file and line of that one.
     """
 
     def __init__(self, source: Source) -> None:
@@ -253,11 +254,11 @@ class Diagnostics:
         self.problems: list[Problem] = []
 
     def add(self, place: Place, text: str) -> None:
-        """Note a problem at a place of the deployment file."""
+        """Add a problem at a place of the deployment file."""
         self.problems.append(self._source.problem(place, text))
 
     def check_axis(self, place: Place, name: str, axes: Collection[str]) -> bool:
-        """Whether an axis has this name; a problem where none has."""
+        """Return whether an axis has this name; add a problem where none has."""
         if name not in axes:
             self.add(place, f"expected an axis, got {name!r}; there are {', '.join(axes)}")
         return name in axes
@@ -265,24 +266,24 @@ class Diagnostics:
     def check_same(
         self, place: Place, section: object, keys: Iterable[str], other: object, text: str
     ) -> None:
-        """Note a problem at every key in which a section is not as another one.
+        """Add a problem for every key in which two sections differ.
 
         Args:
-            place: of the section.
+            place: place of the section.
             section: the section.
-            keys: those that are compared.
-            other: the other section.
-            text: what it is, and what makes them equal.
+            keys: keys that are compared.
+            other: the section to compare with.
+            text: end of the sentence "expected the same as ...".
         """
         for key in keys:
             if getattr(section, key) != getattr(other, key):
                 self.add((*place, key), f"expected the same as {text}")
 
     def raise_problems(self) -> None:
-        """End here if there is any problem.
+        """Raise all problems at once, if there is any.
 
         Raises:
-            ConfigError: with all of them.
+            ConfigError: with every problem.
         """
         if self.problems:
             raise ConfigError(self.problems)

@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field, create_model
 
 from canshaper.config.section import Section, number
 
-# Of each drive, with what it is and its unit.
+# What a campaign measures on each drive: key, and definition with unit.
 MEASURES = {
     "still_s": "from the last release until the swing stays below still_deg, or the drive ends, s",
     "residual_deg": "largest swing that is left later than 2.5 s after the last release, or than"
@@ -17,7 +17,7 @@ MEASURES = {
     "travel_error_s": "way of an axis less the commanded one, s of full speed",
     "dip_pct": "largest fall of a command while the joystick is held, % of full command",
 }
-# Full axis flows that a pump counts as without a limit.
+# A pump flow (full axis flows) that stands for no limit.
 MOST_FLOW = 100.0
 QUANTILES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 
@@ -42,9 +42,9 @@ Range = Annotated[list[_N], AfterValidator(_ordered)]
 
 
 class Uncertainty(Section):
-    """Ranges from which a campaign draws the crane of each drive, each value as likely as another.
+    """Ranges from which a campaign draws the crane of each drive, uniformly distributed.
 
-    Percentages are changes of what the nominal crane has. Each axis has a valve of its own.
+    Percentages are changes against the nominal crane. Each axis has a valve of its own.
     """
 
     length_pct: Range[Annotated[float, _end(-60, 100, "%")]] = _usual(

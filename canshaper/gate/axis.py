@@ -1,4 +1,4 @@
-"""The gate's memory of one axis: demands that were asked of it, frames that left for its valve."""
+"""The gate's memory of one axis: demands of its operator, and frames that left for its valve."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -8,31 +8,31 @@ from canshaper.gate.received import NEVER, AxisInput, JoystickState
 from canshaper.gate.record import Axis, Valve
 
 FOREIGN_NS = 1_000_000_000
-"""So long a second sender has to be silent."""
+"""Time (ns) for which a second sender has to be silent before the axis may move again."""
 BLEND_S = 0.3
-"""Seconds for which a velocity may go on as it was, where another filter takes over from one."""
+"""Time (s) for which the output may keep its velocity when another filter takes over."""
 UP = 0.5
-"""Steps of a frame by which a velocity may be rounded up."""
+"""Largest rounding up of a velocity, in steps of the frame."""
 ROUNDING = 1.0 + UP
-"""Steps between two frames that rounding makes: the end of the range rounds down by up to one."""
+"""Largest change between two frames by rounding, in steps: ``UP`` up, 1 down at the range's end."""
 
 
 class Asked:
-    """Demand in one direction within the tail."""
+    """Demand of the operator in one direction within the tail, and the distance it has left."""
 
     __slots__ = ("_last", "_since", "_sizes", "before", "most", "remaining")
 
     def __init__(self) -> None:
-        # Each with the period when it was asked last, the largest first, each later one smaller.
+        # (period of the last demand of this size, size); largest first, each later one smaller.
         self._sizes: deque[tuple[int, float]] = deque()
-        self.most = self.before = 0.0  # the largest since the last stop, and before it too
-        # Distance that was asked and has not been run, full speed times seconds; not below 0 where
-        # a stroke begins, since a sound filter may make more of a tap than it is.
+        self.most = self.before = 0.0  # largest size within the tail: since the last stop; at all
+        # Demanded distance that has not been travelled, full speed times seconds; not below 0 when
+        # a stroke begins, since a sound filter may travel farther after a tap than was demanded.
         self.remaining = 0.0
-        self._last = self._since = -1  # periods, of the last note and of the last stop
+        self._last = self._since = -1  # period of the last note, and of the last stop
 
     def note(self, size: float, distance: float, period: int, of: Axis) -> None:
-        """So much is asked in this period: a velocity, and a distance since the last one."""
+        """Remember the demand of this period: velocity, and distance since the last note."""
         sizes, self._last = self._sizes, period
         if not (size or sizes or self.remaining):
             return
@@ -53,16 +53,16 @@ class Asked:
         self.remaining = (remaining if remaining < most else most) if most else 0.0
 
     def forget(self) -> None:
-        """Nothing of it may run on."""
+        """Forget the demand at a stop: the output may not run on by it."""
         self._since = self._last
         self.most = self.remaining = 0.0
 
 
 class AxisState(AxisInput):
-    """One axis. It may move while it is armed, and for ``stop_left`` periods of a shaped stop.
+    """State of one axis. It may move while armed, and for ``stop_left`` periods of a shaped stop.
 
-    ``made`` counts ticks that were made, ``number`` deadlines, also those that were missed;
-    ``passed`` and ``ticks`` count periods of the valve.
+    In its methods ``made`` counts ticks that were run, ``number`` counts deadlines, missed ones
+    too; ``passed`` and ``ticks`` count periods of the valve.
     """
 
     __slots__ = (
@@ -75,34 +75,34 @@ class AxisState(AxisInput):
         super().__init__(axis)
         self.joystick = joystick
         self.partner: AxisState | None = None
-        # Of a measurement, the demand in the place of the joystick's, which stays neutral.
+        # During a measurement: the demand that replaces the joystick's, which stays neutral.
         self.ramp: float | None = None
         self.armed = False  # neutral was seen, valid and enabled, since the last reason to stop
         self.latched = False  # neutral does not arm before reset or enable is pressed again
-        self.cause = NEVER  # ticks that were made before the last reason that latched
+        self.cause = NEVER  # ``made`` at the last reason that latched
         self.why, self.stop_left = "start", 0  # why it is not armed
-        self.now = 0.0  # demand in this period, where it is armed
-        self.held = 0  # for how many periods before it was on the same side
-        self.forth, self.back = Asked(), Asked()  # in each direction
-        self.least = self.most = 0.0  # what may leave in this tick
-        # Something is asked of it or its partner: in this period; in this or the last one.
+        self.now = 0.0  # demand in this period; 0 while not armed
+        self.held = 0  # number of periods before this one with the demand on the same side
+        self.forth, self.back = Asked(), Asked()  # demand in each direction
+        self.least = self.most = 0.0  # velocities that may leave in this tick
+        # There is a demand to the axis or its partner: in this period; in this or the last one.
         self.asked_now = self.asked = False
         self.due = False  # it has its turn in this tick, and has sent nothing yet
-        self.ticks = 0  # since its last frame; ``sent_at`` number of the deadline of that
-        self.sent_at = 0
-        self.flips = 0  # how often anti-sway was switched in its joystick, as it knows
-        # Velocity of that frame; what it may have been before it was rounded, or may be by now
-        # where no frame was passed on; and that of a fall, at its rate, from what was asked last:
-        # that is no run-on, and what is no faster counts no distance.
+        self.ticks = 0  # periods since its last frame
+        self.sent_at = 0  # number of the deadline of its last frame
+        self.flips = 0  # how often anti-sway was switched in its joystick, as the axis has seen
+        # ``last``: velocity of the last frame. ``top``: what it may have been before rounding, or
+        # may be by now where no frame was passed on. ``way_back``: a fall at ``fall_per_s`` from
+        # the last demand; that is no run-on, and a velocity no faster counts no distance.
         self.last, self.top, self.way_back = 0.0, axis.step, axis.step
-        self.zero_at = NEVER  # ticks made before it came to rest, or lost the right to move
-        self.ran = 0.0  # beyond the demand and what a partner may add, since it did not
-        # Distance and periods in motion since something was asked of it, or nothing of its
-        # partner; a pause gives none of it back.
+        self.zero_at = NEVER  # ``made`` when it came to rest, or lost the right to move
+        self.ran = 0.0  # distance in one run beyond the demand and what a partner may add
+        # Distance and periods in motion since the axis last had a demand, or its partner had none;
+        # a pause resets neither.
         self.way, self.alone = 0.0, 0
 
     def halt(self, why: str, made: int, *, latch: bool) -> None:
-        """Stop at once."""
+        """Stop the axis at once: no velocity may leave from now on; ``latch`` as after a trip."""
         if self.armed or self.last:
             self.zero_at = made
         self.armed, self.stop_left, self.why = False, 0, why
@@ -114,12 +114,12 @@ class AxisState(AxisInput):
     def look(
         self, why: str, demand: float | None, made: int, number: int, passed: int, *, latches: bool
     ) -> None:
-        """Whether it may move in this period, and what is asked of it.
+        """Decide whether the axis may move in this period, and remember its demand.
 
         Args:
-            why: the reason to stop at once; ``latches`` whether it latches at rest too.
-            demand: of the joystick; None is a reason to stop shaped.
-            made, number, passed: see above; ``passed`` since the last turn.
+            why: the reason to stop at once, or empty; ``latches``: it latches at rest too.
+            demand: demand of the joystick; None is a reason for a shaped stop.
+            made, number, passed: as in the class; ``passed`` counts from the last turn.
         """
         of, before = self.of, self.now
         self.now = 0.0
@@ -137,15 +137,15 @@ class AxisState(AxisInput):
             self.now = demand if self.armed else 0.0
         else:
             self.stop_left = 0
-            # The cause is noted in the axis' turn, which may be a period after it was received: a
-            # press since the turn before may be the later one of the two, and counts.
+            # The cause is noted in the axis' turn, up to a period after it was received: a press
+            # since the turn before may have come after the cause, and counts.
             if not self.latched or self.joystick.pressed.press >= self.cause - of.period:
                 self.latched, self.armed = False, True
         self.hard, self.latches, self.lost = "", False, False
         self._ask(before, number // of.period, passed)
 
     def _ask(self, before: float, period: int, passed: int) -> None:
-        """Remember what is asked; over deadlines that were missed the demand before was held."""
+        """Remember the demand; over missed deadlines the demand before counts as held."""
         of, now = self.of, self.now
         self.held = self.held + passed if now * before > 0.0 else 0
         if self.flips != self.joystick.flips:
@@ -160,13 +160,13 @@ class AxisState(AxisInput):
         self.back.note(-now if now < 0.0 else 0.0, forth - distance, period, of)
 
     def change_filter(self) -> None:
-        """Another filter takes over, or none: the output may go on as it was for BLEND_S."""
+        """Let the output keep its velocity for BLEND_S, as another filter, or none, takes over."""
         (self.forth if self.last > 0.0 else self.back).remaining += abs(self.last) * BLEND_S
 
     def dropped(self, made: int) -> float:
-        """How much of the velocity may end in one frame: what a partner added, when that stops.
+        """Return how much velocity may end in one frame: what a partner added, if it has stopped.
 
-        The gate does not know when a partner that is at rest has stopped.
+        The gate does not know when a partner that is at rest now has stopped.
         """
         partner = self.partner
         if partner is None:
@@ -176,27 +176,27 @@ class AxisState(AxisInput):
         return 0.0 if partner.last else self.of.added
 
     def share(self) -> None:
-        """Find what is asked of it or its partner, which both know by now."""
+        """Find whether the axis or its partner has a demand, after ``look`` of both."""
         own, partner = self.forth.most or self.back.most, self.partner
         asked = bool(own or (partner and (partner.forth.most or partner.back.most)))
         self.asked_now, self.asked = asked, asked or self.asked_now
         if own or not self.asked:
             self.way, self.alone = 0.0, 0
         if self.of.forwarded and self.ticks > 1:
-            # No frame was passed on in the period before: what was allowed in it may fall from now.
+            # No frame was passed on in the period before: from now on what it allowed has to fall.
             reach = self.most if self.last > 0.0 else -self.least
             self.top = max(self.top - self.of.fall, min(self.top, reach))
 
     def fallen(self, velocity: float, periods: int) -> float:
-        """Return the speed to which the axis has to have fallen by then, in the direction given."""
+        """Return the speed to which the output has to fall in so many periods in a direction."""
         return self.top - self.of.fall * periods if velocity * self.last >= 0.0 else 0.0
 
     def held_at(self, velocity: float) -> float:
-        """Demand in the direction of a velocity."""
+        """Return the size of the demand in the direction of a velocity; 0 if it points back."""
         return max(self.now if velocity > 0.0 else -self.now, 0.0)
 
     def left(self, velocity: float, made: int, number: int) -> None:
-        """Remember a frame that has left."""
+        """Remember the velocity of a frame that has left."""
         of, last = self.of, self.last
         passed, self.ticks, self.sent_at = self.ticks, 0, number
         if not velocity:
@@ -217,28 +217,28 @@ class AxisState(AxisInput):
         if size > min(fallen, self.way_back) + EPSILON:
             way = size * of.period_s * passed
             asked.remaining -= way
-            if of.added:  # to and fro: what ran beyond on the other side is given back
+            if of.added:  # an added motion to and fro: this way makes up for an overrun back
                 other.remaining = max(min(other.remaining + way, 0.0), other.remaining)
         self.top = size + of.step
-        if size > reach + EPSILON:  # on its way back, by the fall with each frame
+        if size > reach + EPSILON:  # on its way back to ``reach``: it has to fall with each frame
             self.top = min(self.top, max(reach, fallen))
         self.last = velocity
 
     def _rests(self, passed: int, made: int) -> None:
-        """Neutral has left."""
+        """Remember that a neutral frame has left."""
         of = self.of
         if self.last:
             self.zero_at = made
             fall = of.fall * max(passed, 1) + ROUNDING * of.step
             if abs(self.last) > fall + self.dropped(made):
-                # Nothing falls so fast but a stop: from here on it is neutral first.
+                # Only a stop falls so fast: from here on rule 3 demands neutral first.
                 self.halt("fell to neutral at once", made, latch=False)
         if self.now:
             self.ran = 0.0
         self.last, self.top, self.way_back = 0.0, of.step, of.step
 
     def carry_over(self, before: "AxisState") -> None:
-        """Keep over a reload what is latched, and a reason to stop that no tick has seen yet."""
+        """Keep the latch over a reload, and any reason to stop that no tick has seen yet."""
         self.latched = self.latched or before.latched
         self.cause = max(self.cause, before.cause)
         self.hard, self.latches = self.hard or before.hard, self.latches or before.latches
@@ -246,10 +246,11 @@ class AxisState(AxisInput):
 
 
 class ValveState:
-    """One valve message with its axes, which have one period, and so their turn together.
+    """State of one valve message; its axes have one period, and so their turn together.
 
     Attributes:
-        count: alive counter of the last frame that left; ``before`` of the one before that.
+        count: alive counter of the last frame that left.
+        before: alive counter of the frame before.
     """
 
     def __init__(self, valve: Valve, axes: Sequence[AxisState]) -> None:

@@ -1,6 +1,6 @@
 """Makes the record of a machine, once: from the numbers of its file and cantools' signals.
 
-This and ``signals.py`` are all of the gate that reads anything else, and they read data only.
+Only this module and ``signals.py`` read anything outside the gate, and they read data only.
 """
 
 import math
@@ -21,11 +21,11 @@ from canshaper.gate.signals import (
 )
 
 SPREADING = ("off", "first_order", "s_curve", "zv", "zvd", "ei", "two_mode")
-"""Filters that spread the demand over time, and know of no swing."""
+"""Filters that only spread the demand over time."""
 SLACK, SWING_SLACK = 0.4, 1.5
-"""Slack of those filters, and of the others, s of full speed. Taps in the time of the swing sum up:
-a G_FF needs 1.04 s to damp that, a robust shaper .9 s after a bypass (gate/test_distance.py). Of a
-swing of more than 3 s it is half of that."""
+"""Slack of ``SPREADING`` filters and of others, s of full speed: taps at the swing's period add up,
+which a G_FF needs 1.04 s to damp, a robust shaper .9 s after a bypass (gate/test_distance.py).
+For a swing of more than 3 s the slack is half a period."""
 # J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
@@ -34,7 +34,7 @@ HEARTBEAT, NMT, START, WORDS = 0x700, 0x000, 1, frozenset((0x8, 0x9, 0xB, 0xF, 0
 
 
 def record_of(deployment: Any) -> Record:
-    """The record of a deployment."""
+    """Return the record of a deployment."""
     config = deployment.config
     messages = {name: _message(name, one, config) for name, one in deployment.joysticks.items()}
     switches: dict[str, Switch] = {}
@@ -98,17 +98,17 @@ def _message(name: str, bound: Any, config: Any) -> Message:
 
 
 def _from(can_id: int, source: int | None) -> int:
-    """A message of J1939 from another address."""
+    """Return a J1939 identifier with this source address; None leaves it as it is."""
     return can_id if source is None else can_id & ~0xFF | source
 
 
 def _group(can_id: int) -> int:
-    """Bits of an identifier of J1939 that say what it is; below PF 240 a destination follows."""
+    """Return the mask of a J1939 identifier's group; below PF 240 a destination follows it."""
     return 0x03FF0000 if (can_id >> 16) & 0xFF < 240 else 0x03FFFF00
 
 
 def protection_of(section: Any, message: Any, can_id: int) -> Protection:
-    """Protection of a message, by its section of the file."""
+    """Return the protection of a message, from its section of the file."""
     if one := section.e2e:
         counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
         e2e = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
@@ -121,7 +121,7 @@ def protection_of(section: Any, message: Any, can_id: int) -> Protection:
 
 
 def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
-    """A checksum; None for one of another package."""
+    """Return the checksum of a message; None for a kind that another package adds."""
     signal, kind = signal_of(message, section.signal), section.kind
     place, bits = bits_of(field_of(message, section.signal), message.length), signal.length
     lowest = (place & -place).bit_length() - 1
@@ -193,7 +193,7 @@ def _axis(bound: Any, deployment: Any) -> Axis:
 
 
 def slack_of(config: Any) -> float:
-    """How far the filter of an axis may run ahead, full speed times seconds."""
+    """Return how far a filter may run ahead of the demand, full speed times seconds."""
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
     one = not (config.gain_schedule or config.profiles or config.sway_sensor)
@@ -203,7 +203,7 @@ def slack_of(config: Any) -> float:
 
 
 def _forwarded(axis: Any, deployment: Any) -> bool:
-    """Whether the command of an axis leaves in the frames of its own joystick."""
+    """Return whether the command of an axis leaves in the frames of its own joystick."""
     gateway = deployment.config.gateway
     joystick = deployment.config.joysticks[axis.command.joystick]
     other = gateway.other(axis.valve.bus) if gateway else None
@@ -276,7 +276,7 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
 
 
 def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
-    """Messages besides those of valves: status, and what our nodes say about themselves."""
+    """Yield (key, (lengths, contents or none)) of status messages and those of our own nodes."""
     anything, config = frozenset[bytes](), deployment.config
     of_axes = (one.status for one in config.axes.values())
     aims = (one.aim for one in config.motion.values())

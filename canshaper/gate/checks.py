@@ -1,4 +1,4 @@
-"""Checksums of frames, and profiles of AUTOSAR E2E: the gate's own, from their definitions."""
+"""Checksums of frames, and profiles of AUTOSAR E2E: the gate's own code, from the definitions."""
 
 from dataclasses import dataclass, field
 from functools import reduce
@@ -8,12 +8,12 @@ from typing import Literal
 
 @dataclass(slots=True)
 class Crc:
-    """A CRC by its numbers, as catalogues give them; a byte at a time, by a table."""
+    """A CRC by its numbers in catalogues, computed a byte at a time by a table."""
 
     bits: int  # width of the register, 8 to 64
     polynomial: int  # without its highest bit
     start: int  # register before the first byte
-    end: int  # what is added (exclusive or) to the register after the last byte
+    end: int  # XORed into the register after the last byte
     reflected: bool = False  # the lowest bit of each byte comes first
     table: tuple[int, ...] = field(init=False)
 
@@ -33,7 +33,7 @@ class Crc:
         self.table = tuple(table)
 
     def of(self, data: bytes) -> int:
-        """CRC of these bytes."""
+        """Return the CRC of these bytes."""
         value, table = self.start, self.table
         if self.reflected:
             for byte in data:
@@ -46,7 +46,7 @@ class Crc:
 
 
 def _turned(value: int, bits: int) -> int:
-    """Bits in the reverse order."""
+    """Return a value with its bits in reverse order."""
     return int(f"{value:0{bits}b}"[::-1], 2)
 
 
@@ -54,15 +54,15 @@ def _turned(value: int, bits: int) -> int:
 class Checksum:
     """A checksum over all other bits of a frame."""
 
-    how: Crc | Literal["xor", "sum", "halves"]  # of the bytes, and of the half bytes
-    byte: int  # where it lies
-    shift: int = 0
+    how: Crc | Literal["xor", "sum", "halves"]  # halves: sum of the half bytes
+    byte: int  # its first byte in the frame
+    shift: int = 0  # its lowest bit in that byte
     bits: int = 8
     order: Literal["little", "big"] = "little"
     plus: int = 0  # what is added to a sum: the bytes of the identifier, or the length
 
     def right(self, data: bytes) -> bool:
-        """Whether a frame carries the checksum of the rest of it."""
+        """Return whether the checksum in a frame is that of the frame's other bits."""
         at, ones = self.byte, (1 << self.bits) - 1
         end = at + (self.bits + 7) // 8
         sent = int.from_bytes(data[at:end], self.order)
@@ -88,11 +88,11 @@ CRCS: dict[str, tuple[int, ...]] = {
     "crc16_arc": (16, 0x8005, 0, 0, True), "p01": J1850_OF_1, "p11": J1850_OF_1, "p02": AUTOSAR,
     "p22": AUTOSAR, "p04": P4, "p05": CCITT, "p06": CCITT, "p07": XZ,
 }  # fmt: skip
-"""Numbers of the CRC of each kind of checksum, and of each profile of E2E, by its name."""
+"""Numbers of the CRC (as in ``Crc``) by checksum kind, and by E2E profile."""
 
 
 def crc_of(name: str) -> Crc:
-    """A CRC by its name."""
+    """Return the CRC of a checksum kind or E2E profile."""
     bits, polynomial, start, end, *reflected = CRCS[name]
     return Crc(bits, polynomial, start, end, bool(reflected))
 
@@ -102,7 +102,7 @@ class E2e:
     """CRC and counter in the first bytes of a frame (AUTOSAR PRS_E2EProtocol)."""
 
     profile: str  # p01, p02, p04, p05, p06, p07, p11 or p22
-    counts: int  # values of the counter
+    counts: int  # number of values of the counter
     data_id: int = 0  # of the message
     mode: str = ""  # bytes of the data ID that enter the CRC, profiles 1 and 11
     ids: bytes = b""  # data IDs by the counter, profiles 2 and 22
@@ -112,13 +112,13 @@ class E2e:
         self.crc = crc_of(self.profile)
 
     def count(self, data: bytes) -> int:
-        """The counter of a frame."""
+        """Return the counter of a frame."""
         first, last = COUNTERS[self.profile]
         count = int.from_bytes(data[first:last], "big")
         return count & 0x0F if last == 2 else count
 
     def right(self, data: bytes) -> bool:
-        """Whether a frame has the header that it should."""
+        """Return whether the header of a frame is right."""
         profile, count, of = self.profile, self.count(data), self.crc.of
         if count >= self.counts:
             return False
@@ -135,7 +135,7 @@ class E2e:
             return data[0] == of(bytes(first) + data[1:])
         if profile in ("p02", "p22"):
             return data[0] == of(data[1:] + self.ids[count : count + 1])
-        # The others lay length, counter and data ID over the frame, high bytes first but in 5.
+        # The others put length, counter and data ID into a header, high bytes first except p05.
         if profile == "p05":
             crc = of(data[2:] + self.data_id.to_bytes(2, "little"))
             head = crc.to_bytes(2, "little")
@@ -155,8 +155,8 @@ COUNTERS = {
     "p01": (1, 2), "p11": (1, 2), "p02": (1, 2), "p22": (1, 2), "p04": (2, 4), "p05": (2, 3),
     "p06": (4, 5), "p07": (12, 16),
 }  # fmt: skip
-"""First byte of the counter and the one behind it; in byte 1 it fills the lower half only."""
+"""(first byte, end byte) of the counter by profile; in byte 1 it fills the lower half only."""
 COUNTS = {"p01": 15, "p11": 15, "p02": 16, "p22": 16, "p04": 1 << 16, "p07": 1 << 32}
-"""Values of the counter; of the others 256."""
+"""Number of values of the counter by profile; other profiles have 256."""
 HEADERS = {"p04": 12, "p05": 3, "p06": 5, "p07": 20}
-"""Bytes of the header; of the others 2."""
+"""Bytes of the header by profile; other profiles have 2."""

@@ -1,4 +1,4 @@
-"""A loop at its deadlines, its tick between buses and controller, what a standstill takes back."""
+"""A loop at its deadlines, its tick between buses and controller, and the check for standstill."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any, Protocol
 
 Frame = Any
-"""A frame: of it only its bus is used here, ``frame.bus``."""
+"""A frame, of which this module only uses the bus, ``frame.bus``."""
 
 # Time since the machine was booted, ns. No one can set it, and unlike CLOCK_MONOTONIC it goes on
 # while the machine is suspended: an age, and a standstill of the loop, includes that time. Other
@@ -26,17 +26,16 @@ def run_at_deadlines(
 ) -> None:
     """Call ``body`` at every deadline until it returns False.
 
-    A deadline is fixed before the sleep that ends at it, so lateness does not add up. Those that
-    have passed are counted and left out, never caught up in a burst.
+    A deadline is fixed before the sleep that ends at it, so lateness does not add up. Deadlines
+    that have passed are counted and skipped, never caught up in a burst.
 
     Args:
-        period_ns: time between two deadlines.
+        period_ns: time between two deadlines, ns.
         body: called with the time by ``boottime_ns``, the number of deadlines missed since its
-            last call, and how late it is, in ns after the first deadline it has not yet been called
-            for.
-        wait: lets so many seconds pass; by default it sleeps.
-        steer: asked after each call, with where the next deadline would be, by how many ns it is
-            to be moved; much less than a period.
+            last call, and its lateness: ns after the first deadline that it was not called for.
+        wait: waits so many seconds; by default it sleeps.
+        steer: called after each call of ``body`` with the time of the next deadline; returns by how
+            many ns to move that deadline, which is much less than a period.
     """
     clock = boottime_ns
     deadline = now = clock()
@@ -55,18 +54,18 @@ def run_at_deadlines(
         now = clock()
 
 
-# A frame may leave so late after it was computed, where a tick is shorter than that: a program
-# that is held up now and then for some milliseconds goes on.
+# A frame may leave so late after it was computed, if a tick is shorter: a program that is held up
+# for some milliseconds now and then continues.
 LEAST_LEAVE_NS = 10_000_000
 NEVER_NS = 1 << 63  # later than any time of a clock
 
 
 def longest_gap_ns(deployment: Any) -> int:
-    """Longest time between two ticks, in ns, after which an axis in motion may go on.
+    """Return the longest time between two ticks, in ns, after which an axis may continue to move.
 
-    After the shortest age limit of an input, what waits in the sockets must not look fresh; after
-    the shortest timeout of a valve, that valve has closed, and would get full speed in one step.
-    A valve that gets a frame in every n-th tick only may have waited for n - 1 ticks before.
+    After the shortest age limit of an input, frames that wait in the sockets must not look fresh.
+    After the shortest timeout of a valve, that valve has closed, and would get full speed in one
+    step. A valve with a frame in every n-th tick may have waited n - 1 ticks before.
     """
     tick_ms = deployment.config.tick_ms
     limits = [one.config.timeout_ms for one in deployment.stopping_inputs]
@@ -79,42 +78,42 @@ def longest_gap_ns(deployment: Any) -> int:
 
 
 class Standstill:
-    """Whether a loop stood still for too long since its last tick; that of ``before`` counts."""
+    """Finds whether a loop stood still too long since its last tick, or the last of ``before``."""
 
     def __init__(self, deployment: Any, before: "Standstill | None" = None) -> None:
         # The time when a frame is about to leave; a test may replace it.
         self.clock: Callable[[], int] = boottime_ns
         self.limit_ns = longest_gap_ns(deployment)
-        # Of the last tick that was made: all its frames were sent in time.
+        # Time of the last tick that counts as run: all its frames were sent in time.
         self.last_ns: int = before.last_ns if before else NEVER_NS
-        self.until_ns = 0  # what is computed in this tick may leave until then
+        self.until_ns = 0  # frames of the present tick may leave until then
         self._leave_ns = max(deployment.config.tick_ms * 1_000_000, LEAST_LEAVE_NS)
 
     def late(self) -> bool:
-        """Whether it is too late for what was computed in this tick to leave."""
+        """Return whether it is too late for a frame that was computed in this tick to leave."""
         return self.clock() > self.until_ns
 
     def over(self, now_ns: int) -> bool:
-        """Whether the loop stood still for too long until now; a tick begins, or is made up."""
+        """Begin a tick at ``now_ns``; return whether the loop stood still for too long before."""
         latest_ns = self.last_ns + self.limit_ns
         self.until_ns = min(latest_ns, now_ns + self._leave_ns)
         return now_ns > latest_ns
 
 
-# After a standstill ports are read again until none has more frames, this often at most: a port
-# hands out 2000 frames at a time, a queue holds more, and none holds 100 000.
+# Most rounds in which ports are read after a standstill, until none has more frames: a port hands
+# out 2000 frames at a time, its queue holds more, but no queue holds 100 000.
 MOST_ROUNDS = 50
 
 
 class FrameProcessor(Protocol):
-    """Frames in, frames out: a ``Controller``, or what stands around one."""
+    """Takes frames and yields frames: a ``Controller``, or an object that wraps one."""
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last is that of a valve, and any axis moves."""
+        """Whether the frame that was handed out last is a valve's, and any axis moves."""
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Take a frame; return the frame for the other bus of a gateway, or None."""
+        """Receive a frame; return the frame for the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
         """Take note that the loop stood still: frames up to the next tick have waited."""
@@ -126,11 +125,11 @@ class FrameProcessor(Protocol):
         """Take note that a frame did not reach its bus."""
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
+        """Return whether a late valve frame moves a valve, and so must not leave."""
 
 
 class FramePort(Protocol):
-    """Bus as a cycle needs it, see ``Port``; or a substitute for one."""
+    """A bus as a cycle uses it: a ``Port``, or a substitute."""
 
     @property
     def arrived_ns(self) -> int:
@@ -143,15 +142,16 @@ class FramePort(Protocol):
         """Yield frames that can wait until the valves have their commands."""
 
     def send(self, frame: Frame) -> bool:
-        """Send now or not at all; whether the frame went out."""
+        """Send a frame now or not at all; return whether it was sent."""
 
 
 def receive_waiting(
     processor: FrameProcessor, ports: Mapping[str, FramePort], now_ns: int, standstill: Standstill
 ) -> int:
-    """Receive what waits, none of it younger than ``now_ns``; return how many frames there were.
+    """Receive all waiting frames, and return how many there were.
 
-    Frames of a joystick that pass a gateway leave at once or not at all.
+    An arrival after ``now_ns`` counts as one at ``now_ns``. A joystick's frame that passes a
+    gateway leaves at once or not at all.
     """
     count = 0
     for port in ports.values():
@@ -175,15 +175,16 @@ def io_cycle(
     missed: int,
     standstill: Standstill,
 ) -> None:
-    """Receive all waiting frames, tick, send, then receive what can wait.
+    """Receive all waiting frames, run the tick, send its frames, then receive background frames.
 
-    A frame that moves a valve and was computed before the process was held up does not leave
-    after that. Its tick is none that was made, so the next one sees how long the loop stood still.
+    A frame that moves a valve, and was computed before the process was held up, does not leave
+    afterwards. Its tick does not count as run, so the next one sees how long the loop stood still.
 
     Args:
-        processor, ports: what the frames are for, and the buses by name.
-        now_ns: time of this tick, by ``boottime_ns``; ``missed`` deadlines since the last one.
-        standstill: when the last tick was.
+        processor, ports: receiver and source of the frames; buses by name.
+        now_ns: time of this tick by ``boottime_ns``.
+        missed: deadlines missed since the last tick.
+        standstill: knows the time of the last tick.
     """
     if standstill.over(now_ns):
         processor.stalled()

@@ -1,4 +1,4 @@
-"""The gate's own decoder: bits of a frame to numbers and velocities, by shift and mask."""
+"""The gate's own decoder: converts bits of a frame to numbers and velocities by shift and mask."""
 
 import struct
 from bisect import bisect_right
@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 Word = tuple[int, int]
-"""A frame as one number, in which byte 0 is the lowest, and one in which it is the highest."""
+"""A frame as two numbers: byte 0 is the lowest byte of the first, the highest of the second."""
 EPSILON = 1e-6
 """Part of full speed: more than the rounding of floats, less than any step of a frame."""
 SMALL = 0.05
-"""Part of full deflection: neutral flag and position sensor do not meet at one angle."""
-# (neutral, negative, positive) to the sign, and the largest position that may go with it.
+"""Largest part of full deflection at which the neutral flag may be set: flag and position sensor do
+not switch at one angle."""
+# Flags (neutral, negative, positive) to (sign, largest part of full deflection with them).
 _FLAGS: Mapping[tuple[float, ...], tuple[int, float]] = {
     (0, 0, 1): (1, 1.0),
     (0, 1, 0): (-1, 1.0),
@@ -22,7 +23,7 @@ _FLAGS: Mapping[tuple[float, ...], tuple[int, float]] = {
 
 
 def word_of(data: bytes) -> Word:
-    """A frame as a word."""
+    """Return a frame as a word."""
     return int.from_bytes(data, "little"), int.from_bytes(data, "big")
 
 
@@ -30,14 +31,14 @@ def word_of(data: bytes) -> Word:
 class Field:
     """Bits of a frame that are one number."""
 
-    shift: int  # where they lie in the word
-    mask: int
+    shift: int  # lowest bit of the number in the word
+    mask: int  # all ones, as long as the number
     sign: int = 0  # the sign bit; 0 where there is none
     order: int = 0  # 0 for little endian, 1 for big endian: which number of the word
     real: str = ""  # ``struct`` format of a float; empty where it is none
 
     def raw(self, word: Word) -> float:
-        """Raw value; of a float signal the float."""
+        """Return the raw value; of a float signal the float."""
         raw = word[self.order] >> self.shift & self.mask
         if raw & self.sign:
             return raw - 2 * self.sign
@@ -49,7 +50,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A signal as a part of full deflection."""
+    """A signal that is read as a part of full deflection."""
 
     field: Field
     scale: float  # value = (raw * scale + offset) / full
@@ -57,30 +58,30 @@ class Part:
     full: float
     low: float  # parts of full deflection beyond which it is no measurement
     high: float
-    named: frozenset[float]  # raw values that are none: those with a name in the DBC
+    named: frozenset[float]  # raw values that are no measurement, as the DBC names them
 
     def value(self, word: Word) -> float | None:
-        """In [-1, 1]; None where it is no measurement."""
+        """Return the value in [-1, 1]; None where it is no measurement."""
         raw = self.field.raw(word)
         if raw in self.named:
             return None
         value = (raw * self.scale + self.offset) / self.full
-        if not self.low <= value <= self.high:  # nor is what is no number
+        if not self.low <= value <= self.high:  # true of NaN too
             return None
         return -1.0 if value < -1.0 else 1.0 if value > 1.0 else value
 
 
 @dataclass(frozen=True, slots=True)
 class Stick:
-    """The demand of one axis in the frame of its joystick."""
+    """Reads the demand of one axis from the frame of its joystick."""
 
     part: Part
-    back: Part | None = None  # of a rocker with a signal for each side, the negative one
-    flags: tuple[Field, ...] = ()  # of a magnitude, the signals neutral, negative and positive
-    band: float = 0.02  # deflection up to which it is neutral
+    back: Part | None = None  # negative direction of a rocker with a signal for each direction
+    flags: tuple[Field, ...] = ()  # neutral, negative and positive flag, where part is a magnitude
+    band: float = 0.02  # deflection up to which the joystick is neutral
 
     def demand(self, word: Word) -> float | None:
-        """In [-1, 1]; None where the frame has none, or its signals contradict each other."""
+        """Return the demand in [-1, 1]; None where it has none, or its signals contradict."""
         value = self.part.value(word)
         if value is None:
             return None
@@ -101,18 +102,18 @@ class Stick:
 
 @dataclass(slots=True)
 class Opening:
-    """Velocity that a valve gives in one direction: behind a dead band, or by a measured curve."""
+    """Velocity of a valve by command in one direction: beyond a deadband, or by a curve."""
 
-    steps: tuple[float, ...]  # commands, the first one the largest that moves nothing
-    velocities: tuple[float, ...]  # parts of full speed that these give
-    slopes: tuple[float, ...] = field(init=False)  # between two of them, in a step
+    steps: tuple[float, ...]  # commands; the first is the largest command that moves nothing
+    velocities: tuple[float, ...]  # part of full speed at each of these commands
+    slopes: tuple[float, ...] = field(init=False)  # velocity per step between two commands
 
     def __post_init__(self) -> None:
         ends = list(zip(self.steps, self.velocities, strict=True))
         self.slopes = tuple((b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(ends))
 
     def velocity(self, steps: int) -> float:
-        """Part of full speed for a command of so many steps; one that is not 0 moves something."""
+        """Return the part of full speed for a command in steps; never 0, as the command is not."""
         i = bisect_right(self.steps, steps, 1, len(self.slopes)) - 1
         velocity = self.velocities[i] + (steps - self.steps[i]) * self.slopes[i]
         return velocity if velocity > 2 * EPSILON else 2 * EPSILON
@@ -124,9 +125,9 @@ def openings_of(
     """Return the openings of the positive and of the negative direction.
 
     Args:
-        deadband_pct: % of full command.
-        curve: instead of it, of the measured valve, commands and speeds in %.
-        full: steps to full command.
+        deadband_pct: deadband, % of full command.
+        curve: commands and speeds of the measured valve in %, instead of the deadband, or Nones.
+        full: steps from zero to full command.
     """
     commands, speeds = curve
     if commands is None or speeds is None:
@@ -141,30 +142,30 @@ def openings_of(
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """A signal with a command."""
+    """A signal that carries a command, and its resolution."""
 
     field: Field
-    zero: int  # raw value
-    sign: int  # -1 where the raw value falls with the command
-    full: int  # steps to full command
+    zero: int  # raw value at zero command
+    sign: int  # -1 where the raw value falls as the command rises, else 1
+    full: int  # steps from zero to full command
 
     def steps(self, word: Word) -> int:
-        """Steps from zero."""
+        """Return the command as steps from zero."""
         return self.sign * (int(self.field.raw(word)) - self.zero)
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """The command of one axis in the frame of its valve."""
+    """Reads the command of one axis from the frame of its valve."""
 
-    size: Resolution  # where the direction stands apart, its magnitude
-    codes: tuple[Field, ...] = ()  # the signals of the direction
-    signs: Mapping[tuple[float, ...], int] = field(default_factory=dict)  # of their raw values
-    back: Resolution | None = None  # of a rocker, the magnitude of the negative direction
+    size: Resolution  # the command; its magnitude where other signals say the direction
+    codes: tuple[Field, ...] = ()  # signals of the direction
+    signs: Mapping[tuple[float, ...], int] = field(default_factory=dict)  # sign by their raw values
+    back: Resolution | None = None  # magnitude of the negative direction, for a rocker
     also: tuple[Resolution, ...] = ()  # the same command in other resolutions
 
     def steps(self, word: Word) -> int | None:
-        """With their sign; None where signals contradict each other, or it is beyond full."""
+        """Return the signed steps; None where signals contradict, or they are beyond full."""
         size = steps = self.size.steps(word)
         full = self.size.full
         if self.codes:

@@ -1,4 +1,4 @@
-"""The gate at work: frames come in, a tick begins, and each frame that wants to leave is judged."""
+"""The gate at work: it receives frames, begins ticks, and judges each frame that is to leave."""
 
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -11,14 +11,14 @@ from canshaper.gate.record import Joystick, Key, Message, Record, Switch
 
 
 class Gate:
-    """All valves of a machine."""
+    """Judges the frames to all valves of a machine, by the frames that it has received itself."""
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        self.number = -1  # of this deadline
-        self.made = 0  # ticks; deadlines that were missed are none
-        self.stood = False  # the loop stood still, and no tick was made since
-        self.others: dict[Key, int] = {}  # frames of it, by messages that are no valve's
+        self.number = -1  # number of the present deadline
+        self.made = 0  # number of ticks that were run, without missed deadlines
+        self.stood = False  # the loop stood still, and no tick was run since
+        self.others: dict[Key, int] = {}  # frames sent in this tick, by message that is no valve's
         self.messages = {name: Received(one) for name, one in record.messages.items()}
         self.joysticks = {name: self._joystick(one) for name, one in record.joysticks.items()}
         self.axes = {
@@ -54,7 +54,7 @@ class Gate:
     # --- what comes in ---------------------------------------------------------------------------
 
     def receive(self, key: Key, data: bytes, now_ns: int) -> Received | None:
-        """Take a frame; return its message, where that is one with a joystick."""
+        """Receive a frame; return its message if a joystick in it moves axes, else None."""
         message = self.ids.get(key) or self._by_group(key, now_ns)
         if message is None:
             return None
@@ -71,7 +71,7 @@ class Gate:
         return message if message.axes else None
 
     def _by_group(self, key: Key, now_ns: int) -> Received | None:
-        """A message of J1939 that any address may send; and commands of others to our valves."""
+        """Find the J1939 message that any address may send; note others' commands to our valves."""
         bus, can_id, extended = key
         if key in self.valves:
             self._foreign(self.valves[key], now_ns)
@@ -83,48 +83,48 @@ class Gate:
                     return None if ours else message
             for (at, own, _), valve in self.valves.items():
                 mask = valve.of.group
-                # Below the mask: a destination, where the group has one; 255 is all of them.
+                # Below the mask is the destination, where the group has one; 255 means all nodes.
                 to_us = can_id >> 8 & 0xFF in (own >> 8 & 0xFF, 0xFF)
                 if mask and bus == at and can_id & mask == own & mask and to_us:
                     self._foreign(valve, now_ns)
         return None
 
     def _foreign(self, valve: ValveState, now_ns: int) -> None:
-        """Someone else commands a valve; one who only listens is no one's rival."""
+        """Stop a valve that another sender commands, unless we only listen."""
         if not self.record.listens:
             for axis in valve.axes:
                 axis.foreign_ns, axis.hard, axis.latches = now_ns, "second sender", True
 
     def disagrees(self, axes: Iterable[AxisInput]) -> None:
-        """Another decoder has read something else in a frame of their joystick."""
+        """Stop axes: the controller's decoder has read another demand in their joystick's frame."""
         for axis in axes:
             axis.hard = "decoders disagree"
 
     def stalled(self) -> None:
-        """The loop stood still: what moves stops; what comes before the next tick has waited."""
+        """Stop every axis after a standstill; frames until the next tick count as old."""
         self.stood = True
         for axis in self.axes.values():
             axis.halt("loop stalled", self.made + 1, latch=axis.last != 0.0)
 
     def send_failed(self, key: Key) -> None:
-        """A frame did not reach its bus: what moves stops."""
+        """Stop the moving axes of a valve frame that did not reach its bus."""
         for axis in self.valves[key].axes if key in self.valves else ():
             if axis.last:
                 axis.halt("send failed", self.made + 1, latch=True)
 
     def withheld(self, key: Key) -> None:
-        """A valve's frame was too late and did not leave: the next one has its count."""
+        """Take back the count of a valve frame that was too late and did not leave."""
         self.valves[key].count = self.valves[key].before
 
     def set(self, key: str, value: float) -> None:
-        """A number of the file is another one from now on: axes.NAME.SECTION.KEY."""
+        """Change a number of the file, with the key axes.NAME.SECTION.KEY."""
         name, section, last = key.rsplit(".", 2)
         axis = self.axes[name.removeprefix("axes.")]
         axis.of.set(f"{section}.{last}", value)
         axis.change_filter()
 
     def measure(self, name: str, part: float) -> None:
-        """A measurement moves an axis: so large a part of full command is the demand, [-1, 1]."""
+        """Let a measurement move an axis: its demand is this part of full command, [-1, 1]."""
         axis = self.axes[name]
         steps = math.ceil(abs(part) * axis.of.command.size.full)
         axis.ramp = axis.of.velocity(-steps if part < 0.0 else steps)
@@ -132,7 +132,7 @@ class Gate:
     # --- a tick ----------------------------------------------------------------------------------
 
     def tick(self, now_ns: int, missed: int) -> None:
-        """A tick begins, after so many deadlines that were missed."""
+        """Begin a tick, after so many missed deadlines."""
         last, self.number = self.number, self.number + 1 + missed
         self.made += 1
         self.others.clear()
@@ -159,7 +159,10 @@ class Gate:
     # --- what goes out ---------------------------------------------------------------------------
 
     def leaving(self, key: Key, data: bytes, of: bytes | None = None) -> str:
-        """Why a frame may not leave; in a gateway it was made ``of`` one of the joystick."""
+        """Return why a frame may not leave; empty if it may, and then remember it as sent.
+
+        In a gateway ``of`` is the joystick's frame that it was made from; None for our own.
+        """
         valve = self.valves.get(key)
         if valve is None:
             self.others[key] = sent = self.others.get(key, 0) + 1
@@ -190,12 +193,12 @@ class Gate:
         return ""
 
     def refused(self, key: Key) -> None:
-        """A frame was refused: its axes stop, and wait for a reset."""
+        """Stop the axes of a refused frame; they wait for a reset."""
         for axis in self.valves[key].axes:
             axis.halt("refused", self.made, latch=True)
 
     def last(self, key: Key, data: bytes) -> str:
-        """Why a frame may not be the last one: it has to be right and neutral."""
+        """Return why a frame may not be the last one: its bytes have to be right, and neutral."""
         valve, word = self.valves[key], word_of(data)
         if why := rules.bytes_refused(valve, data, word, None, last=True):
             return why
@@ -208,11 +211,11 @@ class Gate:
     # --- a reload --------------------------------------------------------------------------------
 
     def carry_over(self, before: "Gate", reopened: frozenset[str]) -> None:
-        """Go on where the gate of the file before has ended: what is latched stays latched.
+        """Continue the state of the gate before a reload: each latch stays latched.
 
         Args:
-            before: that gate.
-            reopened: buses that were closed meanwhile: nothing good that is known of them counts.
+            before: the gate of the file before.
+            reopened: buses that were closed meanwhile: no frame received on them counts as good.
         """
         self.made = before.made
         places, were = self.record.places, before.record.places
@@ -235,5 +238,5 @@ class Gate:
 
 
 def _known_by(of: Message, places: Mapping[str, Hashable]) -> Hashable:
-    """Place and identifiers of a message: they stay where the file gives it another name."""
+    """Return place and identifiers of a message, which stay if the file renames message or bus."""
     return places[of.bus], of.ids, of.extended, of.group

@@ -1,7 +1,7 @@
 """The gate's memory of received frames: messages, switches, joysticks.
 
-Bad news counts in every frame with the right length and checksum, however short; good news only in
-one that is in sequence too.
+A reason to stop counts in every frame with the right length and checksum, however briefly it was
+there; a reason to go on counts only in a frame that is in sequence too.
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,15 @@ NEVER = -(1 << 62)
 
 
 class AxisInput:
-    """Input of an axis: its demand, and each reason to stop since its last turn, however short.
+    """Input of an axis: its demand, and each reason to stop since its last turn, however brief.
 
     Attributes:
-        demand: of the last joystick frame that counts, and ``changed_ns`` since when.
-        foreign_ns: when a second sender was received last.
-        hard: a reason to stop at once; ``latches`` whether one was that latches at rest too.
-        lost: its joystick was another one meanwhile.
+        demand: demand of the last joystick frame that counts.
+        changed_ns: time since when the demand has this value.
+        foreign_ns: time when a second sender was received last.
+        hard: a reason to stop at once, or empty.
+        latches: whether any of these reasons latches at rest too.
+        lost: whether another joystick has taken over meanwhile.
     """
 
     __slots__ = ("changed_ns", "demand", "foreign_ns", "hard", "latches", "lost", "of")
@@ -31,31 +33,31 @@ class AxisInput:
         self.hard, self.latches, self.lost = "", False, False
 
     def take(self, word: Word, now_ns: int) -> None:
-        """Take a frame of its joystick that counts."""
+        """Store the demand of a joystick frame that counts."""
         demand = self.of.stick.demand(word)
         if demand != self.demand:
             self.demand, self.changed_ns = demand, now_ns
 
 
 class Received:
-    """One message: is it whole, right, in sequence, and how old is it?"""
+    """State of one received message: whether its frames are right and in sequence, and its age."""
 
     def __init__(self, message: Message) -> None:
         self.of = message
-        self.good_ns: int | None = None  # when the last frame came that counts
-        self.intact_ns = NEVER  # when the last one came with the right checksum
-        self.count: int | None = None  # its alive counter
-        self.any_count = True  # after silence the next one may be any but that
-        self.good = 0  # good ones in a row
-        self.waiting = False  # of a gateway: one that counts has come and was not passed on
-        # Of a message from any address, the one that counts, and its last frame.
+        self.good_ns: int | None = None  # time of the last frame that counts
+        self.intact_ns = NEVER  # time of the last frame with the right checksum
+        self.count: int | None = None  # alive counter of the last frame with the right checksum
+        self.any_count = True  # after silence: any next count is good except the last one
+        self.good = 0  # good frames in a row
+        self.waiting = False  # in a gateway: a frame that counts has come and was not passed on
+        # For a message from any address: the address that counts, and the time of its last frame.
         self.source, self.source_ns = -1, NEVER
-        self.switches: list[SwitchState] = []  # in it, as the joystick
-        self.joystick: JoystickState | None = None
-        self.axes: list[AxisInput] = []  # that this moves
+        self.switches: list[SwitchState] = []  # switches in the message
+        self.joystick: JoystickState | None = None  # the joystick in the message
+        self.axes: list[AxisInput] = []  # axes that the joystick moves
 
     def take(self, data: bytes, word: Word, now_ns: int) -> tuple[bool, bool]:
-        """Whether a frame says anything, and whether it counts."""
+        """Receive a frame; return (whether its reasons to stop count, whether it counts fully)."""
         of, protection = self.of, self.of.protection
         if len(data) != of.length:
             return False, False
@@ -83,7 +85,7 @@ class Received:
         return True, True
 
     def from_other(self, source: int, now_ns: int) -> bool:
-        """Whether another address sends this message while the first one does; see J1939."""
+        """Return whether a second J1939 address sends this message while the first one does."""
         if source != self.source:
             if now_ns - self.source_ns <= self.of.timeout_ns:
                 return True
@@ -95,15 +97,15 @@ class Received:
         return False
 
     def lost(self, now_ns: int) -> bool:
-        """Whether it is not known what it says now."""
+        """Return whether the message is older than its timeout, or never came."""
         return self.good_ns is None or now_ns - self.good_ns > self.of.timeout_ns
 
     def forget(self) -> None:
-        """Nothing received so far counts."""
+        """Let no frame received so far count."""
         self.good_ns, self.intact_ns = None, NEVER
 
     def carry_over(self, before: "Received", *, missed: bool) -> None:
-        """Go on where it was before a reload; ``missed`` where its bus was closed meanwhile."""
+        """Continue the state before a reload; ``missed``: its bus was closed meanwhile."""
         self.source, self.source_ns = before.source, before.source_ns
         self.intact_ns = NEVER if missed else before.intact_ns
         if self.of.protection == before.of.protection:
@@ -114,20 +116,20 @@ class Received:
 
 
 class SwitchState:
-    """One switch, as it was seen, and the axes that it stops."""
+    """State of one switch, and the axes that it stops."""
 
     def __init__(
         self, switch: Switch, received: Received, axes: Sequence[AxisInput], *, emergency: bool
     ) -> None:
         self.of, self.received, self.axes = switch, received, axes
-        self.emergency = emergency  # it latches at rest too
-        self.on = False  # it agrees in the last frame that counts
-        self.released = False  # by the last frame that says so or, if it counts, otherwise
-        self.was_off = False  # it was seen released since it was pressed last
-        self.press = NEVER  # ticks that were made before that, or before reset was
+        self.emergency = emergency  # an emergency stop, which latches at rest too
+        self.on = False  # whether it is on in the last frame that counts
+        self.released = False  # set by any frame that says so, cleared only by one that counts
+        self.was_off = False  # whether it was seen released since its last press
+        self.press = NEVER  # ``made`` at its last press, or at the last press of reset
 
     def take(self, word: Word, made: int, *, counts: bool, stood: bool) -> None:
-        """Take a frame. One that has waited in a standstill is no press."""
+        """Receive a frame; a frame that has waited during a standstill is no press."""
         of = self.of
         raw = of.field.raw(word)
         on = raw == of.on
@@ -146,23 +148,23 @@ class SwitchState:
                     self.press = made
 
     def off(self, now_ns: int) -> bool:
-        """Whether it does not agree now, or is not known to."""
+        """Return whether the switch is off now, or its state is not known."""
         return self.released or self.received.lost(now_ns)
 
 
 class JoystickState:
-    """One joystick, and the switches that enable it; the first one is the one that is pressed."""
+    """State of one joystick and of the switches that enable it; the operator presses the first."""
 
     def __init__(self, joystick: Joystick, received: Received, *switches: SwitchState) -> None:
         self.of, self.received = joystick, received
         self.pressed, *self.others = switches
         self.was_reset = True
-        self.bypassed, self.flips = False, 0  # anti-sway was off; how often that has changed
-        self.gone = ""  # why nothing that it moves may move in this tick, at once
-        self.valid = False  # it may be used in this tick
+        self.bypassed, self.flips = False, 0  # anti-sway is off; how often that has changed
+        self.gone = ""  # why all its axes have to stop at once in this tick, or empty
+        self.valid = False  # whether its demand may be used in this tick
 
     def take(self, word: Word, made: int, *, stood: bool) -> None:
-        """Take a frame of it that counts. One that has waited in a standstill is no press."""
+        """Receive a frame that counts; one that has waited during a standstill is no press."""
         of = self.of
         bypassed = of.bypass is not None and of.bypass.raw(word) == 1
         self.flips += bypassed is not self.bypassed
@@ -174,7 +176,7 @@ class JoystickState:
             self.was_reset = reset
 
     def look(self, now_ns: int) -> None:
-        """Find whether it may be used in this tick."""
+        """Find whether the joystick may be used in this tick, and whether its axes have to stop."""
         pressed, lost = self.pressed, self.received.lost(now_ns)
         own = pressed.received is self.received
         gone = pressed.released if own else pressed.off(now_ns)

@@ -1,6 +1,6 @@
 """The gate's record of a machine: identifiers, bits and limits. ``build.py`` fills it in once.
 
-Nothing here changes while the machine runs but three limits of an axis, see ``Gate.set``.
+While the machine runs only three limits and ``full_m_s`` of an axis may change (``Gate.set``).
 """
 
 import math
@@ -18,13 +18,13 @@ Key = tuple[str, int, bool]
 class Protection:
     """Protection of a message."""
 
-    check: Checksum | E2e | None = None  # of its content; None for nothing, or what is not known
-    known: bool = True  # whether the gate knows its checksum; of another package it does not
+    check: Checksum | E2e | None = None  # of the content; None without one, or one not known
+    known: bool = True  # whether the gate knows the checksum; not that of another package
     counter: Field | None = None  # alive counter; with E2E it is in the header
-    counts: int = 0  # its values
+    counts: int = 0  # number of values of the counter; 0 without one
 
     def right(self, data: bytes) -> bool:
-        """Whether a frame of the right length carries what it should."""
+        """Return whether the checksum or E2E header of a frame of the right length is right."""
         return self.check is None or self.check.right(data)
 
     def count(self, data: bytes, word: Word) -> int:
@@ -36,7 +36,7 @@ class Protection:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message that is received."""
+    """A received message."""
 
     name: str
     bus: str
@@ -45,35 +45,33 @@ class Message:
     length: int
     timeout_ns: int
     protection: Protection
-    most_step: int = 0  # largest step of the counter that is still the next one
+    most_step: int = 0  # largest good step of the counter
     qualify: int = 1  # good frames in a row that are needed at the start and after a wrong one
-    # Of a multiplexed message the multiplexor, and its value in the frames that are meant; and
-    # whether counter or checksum are in these frames only.
-    page: tuple[Field, int] | None = None
-    alone: bool = False
-    group: tuple[int, int] | None = None  # instead of identifiers mask and value of the group
+    page: tuple[Field, int] | None = None  # multiplexor, and its value in the frames that count
+    alone: bool = False  # whether counter or checksum are in these frames only
+    group: tuple[int, int] | None = None  # (mask, value) of a J1939 group, instead of ``ids``
     own: int = -1  # our own address on that bus, which no one else may use; -1 for none
 
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """A switch that has to agree."""
+    """A switch that has to be on."""
 
-    message: str  # by name
+    message: str  # name of its message
     field: Field
-    on: int  # raw value that agrees
-    only_zero: bool = False  # only 0 says that it is released; another value is an error code
+    on: int  # raw value that means on
+    only_zero: bool = False  # only 0 means released; any other value but ``on`` is an error code
 
 
 @dataclass(frozen=True, slots=True)
 class Joystick:
-    """A joystick."""
+    """A joystick with its switches."""
 
-    message: str  # by name
-    pressed: Switch  # enables it, by a press
-    others: tuple[Switch, ...]  # that enable it too
-    reset: Field | None  # resets a trip
-    bypass: Field | None  # switches anti-sway off
+    message: str  # name of its message
+    pressed: Switch  # switch that the operator presses to enable it
+    others: tuple[Switch, ...]  # further switches that have to be on
+    reset: Field | None  # signal that resets a trip
+    bypass: Field | None  # signal that switches anti-sway off
     stuck_ns: int  # longest deflection without a change
 
 
@@ -81,12 +79,12 @@ class Joystick:
 class Axis:
     """One axis and its limits. Speeds are parts of full speed, times are periods of its valve.
 
-    A distance is full speed times seconds, where it is not in m.
+    Distances are full speed times seconds, except those in m.
     """
 
     name: str
-    joystick: str  # by name
-    signal: str  # of the joystick, as the file names it
+    joystick: str  # name of its joystick
+    signal: str  # signal of its velocity in the file
     stick: Stick
     valve: Key
     command: Command
@@ -96,39 +94,39 @@ class Axis:
     maximum: float  # fastest output
     rise: float  # fastest change of the output in a period
     fall: float
-    tail: int  # for how long the output may stay as fast as was asked
+    tail: int  # how long the output may stay as fast as was demanded before
     stop: int  # longest shaped stop
     silent: int  # ticks without a frame after which the valve closes
-    faster: bool  # the file allows more than was asked
-    reverse: bool  # and against it
-    reversal: int  # for how long the output may run on against a stick that is held
-    slack: float  # distance that a sound filter may run ahead of what was asked
+    faster: bool  # the file allows an output faster than the demand
+    reverse: bool  # the file allows an output against the demand
+    reversal: int  # how long the output may run on against a joystick that is held
+    slack: float  # distance by which a sound filter may run ahead of the demand
     forwarded: bool  # its command leaves in the frames of its own joystick, through a gateway
     partner: str = ""  # axis that adds velocity to this one; empty for none
-    added: float = 0.0  # largest velocity that is added where no one asks
-    most_periods: int = 0  # longest motion of that kind
-    path_m: float = 0.0  # farthest way of it; 0 for no bound
+    added: float = 0.0  # largest velocity that a partner may add without a demand
+    most_periods: int = 0  # longest motion by added velocity
+    path_m: float = 0.0  # longest path by added velocity; 0 for no bound
     full_m_s: float = 1.0
-    stop_m: float = math.inf  # farthest way of the tip when it stops
-    tip_m_s: float = 0.0  # full speed of the tip where that is not ``full_m_s``
-    # Ends of the numbers that may be set while the machine runs, as in the file.
+    stop_m: float = math.inf  # longest stopping distance of the tip
+    tip_m_s: float = 0.0  # full speed of the tip; 0 where it is ``full_m_s``
+    # (low, high) of each number that may be set while the machine runs, as in the file.
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    step: float = field(init=False)  # most that one step of the frame changes the velocity
-    path: float = field(init=False)  # ``path_m`` and ``stop_m`` as a distance
-    run_on: float = field(init=False)
+    step: float = field(init=False)  # largest change of velocity by one step of the frame
+    path: float = field(init=False)  # ``path_m`` as a distance in full speed times seconds
+    run_on: float = field(init=False)  # ``stop_m`` as such a distance
 
     def __post_init__(self) -> None:
         self.step = max(slope for one in self.openings for slope in one.slopes)
         self._scale()
 
     def velocity(self, steps: int) -> float:
-        """Part of full speed that a command of so many steps gives."""
+        """Return the part of full speed for a command in signed steps."""
         if steps > 0:
             return self.openings[0].velocity(steps)
         return -self.openings[1].velocity(-steps) if steps else 0.0
 
     def set(self, key: str, value: float) -> None:
-        """Change a number, never beyond the range of the file; without one it stays."""
+        """Change a number, clamped to its range in the file; a number without a range stays."""
         if key not in self.ranges or math.isnan(value):
             return
         low, high = self.ranges[key]
@@ -150,38 +148,38 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Valve:
-    """A valve message: what it looks like apart from its commands. Of bits byte 0 is the lowest."""
+    """A valve message: its bits apart from the commands. In masks of bits byte 0 is the lowest."""
 
     length: int
     axes: tuple[str, ...]
-    fixed: int  # bits that never change
-    fixed_value: int
-    ours: int  # bits that may differ from the joystick's frame that this one was made from
+    fixed: int  # mask of the bits that never change
+    fixed_value: int  # value of these bits
+    ours: int  # mask of the bits that may differ from the joystick's frame (in a gateway)
     protection: Protection
-    # Signals with the values that they may have: control words of CiA 408; and those of a frame of
-    # our own in the place of a joystick's, in which the switch may be 1 only while it is held.
-    words: tuple[tuple[Field, frozenset[int]], ...] = ()
+    words: tuple[tuple[Field, frozenset[int]], ...] = ()  # control words of CiA 408, their values
+    # For a frame of our own in place of a joystick's: signals with the values that they may have,
+    # and the enabling switch, which may be 1 only while it is held.
     own: tuple[tuple[Field, frozenset[float]], ...] = ()
     enable: Field | None = None
-    group: int = 0  # mask of its group in J1939, which no other address may send; 0 for none
+    group: int = 0  # mask of its J1939 group, which no other address may send; 0 for none
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """All that the gate knows."""
+    """All that the gate knows of a machine."""
 
     messages: dict[str, Message]
     joysticks: dict[str, Joystick]
     axes: dict[str, Axis]
     valves: dict[Key, Valve]
     stop: Switch | None  # the emergency stop
-    others: dict[Key, tuple[frozenset[int], frozenset[bytes]]]  # may leave: lengths, contents
-    places: dict[str, Hashable]  # interface and channel of each bus, whatever the file calls it
+    others: dict[Key, tuple[frozenset[int], frozenset[bytes]]]  # other messages: lengths, contents
+    places: dict[str, Hashable]  # interface and channel of each bus, by its name in the file
     listens: bool = False  # another controller sends the valve frames, and none of ours leaves
 
     @property
     def unchecked(self) -> list[str]:
-        """Messages whose checksum is of another package, which the gate does not know."""
+        """Messages whose checksum another package computes, so that the gate cannot check it."""
         received = [name for name, one in self.messages.items() if not one.protection.known]
         valves = [one for one in self.valves.values() if not one.protection.known]
         return received + [f"the valve of {' and '.join(one.axes)}" for one in valves]

@@ -1,7 +1,8 @@
 """The ten rules: each a function of what was received, what left before, and now.
 
-1 and 2 say why an axis has to stop, 3 to 7 why a velocity may not leave, 8 and 9 why a frame may
-not, 10 why an identifier may not. Empty text, or None for no fault, is that it may.
+Rules 1 and 2 decide whether an axis has to stop, 3 to 7 whether a velocity may leave, 8 and 9
+whether a frame may leave, 10 whether an identifier may leave. Each rule from 3 on returns the
+reason for its refusal; an empty text means that it refuses nothing.
 """
 
 from canshaper.gate.axis import FOREIGN_NS, ROUNDING, UP, AxisState, ValveState
@@ -10,13 +11,15 @@ from canshaper.gate.received import SwitchState
 from canshaper.gate.record import Key, Record
 
 OTHERS = 8
-"""Frames in a tick of a message that is no valve's: answers to others come several at once."""
+"""Most frames in a tick of one message that is no valve's: we may answer several nodes at once."""
 
 
 def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool]:
-    """Rule 1: enable, emergency stop, a second sender; limit: none, seen once is enough.
+    """Rule 1: enable, emergency stop, second sender; no limit: a reason seen once is enough.
 
-    And whether that latches at rest too; in motion it always does.
+    Returns:
+        The reason to stop at once, or empty; and whether it latches at rest too. In motion it
+        always latches.
     """
     why, latches = axis.hard, axis.latches
     if stop is not None and stop.off(now_ns):
@@ -27,13 +30,13 @@ def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tupl
 
 
 def demand_of(axis: AxisState, now_ns: int) -> float | None:
-    """Rule 2: the demand; None for silence, error codes, a frozen stick; limit: the timeout."""
+    """Rule 2: the demand; None for silence, error codes, a frozen joystick; limit: the timeout."""
     demand, joystick = axis.demand, axis.joystick
     if demand is None or axis.lost or not joystick.valid:
         return None
     if now_ns - axis.changed_ns > joystick.of.stuck_ns and abs(demand) > axis.of.stick.band:
         return None
-    if axis.ramp is not None:  # a touch of the joystick ends it; it begins armed
+    if axis.ramp is not None:  # a measurement: a touch of the joystick ends it; it begins armed
         if abs(demand) > axis.of.stick.band:
             return None
         return axis.ramp if axis.armed else demand
@@ -41,17 +44,17 @@ def demand_of(axis: AxisState, now_ns: int) -> float | None:
 
 
 def neutral_first(axis: AxisState) -> str:
-    """Rule 3: armed, or in its shaped stop; limit: ``stop_s``."""
+    """Rule 3: an axis moves only while armed, or in its shaped stop; limit: ``stop_s``."""
     if axis.hard or not (axis.armed or axis.stop_left):
         return f"limit=stopped why={axis.hard or axis.why}"
     return ""
 
 
 def bounds(axis: AxisState) -> tuple[float, float]:
-    """Rule 4: what may leave in each direction; limit: the demand within the tail, ``max_pct``.
+    """Rule 4: return the velocities that may leave; limits: demand within the tail, ``max_pct``.
 
-    Against a stick that is held for ``reversal_s`` only, but in a shaped stop. Beyond the demand
-    what a partner adds.
+    Against a joystick that is held, the output may run on for ``reversal_s`` only, except in a
+    shaped stop. Beyond the demand, only what a partner may add may leave.
     """
     of, now = axis.of, axis.now
     least, most = -axis.back.most, axis.forth.most
@@ -74,7 +77,7 @@ def bounds(axis: AxisState) -> tuple[float, float]:
 
 
 def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
-    """Rule 4: within ``bounds``, or on its way back there, lower with each frame."""
+    """Rule 4: a velocity is within ``bounds``, or on its way back there, lower with each frame."""
     size = abs(velocity)
     reach = axis.most if velocity > 0.0 else 0.0 - axis.least
     if size > reach + EPSILON and size > fallen + EPSILON:
@@ -83,11 +86,11 @@ def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
 
 
 def rise(axis: AxisState, velocity: float, ticks: int) -> str:
-    """Rule 5: limit: ``rise_per_s``, and rounding; one period a frame."""
+    """Rule 5: the output rises no faster than ``rise_per_s`` and rounding, one period a frame."""
     of, last = axis.of, abs(axis.last)
     step, most = of.step, of.rise * ticks
     if velocity * axis.last >= 0.0:
-        highest = axis.top + most + UP * step  # ``top`` has the rounding down
+        highest = axis.top + most + UP * step  # ``top`` includes the rounding down
     else:  # a part of the time goes by on the way to zero
         left = 1.0 - max(last - step, 0.0) / (of.fall * max(ticks, 1))
         highest = max(left, 0.0) * most + ROUNDING * step
@@ -95,7 +98,7 @@ def rise(axis: AxisState, velocity: float, ticks: int) -> str:
 
 
 def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
-    """Rule 6: limit: ``fall_per_s``, and rounding; neutral ends the motion instead."""
+    """Rule 6: the output falls no faster than ``fall_per_s`` and rounding, except to neutral."""
     of, size = axis.of, abs(velocity) if velocity * axis.last >= 0.0 else 0.0
     least = abs(axis.last) - of.fall * max(ticks, 1) - ROUNDING * of.step - EPSILON
     if size < least and size < least - axis.dropped(made):
@@ -104,10 +107,10 @@ def fall(axis: AxisState, velocity: float, ticks: int, made: int) -> str:
 
 
 def distance(axis: AxisState, velocity: float) -> str:
-    """Rule 7: no farther than was asked and not yet run; limit: the slack of its filter.
+    """Rule 7: the axis runs no farther than the demanded distance it has left; limit: the slack.
 
-    Beyond the demand no farther than ``stop_distance_m``.
-    Where nothing was asked within the tail a partner moves it: limits are its path and its time.
+    Beyond the demand the axis runs no farther than ``stop_distance_m``. Without a demand within the
+    tail only a partner moves it: limits are path and time of the added velocity.
     """
     of, asked = axis.of, axis.forth if velocity > 0.0 else axis.back
     size = abs(velocity)
@@ -128,7 +131,7 @@ def distance(axis: AxisState, velocity: float) -> str:
 
 
 def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
-    """Why a velocity that is not 0 may not leave: rules 3 to 7."""
+    """Return why a velocity other than 0 may not leave, by rules 3 to 7; empty if it may."""
     ticks = axis.ticks if axis.of.forwarded else 1
     fallen = axis.fallen(velocity, min(ticks, 1))
     why = (
@@ -137,7 +140,7 @@ def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
         or rise(axis, velocity, ticks)
         or fall(axis, velocity, ticks, made)
     )
-    # What falls is on its way back, however far that is.
+    # An output that falls is on its way back, which counts no distance.
     if not why and abs(velocity) > fallen + EPSILON:
         why = distance(axis, velocity)
     return f"axis={axis.of.name} {why} speed={velocity:.3f}" if why else ""
@@ -146,10 +149,10 @@ def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
 def bytes_refused(
     valve: ValveState, data: bytes, word: Word, of: bytes | None, *, last: bool = False
 ) -> str:
-    """Rule 8: length, bits that are not ours, values of a word, checksum; limit: none.
+    """Rule 8: length, bits that are not ours, control words and checksum are right; no tolerance.
 
-    In a gateway it was made ``of`` a frame of the joystick, or is one of our own: enable is on in
-    that only while it is held and an axis may move, and not in the ``last`` one.
+    In a gateway the frame was made ``of`` a joystick's frame, or (None) is our own: enable may be
+    on in our own only while it is held and an axis may move, and not in the ``last`` frame.
     """
     record = valve.of
     if len(data) != record.length:
@@ -174,7 +177,7 @@ def bytes_refused(
 
 
 def turn_refused(valve: ValveState, count: int, *, due: bool) -> str:
-    """Rule 9: one frame in the tick in which it is due, with the next alive counter."""
+    """Rule 9: one frame leaves in the tick in which it is due, with the next alive counter."""
     if not due:
         return "limit=one frame a tick"
     counts = valve.of.protection.counts
@@ -184,9 +187,9 @@ def turn_refused(valve: ValveState, count: int, *, due: bool) -> str:
 
 
 def other_refused(record: Record, key: Key, data: bytes, sent: int) -> str:
-    """Rule 10: nothing leaves that is not in the file, or not as the file has it.
+    """Rule 10: a message that is no valve's leaves only as the file has it.
 
-    Limit: ``OTHERS`` frames of an identifier in a tick, and one for each content that is given.
+    Limit: ``OTHERS`` frames of an identifier in a tick, and one more for each permitted content.
     """
     allowed = record.others.get(key)
     if allowed is None:

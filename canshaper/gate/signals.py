@@ -1,4 +1,4 @@
-"""Signals, as cantools has loaded them, to fields, scales, sticks and commands of the gate."""
+"""Converts signals that cantools has loaded to fields, scales, sticks and commands of the gate."""
 
 import math
 from typing import Any
@@ -7,19 +7,19 @@ from canshaper.gate.fields import EPSILON, Command, Field, Part, Resolution, Sti
 
 REALS = {16: "<e", 32: "<f", 64: "<d"}
 NEUTRAL = ("neutral", "neutralposition", "center", "centre", "zero", "released")
-"""Names of a code that is a measurement where its value is 0."""
+"""Names of codes that are measurements if their value is 0."""
 
 
 def signal_of(message: Any, name: str) -> Any:
-    """The signal of that name."""
+    """Return the signal of that name."""
     return next(signal for signal in message.signals if signal.name == name)
 
 
 def field_of(message: Any, name: str) -> Field:
-    """Where a signal lies in its message."""
+    """Return the field of a signal: its bits in the message."""
     signal = signal_of(message, name)
     big = signal.byte_order == "big_endian"
-    # Of Intel ``start`` is the lowest bit; of Motorola the highest, counted within its byte.
+    # ``start`` is the lowest bit in Intel order; in Motorola order the highest, within its byte.
     first = signal.start // 8 * 8 + 7 - signal.start % 8
     shift = 8 * message.length - first - signal.length if big else signal.start
     sign = 1 << signal.length - 1 if signal.is_signed and not signal.is_float else 0
@@ -28,19 +28,19 @@ def field_of(message: Any, name: str) -> Field:
 
 
 def bits_of(field: Field, length: int, raw: int = -1) -> int:
-    """Where a field lies in a frame of so many bytes, byte 0 the lowest; or a value of it."""
+    """Return the bits of a field (all, or a raw value) in a frame of ``length``, byte 0 lowest."""
     placed = (raw & field.mask) << field.shift
     return int.from_bytes(placed.to_bytes(length, "big" if field.order else "little"), "little")
 
 
 def ends_of(signal: Any) -> tuple[int, int]:
-    """Smallest and largest raw value that the bits of an integer signal hold."""
+    """Return the smallest and largest raw value that the bits of an integer signal hold."""
     low = -(1 << signal.length - 1) if signal.is_signed else 0
     return low, low + (1 << signal.length) - 1
 
 
 class Scale:
-    """Scale, offset, range and full scale of a velocity: of the DBC, as the file corrects them."""
+    """Scale, offset, range and full scale of a velocity, by the DBC with the file's corrections."""
 
     def __init__(self, signal: Any, section: Any, *, magnitude: bool) -> None:
         full, zero, invert = (
@@ -65,9 +65,9 @@ class Scale:
 
 
 def part_of(field: Field, signal: Any, section: Any) -> Part:
-    """A signal of a joystick, as the DBC has it; a code with a name is no measurement.
+    """Return the reader of a joystick's signal; a code with a name in the DBC is no measurement.
 
-    Whatever the name; but for those that the file lists as a value, and neutral at exactly 0.
+    Exceptions are codes that the file lists as a value, and a name for neutral at exactly 0.
     """
     of = Scale(signal, section, magnitude=bool(section.flags or section.negative))
     listed, named = section.codes, set()
@@ -81,7 +81,7 @@ def part_of(field: Field, signal: Any, section: Any) -> Part:
 
 
 def stick_of(message: Any, command: Any, in_dbc: Any) -> Stick:
-    """The demand of an axis in the message of its joystick; ``in_dbc`` has it uncorrected."""
+    """Return the reader of an axis' demand; ``in_dbc`` is its joystick's uncorrected message."""
     part, *back = (
         part_of(field_of(message, name), signal_of(in_dbc, name), command)
         for name in filter(None, (command.signal, command.negative))
@@ -93,7 +93,7 @@ def stick_of(message: Any, command: Any, in_dbc: Any) -> Stick:
 
 
 def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
-    """The command of an axis in its valve's message; ``joystick`` where that is one of its own."""
+    """Return the reader of a command; ``joystick``: section command if its frame carries it."""
     names: tuple[str, ...] = ()
     signs: dict[tuple[float, ...], int] = {}
     if one := valve.direction:
@@ -119,7 +119,7 @@ def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
 
 
 def start_of(signal: Any, *, j1939: bool) -> float:
-    """Raw value of a signal that no one sets: GenSigStartValue; else in J1939 all ones, or 0."""
+    """Return the raw value of an unset signal: GenSigStartValue; else all ones in J1939, or 0."""
     if signal.is_float:
         return float(signal.raw_initial or 0.0)
     low, high = ends_of(signal)
@@ -129,7 +129,7 @@ def start_of(signal: Any, *, j1939: bool) -> float:
 
 
 def rest_of(signal: Any) -> set[float]:
-    """Raw value 0 of a velocity, which asks for nothing either."""
+    """Return the raw value at zero of a signed velocity, which demands nothing; else no value."""
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or not low < 0 < high:
         return set()

@@ -1,4 +1,4 @@
-"""Axes of a deployment, bound to the DBC: valve, filters, status, and what they require."""
+"""Binds the axes of a deployment to the DBC: valve, filters, status, and checks of each."""
 
 from dataclasses import replace
 
@@ -15,9 +15,9 @@ from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 
 def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
-    """Bind the axes; return those without a problem, by name."""
+    """Bind the axes; return every axis without a problem, by name."""
     shared_valves: SharedValves = {}
-    # A slewing axis acts first: where it trips, nothing of it is in the other one's next output.
+    # A slewing axis acts first: when it trips, the other axis adds nothing for it in the same tick.
     slewing = {motion.slew for motion in lookup.config.motion.values()}
     order = sorted(lookup.config.axes.items(), key=lambda item: item[0] not in slewing)
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}

@@ -55,7 +55,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
 
     Args:
         path: the deployment file.
-        inside: read no DBC file outside of this directory, where somebody else made the file.
+        inside: directory outside of which no DBC file is read, for files that others made.
 
     Raises:
         ConfigError: with every problem of all files.
@@ -127,7 +127,7 @@ def _check_crane(lookup: Lookup) -> None:
 
 
 def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None]) -> None:
-    """Check what is known when all parts are bound."""
+    """Check what can only be checked when all parts are bound."""
     diagnostics, config = lookup.diagnostics, lookup.config
     lookup.check_groups()
     check_ids(lookup)
@@ -139,7 +139,7 @@ def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None
 
 
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
-    """Bind the switch that says which profile is in force, where there is one."""
+    """Bind the switch that selects the profile, if the file has one."""
     config = lookup.config.profile
     profile = bind_switch(lookup, ("profile",), config) if config else None
     if profile and config:
@@ -159,9 +159,9 @@ def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
 
 
 def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
-    """Return lines that name the packages whose checksums and filters may run.
+    """Return the log lines of the packages whose checksums or filters this machine may run.
 
-    The filters of breakpoints are of the kind of their axis or profile.
+    Breakpoints add no filter kind: they have the kind of their axis or profile.
     """
     checksums = {s.checksum.kind or "" for s in protected_sections(config) if s.checksum}
     axes = config.axes.values()
@@ -178,7 +178,7 @@ def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
 def _check_values(
     lookup: Lookup, switch: BoundValue[Choosing], values: Mapping[Place, float]
 ) -> None:
-    """Report values that the DBC names as an error: they are never used, so they choose nothing."""
+    """Report values of the file that the DBC names as an error, as they never select anything."""
     signal = switch.signal
     for place, value in values.items():
         if name := special_name(signal, value):
@@ -186,7 +186,7 @@ def _check_values(
             lookup.diagnostics.add(place, f"{text}, got {value:g}, {name}")
 
 
-# Groups with which nodes of J1939 speak of addresses, and in which they send long messages.
+# J1939 groups of address management and of the transport protocol for long messages.
 PROTOCOL = {
     REQUEST: "request",
     CLAIMED: "address claim",
@@ -197,7 +197,7 @@ PROTOCOL = {
 
 
 def check_names(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that no two parts have one name but for case and spaces, as a person reads them."""
+    """Check that no two names differ only in case and spaces, as a person would confuse them."""
     for key, what in (
         ("buses", "bus"),
         ("joysticks", "joystick"),
@@ -212,9 +212,9 @@ def check_names(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_ids(lookup: Lookup) -> None:
-    """Check that no message has an id of another one, or of our own node on J1939.
+    """Check that no message has the id of another message, or of our own node on J1939.
 
-    Of messages of one kind with the same id ``Lookup.message`` says it.
+    It compares J1939 with other messages; ``Lookup.message`` compares messages of one kind.
     """
     seen: dict[tuple[str, int], UsedMessage] = {}
     for (bus, _, extended), used in lookup.used.items():
@@ -232,7 +232,7 @@ def check_ids(lookup: Lookup) -> None:
 
 
 def _fault_of_node(lookup: Lookup, bus: str, used: UsedMessage) -> str | None:
-    """Why a message is one that our own node sends or waits for, or None."""
+    """Return a fault if our own J1939 node sends or waits for this message; else None."""
     own = lookup.own_address(bus)
     if own is None:
         return None
@@ -248,7 +248,7 @@ def _fault_of_node(lookup: Lookup, bus: str, used: UsedMessage) -> str | None:
 
 
 def _check_sources(lookup: Lookup) -> None:
-    """Check that a message from any source address is not also one from a certain address."""
+    """Check that a group is not received from any source address and also from a certain one."""
     read = [
         (bus, used)
         for (bus, _, _), used in lookup.used.items()

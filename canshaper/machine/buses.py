@@ -1,4 +1,4 @@
-"""Buses and gateway of a deployment file: options, contradictions, load."""
+"""Checks of buses and gateway of a deployment file: options, contradictions; load of a bus."""
 
 from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
@@ -24,18 +24,18 @@ LONGEST_NAME = 15
 ALWAYS_FD = frozenset(("udp_multicast", "virtual"))
 # Interfaces that take bit rate and switch of CAN FD without such a parameter (python-can 4.6).
 UNNAMED_FD = frozenset(("kvaser", "neovi"))
-# Parameters that stand elsewhere in the file, or that the program sets.
+# Parameters of python-can that other keys of the file give, or that the program sets.
 OURS = frozenset(("channel", "bitrate", "can_filters", "receive_own_messages"))
 OURS |= {"fd", "data_bitrate"}
 
-# Types where python-can does not name them.
+# Types of parameters that python-can does not annotate.
 UNTYPED = {"host": str, "port": int}
 
 
 def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
-    """Yield the faults of interface and options of a bus: the key in its section, and why.
+    """Yield (key in the section of the bus, fault) for its interface and options.
 
-    An interface whose module cannot be imported here is left to the daemon that opens it.
+    Options of an interface whose module cannot be imported here are not checked.
     """
     if bus.interface == "socketcan":
         if bus.options:
@@ -73,7 +73,7 @@ def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
 
 
 def _fd_faults(bus: Bus, parameters: Container[str]) -> Iterator[tuple[Place, str]]:
-    """Yield why an interface with these parameters cannot carry CAN FD as a bus has it."""
+    """Yield (key, fault) where an interface with these parameters lacks the bus's CAN FD keys."""
     if bus.interface in ALWAYS_FD | UNNAMED_FD:
         return
     for key, used in (("fd", bus.fd), ("data_bitrate", bus.fd and bus.data_bitrate)):
@@ -82,7 +82,7 @@ def _fd_faults(bus: Bus, parameters: Container[str]) -> Iterator[tuple[Place, st
 
 
 def _kinds(opens: Any) -> dict[str, Any]:
-    """Types of the parameters, where the interface has them."""
+    """Return the annotated types of the parameters, by name."""
     try:
         return get_type_hints(opens)
     except Exception:  # names that only a type checker knows
@@ -90,12 +90,12 @@ def _kinds(opens: Any) -> dict[str, Any]:
 
 
 def _value_fault(kind: Any, value: object) -> str | None:
-    """Why a value is none of a parameter's type; None where it is, or may be."""
+    """Return why a value does not have a parameter's type; None where it does, or may."""
     if kind is None:
         return None
     try:
         TypeAdapter(kind).validate_python(value, strict=True)
-    except PydanticSchemaGenerationError:  # a class of python-can, which makes it of what it gets
+    except PydanticSchemaGenerationError:  # a class of python-can, which converts the value itself
         return None
     except ValidationError:
         expected = kind.__name__ if isinstance(kind, type) else str(kind)
@@ -104,7 +104,7 @@ def _value_fault(kind: Any, value: object) -> str | None:
 
 
 def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that channels, devices, our J1939 node and nodes of CANopen are distinct."""
+    """Check every bus: its keys and options, and that no two share channel, device or NAME."""
     add = diagnostics.add
     channels: dict[tuple[str, str], str] = {}
     names: dict[J1939Name, str] = {}
@@ -137,7 +137,7 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, bus: Bus) -> None:
-    """Check what can be known of a device while it is not there."""
+    """Check the section ``match`` of a bus, as far as possible without the device."""
     if bus.match is None:
         return
     place = ("buses", name, "match")
@@ -169,7 +169,7 @@ def _check_fd(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
 
 
 def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
-    """Check that ids of nodes of CANopen are used once."""
+    """Check that no two CANopen nodes of a bus have the same id."""
     if bus.canopen is None:
         return
     owners = {bus.canopen.node: "node"}
@@ -184,9 +184,9 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[SentMessage]) -
     """Check the gateway against the buses, the messages and the valves that it forwards to.
 
     Args:
-        lookup: what it is bound with.
+        lookup: shared data of the deployment.
         gateway: the gateway.
-        valves: messages of the valves that are bound.
+        valves: messages of the bound valves.
     """
     add, buses = lookup.diagnostics.add, lookup.config.buses
     for i, bus in enumerate(gateway.between):
@@ -220,19 +220,19 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[SentMessage]) -
             )
 
 
-# A bus that is busier lets frames of low priority wait for several others.
+# Load above which a frame of low priority may wait for several others.
 BUSY = 0.5
 
 
 def longest_frame_bits(extended: bool, length: int) -> int:
-    """Bits of a data frame of ``length`` bytes with all stuff bits, and the space behind it."""
+    """Return the bits of a data frame with all stuff bits and the interframe space."""
     if extended:
         return 67 + 8 * length + (53 + 8 * length) // 4
     return 47 + 8 * length + (33 + 8 * length) // 4
 
 
 def longest_fd_bits(extended: bool, length: int) -> tuple[int, int]:
-    """Return the bits of a CAN FD frame at the rate of the bus, and at that of the data."""
+    """Return the bits of a CAN FD frame at the nominal bit rate, and at the data bit rate."""
     head = 36 if extended else 17
     stuffed_head = (head - 1) // 4
     content = 5 + 8 * length
@@ -245,8 +245,8 @@ class BusLoad:
     """Load of one bus.
 
     Attributes:
-        share: part of its time, 1 is all of it.
-        messages: how many cyclic messages that is.
+        share: part of the time in which the bus is busy, 0 to 1 (more is overload).
+        messages: number of cyclic messages that make the load.
     """
 
     share: float
@@ -254,12 +254,12 @@ class BusLoad:
 
 
 def bus_load(messages: Iterable[Message], bitrate: int, data_bitrate: int | None = None) -> BusLoad:
-    """Load by messages with their cycles; those without one do not count.
+    """Return the load of a bus by its cyclic messages; messages without a cycle do not count.
 
     Args:
-        messages: what is sent on the bus.
-        bitrate: bit/s.
-        data_bitrate: of the data of CAN FD, where it is another.
+        messages: messages on the bus.
+        bitrate: bit rate, bit/s.
+        data_bitrate: bit rate of the data of CAN FD, bit/s, where it is another.
     """
     cyclic = [m for m in messages if m.cycle_time]
     share = 0.0

@@ -1,4 +1,4 @@
-"""Corrections of the deployment file, where the DBC has nothing, or something wrong."""
+"""Corrections that the deployment file makes where the DBC states nothing, or a wrong value."""
 
 import re
 from collections import OrderedDict
@@ -21,14 +21,14 @@ from canshaper.machine.named_codes import Listing
 
 @dataclass(frozen=True)
 class Correction:
-    """Scaling of a signal; one with ``magnitude`` has no negative values."""
+    """Scaling that the file gives to a signal; with ``magnitude`` it has no negative values."""
 
     scaling: Scaling
     magnitude: bool
 
 
 def scalings(config: DeploymentConfig, bus: str, message: str) -> dict[str, Correction]:
-    """Signals of a message whose scaling stands in the deployment file, by name."""
+    """Return the signals of a message whose scaling the deployment file corrects, by name."""
     result: dict[str, Correction] = {}
     for axis in config.axes.values():
         command, valve = axis.command, axis.valve
@@ -52,7 +52,7 @@ _BIT = re.compile(r"([^/.]+)/(\d{1,2})")
 
 
 def bit_names(config: DeploymentConfig, bus: str, message: str) -> dict[str, set[int]]:
-    """Bits that the file names as SIGNAL/BIT in a message, by signal."""
+    """Return the bits of a message that the file names as SIGNAL/BIT, by signal."""
     names: list[str] = []
     for _, section in sections(config):
         if isinstance(section, Protected) and (section.bus, section.message) == (bus, message):
@@ -71,7 +71,7 @@ def bit_names(config: DeploymentConfig, bus: str, message: str) -> dict[str, set
 
 
 def bit_of(signal: Signal, number: int) -> Signal:
-    """One bit of a signal, 0 the lowest, as a switch of its own: SIGNAL/BIT."""
+    """Return one bit of a signal (0 the lowest) as a signal of its own named SIGNAL/BIT."""
     result, at = copy(signal), signal.start
     for _ in range(signal.length - 1 - number if signal.byte_order == "big_endian" else 0):
         at += -1 if at % 8 else 15  # after the lowest bit of a byte comes the highest of the next
@@ -86,7 +86,7 @@ def bit_of(signal: Signal, number: int) -> Signal:
 
 
 def _cut(signal: Signal, bits: Mapping[str, set[int]]) -> list[Signal]:
-    """The bits of a signal that are named, or itself."""
+    """Return the named bits of a signal as signals, or the signal itself if none is named."""
     numbers = sorted(n for n in bits.get(signal.name, ()) if n < signal.length)
     return [bit_of(signal, n) for n in numbers] if numbers and not signal.is_float else [signal]
 
@@ -98,14 +98,14 @@ def corrected(
     listings: Iterable[Listing] = (),
     bits: Mapping[str, set[int]] = MappingProxyType({}),
 ) -> Message | str:
-    """Return the message as it is on the bus of this machine, or why it cannot be.
+    """Return the message with the corrections of the file, or why its multiplexor is wrong.
 
     Args:
-        message: that of the DBC.
-        config: the section that names it.
-        signals: the signals whose scaling it does not have right.
-        listings: which of its named values are measurements.
-        bits: which bits of its signals are switches.
+        message: the message of the DBC.
+        config: the section that names the message.
+        signals: corrected scaling, by signal.
+        listings: which named values of its signals are measurements.
+        bits: which bits of its signals are switches, by signal.
     """
     value = config.multiplexor
     length = frame_length(message)
@@ -136,7 +136,7 @@ def corrected(
 
 
 def chosen(message: Message, config: Protected) -> Chosen | None:
-    """Which frames of a multiplexed message are meant; None where it is not, or cannot be read."""
+    """Return which frames of a multiplexed message the section uses; None where all, or none."""
     signal = multiplexor(message)
     if config.multiplexor is None or signal is None:
         return None
@@ -146,14 +146,14 @@ def chosen(message: Message, config: Protected) -> Chosen | None:
 
 
 def multiplexor(message: Message) -> Signal | None:
-    """The one signal that says which others are there; None where there is none, or several."""
+    """Return the only multiplexor of a message; None where it has none, or several."""
     signals = [s for s in message.signals if s.is_multiplexer]
     chosen_by = {s.multiplexer_signal for s in message.signals if s.multiplexer_ids}
     return signals[0] if len(signals) == 1 and chosen_by <= {signals[0].name} else None
 
 
 def _of_value(message: Message, value: int | None) -> list[Signal] | str:
-    """Signals of a message that are there with this value of its multiplexor."""
+    """Return the signals present at this multiplexor value (None: all), or why it is wrong."""
     if value is None:
         return list(message.signals)
     signal = multiplexor(message)
@@ -178,7 +178,7 @@ def _of_value(message: Message, value: int | None) -> list[Signal] | str:
 
 
 def scaled(signal: Signal, correction: Correction) -> Signal:
-    """The signal with the scaling of the deployment file; its zero is 0."""
+    """Return the signal with the scaling of the deployment file, and 0 at zero command."""
     scaling = correction.scaling
     result = copy(signal)
     result.offset -= scaling.zero or 0.0

@@ -16,7 +16,7 @@ from canshaper.errors import MOST_PROBLEMS, Problem, there_are
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import MOST_MESSAGES, MOST_STATEMENTS, WIDE_ID, Entry, dbc_text
 
-# Of all DBC files of a deployment: five times those of a machine.
+# Most bytes of all DBC files of a deployment: five times those of a machine.
 MOST_BYTES = 16 << 20
 _DEFINITION = re.compile(r"\s*BO_\s+(-?\d{1,10})\s+(\w+)")
 
@@ -26,14 +26,15 @@ class DbcFile:
     """A loaded DBC file.
 
     Attributes:
-        packed: its bytes, by zlib.
-        sha256: of them, in hexadecimal digits.
-        entries: every message that stands in it.
-        messages: those of them that were asked for.
-        warnings: first faults of the other messages.
-        count: how many warnings there are.
-        statements: how many of its statements belong to messages.
-        used_bytes: of what cantools got of it.
+        path: path of the file.
+        packed: content, compressed by zlib.
+        sha256: SHA-256 of the content, in hexadecimal digits.
+        entries: every message of the file.
+        messages: the messages that were loaded.
+        warnings: the first faults of the other messages.
+        count: number of faults of the other messages.
+        statements: number of statements that belong to messages.
+        used_bytes: bytes of text that cantools parsed.
     """
 
     path: Path
@@ -47,13 +48,13 @@ class DbcFile:
     used_bytes: int
 
     def problem(self, message: Message, text: str) -> Problem:
-        """A problem of this file at the line where the message is defined."""
+        """Return a problem of this file at the line that defines the message."""
         number = message.frame_id | (EFF_FLAG if message.is_extended_frame else 0)
         lines = (e.line for e in self.entries if (e.number, e.name) == (number, message.name))
         return Problem(str(self.path), next(lines, None), message.name, text)
 
     def read(self, name: str) -> Message | str:
-        """Another message of it, or why there is none.
+        """Load one more message of the file; return it, or why it cannot be loaded.
 
         Raises:
             OSError: the file cannot be read.
@@ -63,7 +64,7 @@ class DbcFile:
             return "\n".join(str(problem) for problem in problems)
         if file.sha256 != self.sha256:
             return f"{self.path}: has changed since it was read"
-        # Not the same name for cantools: a long one with a line end or a quote in it.
+        # cantools gives it another name: a long name with a line end or a quote in it.
         why = f"{self.path}: {name!r} has another name for the parser"
         return next((m for m in file.messages if m.name == name), why)
 
@@ -71,13 +72,14 @@ class DbcFile:
 def load_dbc(
     path: Path, names: Collection[str] | None = None
 ) -> tuple[DbcFile | None, list[Problem]]:
-    """Load messages of a DBC file strictly; return the file, or its problems.
+    """Load messages of a DBC file strictly; return the file and its problems.
 
-    What is wrong with messages that are not loaded is a warning.
+    The file is None if it, or a named message, cannot be used. Faults of messages that are not
+    loaded are warnings.
 
     Args:
-        path: the file.
-        names: of the messages; by default all that can be loaded, as many as there are.
+        path: path of the file.
+        names: names of the messages to load; by default all that can be loaded.
 
     Raises:
         OSError: the file cannot be read.
@@ -103,7 +105,7 @@ def load_dbc(
         used -= {e.number for e in entries if e.fault} | text.without_type()
         used -= {entry.number for entry, _ in _same_id(entries)}
     rest = text.of(used)
-    # Of a file of messages alone nothing may be left, which cantools would not have as a file.
+    # If no message is used, nothing may be left of the file, and cantools refuses an empty text.
     parsed = parsed_messages(path, rest, bounded=bounded) if rest.strip() or not entries else []
     if isinstance(parsed, Problem):
         if SYNTAX in parsed.message and len(rest) < len(text.data):
@@ -125,7 +127,7 @@ def load_dbc(
 
 
 def too_many(files: Sequence[DbcFile]) -> str | None:
-    """Why the files of a deployment take too long together, or None."""
+    """Return why the DBC files of a deployment are too large together, or None."""
     for what, count, most in (
         ("messages", sum(len(file.entries) for file in files), MOST_MESSAGES),
         ("statements of messages", sum(file.statements for file in files), MOST_STATEMENTS),
@@ -137,9 +139,9 @@ def too_many(files: Sequence[DbcFile]) -> str | None:
 
 
 def _checked(file: DbcFile, *, named: bool) -> tuple[DbcFile | None, list[Problem]]:
-    """The file, and what is wrong with its messages that cantools does not see.
+    """Return the file, and the faults of its messages that cantools does not report.
 
-    Where no one has named the messages those that cannot be used are left out.
+    A faulty message that was named makes the file None; without names it is left out instead.
     """
     problems = []
     loaded = {(message.frame_id, message.is_extended_frame) for message in file.messages}
@@ -169,7 +171,7 @@ def _faults(path: Path, entries: list[Entry], used: set[int]) -> Iterator[Proble
 
 
 def _same_id(entries: list[Entry]) -> Iterator[tuple[Entry, Entry]]:
-    """Messages whose id another one before them has, with that one."""
+    """Yield each message whose id an earlier message has, with the earlier message."""
     seen: dict[int, Entry] = {}
     for entry in entries:
         if entry.number in seen:
@@ -182,7 +184,7 @@ def _same_text(entry: Entry, other: Entry) -> str:
 
 
 def _entries(messages: list[Message], text: str) -> list[Entry]:
-    """Messages of a file that cantools has read as a whole."""
+    """Return the entries of a file that cantools has parsed as a whole."""
     lines: dict[tuple[int, str], int] = {}
     for line, row in enumerate(text.split("\n"), 1):
         if match := _DEFINITION.match(row):
@@ -195,7 +197,7 @@ def _entries(messages: list[Message], text: str) -> list[Entry]:
 
 
 def _id_fault(message: Message) -> str | None:
-    """Why the id of a message is not the one that was meant, or None."""
+    """Return why the id of a message cannot be the intended one, or None."""
     if is_j1939(message) and not message.is_extended_frame:
         return f"is one of J1939 with an id of 11 bits; {WIDE_ID}"
     return None
@@ -217,24 +219,24 @@ class Messages:
         self._loaded = {message.name: message for message in self.all()}
 
     def ids(self) -> set[tuple[int, bool]]:
-        """(id, extended) of every message, whether it is loaded or not."""
+        """Return (id, extended) of every message, whether it is loaded or not."""
         return {entry.key for file in self.files for entry in file.entries}
 
     def all(self) -> list[Message]:
-        """Every message that is loaded."""
+        """Return every loaded message."""
         return [message for file in self.files for message in file.messages]
 
     def named(self, ids: Collection[tuple[int, bool]]) -> list[str]:
-        """Names of the messages with these (id, extended)."""
+        """Return the names of the messages with these (id, extended)."""
         return sorted(e.name for file in self.files for e in file.entries if e.key in ids)
 
     def warnings(self) -> tuple[int, list[Problem]]:
-        """How many faults messages have that are not used, and the first of them."""
+        """Return the number of faults in messages that are not used, and the first of them."""
         problems = [warning for file in self.files for warning in file.warnings]
         return sum(file.count for file in self.files), problems
 
     def find(self, name: str) -> tuple[DbcFile, Message] | str:
-        """The message and its file, or why there is none; one that is not loaded is read now."""
+        """Return a message and its file, or why there is none; load the message if necessary."""
         holders = self._files.get(name, [])
         if not holders:
             text = f"expected a message of the DBC files, got {name!r}"

@@ -11,16 +11,16 @@ from cantools.database.can import Database, Message
 from canshaper.errors import Problem
 from canshaper.machine.dbc_text import WIDE_ID, keyword
 
-# What cantools gets of the files of a deployment: messages that are used, and what is of none.
+# Most bytes of a deployment for cantools: messages that are used, and text of no message.
 MOST_PARSED = 400_000
-# Words of a file that is full of signals; what is no signal takes cantools as long for fewer bytes.
+# Most words, as in a file full of signals; other text costs cantools the same time for fewer bytes.
 MOST_WORDS = 90_000
-# Bytes of all messages: cantools takes 10 us for each, whatever is in it.
+# Most bytes of all messages: cantools takes 10 us for each byte, whatever is in it.
 MOST_PAYLOAD = 100_000
 _MESSAGE = rf"{keyword('BO_')}\s+\d+\s+\w+\s*:\s*"
 _LENGTH = re.compile(rf"{_MESSAGE}(\d{{1,5}})")
-# Bytes of a message, first bit and bits of a signal: cantools makes a list of as many, and the
-# memory would not last. The longest of J1939 has 1785 bytes.
+# Bytes of a message, first bit or bits of a signal with 6 digits: cantools makes a list of as many
+# entries, and memory would run out. The longest message of J1939 has 1785 bytes.
 _TOO_LARGE = re.compile(
     rf"{_MESSAGE}(\d{{6,}})|{keyword('SG_')}\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{{6,}})"
 )
@@ -30,11 +30,14 @@ SYNTAX = "Invalid syntax"
 
 
 def parsed_messages(path: Path, text: str, *, bounded: bool) -> list[Message] | Problem:
-    """Messages that cantools finds, or why it can find none."""
+    """Return the messages that cantools finds, or why it cannot parse the text.
+
+    With ``bounded`` the text must not exceed ``MOST_PARSED``, ``MOST_WORDS`` and ``MOST_PAYLOAD``.
+    """
     if large := _too_large(text, bounded=bounded):
         line, why = large
         return Problem(str(path), line, "", f"{UNUSABLE}: {why}")
-    # cantools only logs that of two messages with one id the first is lost; found below.
+    # Of two messages with one id cantools drops the first, and only logs that; our callers check.
     logging.getLogger("cantools").setLevel(logging.ERROR)
     try:
         database = cantools.database.load_string(text, database_format="dbc")
@@ -59,7 +62,7 @@ def parsed_messages(path: Path, text: str, *, bounded: bool) -> list[Message] | 
 
 
 def _whole(cycle: object) -> Any:
-    """A cycle whose attribute is declared FLOAT or STRING, as a whole number where it is one."""
+    """Return a cycle time as an int if a FLOAT or STRING attribute holds a whole number."""
     if isinstance(cycle, float) and cycle.is_integer():
         return int(cycle)
     if isinstance(cycle, str) and (number := _WHOLE.fullmatch(cycle)):
@@ -68,7 +71,7 @@ def _whole(cycle: object) -> Any:
 
 
 def _explained(text: str, cause: Exception, why: str) -> tuple[int, str] | None:
-    """Line of a mistake that cantools finds without a place, and what to write; None for others."""
+    """Return (line, what to write) for mistakes that cantools reports without a line, or None."""
     if isinstance(cause, KeyError) and (at := _attribute(text, str(cause.args[0]))):
         kind = "STRING" if '"' in at[2] else "INT 0 65535"
         expected = f"expected BA_DEF_ {at[1]}{at[0].split()[1]} {kind}; before it"
@@ -84,7 +87,7 @@ def _explained(text: str, cause: Exception, why: str) -> tuple[int, str] | None:
 
 
 def _attribute(text: str, name: str) -> re.Match[str] | None:
-    """The first value of an attribute."""
+    """Find the first statement that gives an attribute a value."""
     value = rf'^[^\S\n]*BA_\s+"{re.escape(name)}"\s+((?:(?:BU|BO|SG|EV)_\s)?)([^;]*)'
     return re.search(value, text, re.MULTILINE)
 
@@ -94,12 +97,12 @@ def _line_at(text: str, place: int) -> int:
 
 
 def letters(text: str) -> int:
-    """Return the number of letters without line ends, which other messages leave behind."""
+    """Return the number of letters but line ends, which remain of messages that are left out."""
     return len(text) - text.count("\n")
 
 
 def _too_large(text: str, *, bounded: bool) -> tuple[int | None, str] | None:
-    """Line and reason, where a file would take cantools more time or memory than there is."""
+    """Return (line, reason) if a text would cost cantools too much time or memory, or None."""
     if large := _TOO_LARGE.search(text):
         line = _line_at(text, large.end())
         return line, f"expected 99999 bytes or bits at most, got {large[1] or large[2]}"
@@ -116,6 +119,6 @@ def _too_large(text: str, *, bounded: bool) -> tuple[int | None, str] | None:
 
 
 def _line_of(text: str, pattern: str) -> int | None:
-    """Number of the first line of a text that starts with a pattern."""
+    """Return the number of the first line that starts with a pattern, or None."""
     start = re.search(rf"^[^\S\n]*{pattern}", text, re.MULTILINE)
     return _line_at(text, start.start()) if start else None

@@ -1,7 +1,7 @@
-"""Which text of a DBC file belongs to which message: one pass over its statements, no parser.
+"""Assigns the text of a DBC file to its messages, in one pass over the statements, no parser.
 
 cantools gets the text of the messages that are used (docs/decisions.md#cantools-at-the-desk).
-Strings and comments end where they end for cantools: nothing within one is taken for a statement.
+Strings and comments end where cantools ends them: nothing inside one is taken for a statement.
 """
 
 import re
@@ -13,11 +13,11 @@ from typing import NamedTuple
 from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.config.source import encoding_of
 
-# Of all DBC files of a deployment: several times those of a machine.
+# Most messages and statements in all DBC files of a deployment: several times those of a machine.
 MOST_MESSAGES = 20_000
 MOST_STATEMENTS = 300_000
 WIDE_ID = "an id of 29 bits stands in a DBC file with bit 31 set: 0x80000000 more"
-# Signals that belong to no message stand in one of this name; cantools leaves it out.
+# A message of this name holds the signals that belong to no message; cantools leaves it out.
 _NO_MESSAGE = b"VECTOR__INDEPENDENT_SIG_MSG"
 _OF_NO_MESSAGE = -1  # in place of an id: value tables, which no one reads
 
@@ -35,7 +35,7 @@ def _row(*parts: str) -> str:
 
 
 def keyword(word: str) -> str:
-    """A keyword; what may stand before it comes last, so that the search knows its first letter."""
+    """Return the pattern of a keyword; its look-behind comes last, so it starts with a letter."""
     return rf"{word}(?<!\w{word})\b"
 
 
@@ -49,8 +49,8 @@ _SIGNAL = _row(
     *(_STRING, _NAMES),
 )
 _BO, _SG, _BA, _CM, _REL = (keyword(word) for word in ("BO_", "SG_", "BA_", "CM_", "BA_REL_"))
-# The last group of each is empty and has its name. None can run on from one statement into the
-# next, so that all of them together take linear time.
+# In ``_SCAN`` an empty group with the name of the pattern follows each. No pattern can run on from
+# one statement into the next, so that all of them together take linear time.
 _STATEMENTS = {
     "message": _row(
         _BO, _id("message"), f"(?P<name>{_NAME})", ":", r"(?P<length>\d{1,5}+)(?![\w.])"
@@ -74,21 +74,21 @@ _STATEMENTS = {
     "in_node": _row(_REL, _STRING, keyword("BU_SG_REL_"), _NAME, _SG, _id("in_node"), _NAME)
     + f"{_GAP}{_VALUE}{_GAP};",
     "no_message": _row(keyword("VAL_TABLE_"), _NAME, f"{_TABLE};"),
-    # What no statement has taken: a message that is written as no one expects, and the others.
+    # Text that no statement has matched: an unexpected form of a message, and the rest.
     "odd": _row(_BO, r"[-+\d]"),
     "strings": rf'(?:{_STRING}[^"/BCSV]*+)++',
     "comment": r"//[^\n]*+",
     "endless": '"',
 }
 _SCAN = re.compile("|".join(f"{text}(?P<{kind}>)" for kind, text in _STATEMENTS.items()).encode())
-# A signal that no one receives, a message that no one sends: the name of no node is left out.
+# A signal without receiver or a message without sender, whose node name is missing in the file.
 _NO_NODE = re.compile(
     rb'^[ \t]*(?:SG_[ \t][^"\n]*"[^"\n]*"|BO_[ \t]+\d+[ \t]+\w+[ \t]*:[ \t]*\d+)'
     rb"(?=\s*(?:[A-Z_]+_\b|\Z))",
     re.MULTILINE,
 )
 _OF_SIGNAL = re.compile(_row(r"(\w++)", r"\d++", f"({_NAME})").encode())
-# Bytes of a message whose signals are compared: the most that ISO 15765-2 sends in one.
+# Longest message (bytes) whose signals are compared: the most that ISO 15765-2 sends at once.
 LONGEST = 4095
 _PLACE = re.compile(
     _GAP.join((r"SG_\b", r"(\w++)", r"(\w*+)", ":", r"([^ \t\n|/]++)", r"\|")).encode()
@@ -101,10 +101,10 @@ class Entry(NamedTuple):
     """A message of a DBC file.
 
     Attributes:
-        name: its long one, where it has two.
-        number: id as the file has it, with bit 31 for one of 29 bits.
-        line: where it is defined; None where that is not known.
-        fault: why it cannot be used, as far as is known without cantools, or None.
+        name: name of the message; the long one, where it has two.
+        number: id as in the file, with bit 31 set for an id of 29 bits.
+        line: line of its definition; None where unknown.
+        fault: why it cannot be used, as far as our scan shows, or None.
     """
 
     name: str
@@ -120,11 +120,11 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True)
 class DbcText:
-    """Text of a DBC file, by its messages.
+    """Text of a DBC file, divided by message.
 
     Attributes:
-        data: all of it, with line ends as Python has them.
-        entries: its messages; None where only cantools can say which there are.
+        data: the whole text in cp1252, with line ends ``\\n``.
+        entries: messages of the file; None where only cantools can find them.
     """
 
     data: bytes
@@ -135,28 +135,28 @@ class DbcText:
     _leftover: "array[int]"
 
     def of(self, numbers: Collection[int]) -> str:
-        """The text without other messages and leftover tables; every line keeps its number."""
+        """Return the text without other messages and leftover tables; lines keep their numbers."""
         return b"".join(self._parts(numbers)).decode("cp1252", errors="replace")
 
     def whole(self) -> str:
-        """All of it."""
+        """Return the whole text."""
         return self.data.decode("cp1252", errors="replace")
 
     @property
     def statements(self) -> int:
-        """How many belong to messages, definitions included."""
+        """Number of statements that belong to messages, definitions included."""
         return len(self._starts)
 
     def without_type(self) -> set[int]:
-        """Messages with types of values that have no signal: they change what the bits mean."""
+        """Return messages with the value type of a missing signal: whose bits it means is open."""
         return {self._numbers[i] for i in self._leftover if not self._is_table(i)}
 
     def leftover(self, numbers: Collection[int]) -> list[int]:
-        """Tables and types of values that have no signal, but for types of these messages."""
+        """Return value tables and types of signals that do not exist, but types in ``numbers``."""
         return [i for i in self._leftover if self._is_table(i) or self._numbers[i] not in numbers]
 
     def leftover_faults(self, places: Iterable[int]) -> Iterator[tuple[int, str]]:
-        """Line and fault of what ``leftover`` has found."""
+        """Yield (line, fault) of each statement that ``leftover`` has found."""
         line = at = 0
         for i in places:
             start = self._starts[i]
@@ -167,7 +167,7 @@ class DbcText:
             yield line + 1, f"{what} is of a signal that there is not"
 
     def _is_table(self, i: int) -> bool:
-        """Whether a statement is a table of values, which only gives them names."""
+        """Return whether a statement is a table of values, which only names them."""
         return self.data.startswith(b"VAL_", self._starts[i])
 
     def _parts(self, numbers: Collection[int]) -> Iterator[bytes]:
@@ -182,10 +182,10 @@ class DbcText:
 
 
 def dbc_text(data: bytes) -> DbcText:
-    """Look through a DBC file, in time and memory that grow with its length.
+    """Scan a DBC file, in time and memory that are linear in its length.
 
     Raises:
-        ValueError: it has more messages than are allowed.
+        ValueError: the file has too many messages or statements.
     """
     data = _NO_NODE.sub(rb"\g<0> Vector__XXX", _cp1252(data))
     starts, ends, numbers, tables = (array("q") for _ in range(4))
@@ -230,14 +230,14 @@ def dbc_text(data: bytes) -> DbcText:
 
 
 def _cp1252(data: bytes) -> bytes:
-    """A text with line ends as Python has them; one with a byte order mark as one without."""
+    """Return a text in cp1252 with line ends ``\\n``; decode it if it has a byte order mark."""
     if encoding := encoding_of(data[:4]):
         data = data.decode(encoding, "replace").encode("cp1252", "replace")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
 def _id_fault(number: int) -> str | None:
-    """Why no frame has this id, or None."""
+    """Return why no frame can have this id, or None."""
     if number < EFF_FLAG:
         text = f"has the id {number:#x} of more than 11 bits; {WIDE_ID}"
         return text if number > SFF_MASK else None
@@ -246,7 +246,7 @@ def _id_fault(number: int) -> str | None:
 
 
 def signals_fault(text: bytes, length: int) -> tuple[list[bytes], str | None]:
-    """Names of the signals of a message, and the first fault or None; cantools checks used ones.
+    """Return a message's signal names, and its first fault or None; cantools checks used messages.
 
     Args:
         text: the signals of the message.
@@ -259,8 +259,8 @@ def signals_fault(text: bytes, length: int) -> tuple[list[bytes], str | None]:
 
 def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
     multiplexers = sum(mark.endswith(b"M") for _, mark, *_ in rows)
-    every = 0  # bits that any signal has; the lowest bit of the first byte is the lowest
-    used: dict[bytes, int] = {b"": 0}  # those of each value of the multiplexer
+    every = 0  # bits of all signals so far; bit 0 is the lowest bit of the first byte
+    used: dict[bytes, int] = {b"": 0}  # bits by value of the multiplexer
     masks: list[tuple[bytes, int]] = []
     names: set[tuple[bytes, bytes]] = set()
     for name, mark, first, count, order in rows:
@@ -269,7 +269,7 @@ def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
             return f"has {length} bytes, and the signal {name.decode()} is not within them"
         chosen = b"" if mark.endswith(b"M") else mark
         if multiplexers > 1 and mark.startswith(b"m"):
-            continue  # which of them exclude each other is not said here
+            continue  # with several multiplexers we do not know which signals exclude each other
         if (name, chosen) in names:
             return f"has two signals of the name {name.decode()}"
         names.add((name, chosen))
@@ -284,7 +284,7 @@ def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
 
 
 def _mask(first: bytes, count: bytes, order: bytes, length: int) -> int | None:
-    """Bits of a signal in its message, or None where it has others."""
+    """Return the mask of a signal's bits; None where they are not all within the message."""
     if not (_DIGITS.fullmatch(first) and _DIGITS.fullmatch(count)):
         return None
     begin, bits = int(first), int(count)

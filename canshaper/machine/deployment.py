@@ -1,4 +1,4 @@
-"""A deployment, checked: what its files say, with the codecs of its messages."""
+"""A deployment after all checks: the content of its files, and the codecs of its messages."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -32,9 +32,10 @@ class BoundMotion:
     """A motion with its messages.
 
     Attributes:
-        config: the motion.
-        radius: of its radius, where that is measured.
-        aim: of its aim point, where that is sent, every so many ticks.
+        config: section of the motion.
+        radius: message with the measured radius, or None.
+        aim: message with the aim point, or None.
+        aim_ticks: ticks between two of these messages.
     """
 
     config: Motion
@@ -44,7 +45,7 @@ class BoundMotion:
 
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
-    """Bind every motion, by name; an axis is part of one at most."""
+    """Bind every motion; return them by name. An axis may be part of one motion at most."""
     moved: dict[str, str] = {}
     motions = {}
     for name, motion in lookup.config.motion.items():
@@ -80,7 +81,7 @@ def _check_axis(
 
 
 def _check_crane(lookup: Lookup, place: Place, motion: Motion) -> None:
-    """Check that axes with the usual names, such as front_slew, are of the same crane."""
+    """Check that slew and near-far are of one crane, if named as usual (front_slew)."""
     slew, near_far = motion.slew, motion.near_far
     if near_far is None or not (slew.endswith("slew") and near_far.endswith("near_far")):
         return
@@ -92,7 +93,7 @@ def _check_crane(lookup: Lookup, place: Place, motion: Motion) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Deployment:
-    """Everything the controller needs, checked."""
+    """Everything that the controller needs of the deployment file and DBC files, checked."""
 
     path: Path
     config: DeploymentConfig
@@ -111,18 +112,18 @@ class Deployment:
     switches: list[BoundSwitches]
     on_bus: dict[str, list[Message]]
     fd: frozenset[Key]
-    """Messages of CAN FD."""
+    """Used messages that are sent in frames of CAN FD."""
     source: Source = field(compare=False)
-    """The file, for the lines of what is wrong with it on this machine."""
+    """The deployment file with line numbers, for problems that show only on this computer."""
     codes: tuple[NamedCode, ...] = ()
     """Meanings of the named values of the signals that are read."""
     starts: tuple[StartValue, ...] = ()
     """Start values of valve messages in signals that no axis uses."""
     listen_only: bool = False
-    """Whether nothing is sent but status: another controller drives the machine, or no one."""
+    """Whether we send only status, as another controller, or none, drives the machine."""
 
     def load(self, bus: str) -> BusLoad | None:
-        """Load of a bus by the messages of the deployment; None where its bit rate is not given."""
+        """Return the load of a bus by the deployment's messages; None without its bit rate."""
         config = self.config.buses[bus]
         if not config.bitrate:
             return None
@@ -130,7 +131,7 @@ class Deployment:
 
     @cached_property
     def routing(self) -> Routing:
-        """Routing of every frame on the buses, for all who receive or send."""
+        """Routing table of all buses, for every part that receives or sends."""
         used = {bus for bus, messages in self.on_bus.items() if any(map(is_j1939, messages))}
         return build_routing(
             self.config,
@@ -145,16 +146,16 @@ class Deployment:
 
     @cached_property
     def coordinates(self) -> Mapping[str, str]:
-        """Coordinate of the crane that each axis moves, by its name."""
+        """Coordinate of the crane that each axis moves, by axis."""
         return coordinates(self.config.crane, self.axes)
 
     @property
     def by_coordinate(self) -> dict[str, str]:
-        """Axis that moves each coordinate of the crane."""
+        """Axis that moves each coordinate of the crane, by coordinate."""
         return {moved: axis for axis, moved in self.coordinates.items()}
 
     def inputs(self) -> list[Bound[InputSection]]:
-        """Joysticks, switches, positions, sway sensors, feedback and status words of the valves."""
+        """Return every received message once: joysticks, switches, sensors, feedback and so on."""
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
         # Several parts may read one message.
@@ -179,17 +180,17 @@ class Deployment:
         return [*self.joysticks.values(), *self.switches, *stop]
 
     def sent(self) -> list[SentMessage]:
-        """Every message of the DBC files that we send, each once."""
+        """Return every message of the DBC files that we send, each once."""
         valves = [axis.valve.message for axis in self.axes.values()]
         statuses = [status.message for status in self._statuses()]
         return list({one.key: one for one in (*valves, *statuses)}.values())
 
     def listening(self) -> "Deployment":
-        """Return the machine for a program that only listens, and reports what it would do.
+        """Return the machine for a program that only listens, and reports what it would command.
 
-        What valves say of themselves, and a swing, answers another controller's commands, so it is
-        not compared with ours. A node of ours on J1939 stays where a status message needs its
-        address, which it gives up to the node that has it.
+        Feedback, status words and swing follow another controller's commands, so they are not
+        compared with ours. Our node on J1939 stays where a status message needs its address, which
+        it gives up to any node that has it.
         """
         reporting = {s.message.key[0] for s in self._statuses()}
         buses = {
@@ -205,7 +206,7 @@ class Deployment:
 
     @cached_property
     def unreported(self) -> "Deployment":
-        """The machine where no one reads the status: it is not sent."""
+        """The same machine without status messages, for use where no one reads them."""
         axes = {
             name: replace(axis, status=None, status_ticks=0) for name, axis in self.axes.items()
         }
@@ -213,7 +214,7 @@ class Deployment:
         return replace(self, axes=axes, motions=motions, status=None, identity_status=None)
 
     def _statuses(self) -> list[StatusCodec[Any]]:
-        """Every status message that is sent."""
+        """Return every status message that we send."""
         of_axes = [axis.status for axis in self.axes.values()]
         aims = [motion.aim for motion in self.motions.values()]
         return [s for s in (self.status, self.identity_status, *of_axes, *aims) if s]

@@ -1,4 +1,4 @@
-"""Filters of a deployment against the period of the valve that they drive."""
+"""Checks that every filter of a deployment runs at the period of the valve that it drives."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
-    """Check that every filter that the axis may get runs at the period of its valve."""
+    """Check that every filter that the axis may use runs at the period of its valve (seconds)."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
     check_rope(lookup, place, axis)
     parts, filters = _parts(place, axis), every_filter(place, axis)
@@ -41,7 +41,7 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: flo
 
 
 def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -> None:
-    """Check that the filter runs, scaled to each end of an adjustable number of the swing."""
+    """Check that the filter still runs at both ends of each adjustable number in ``sway``."""
     control, rate = lookup.config.control, axis.limits.slowest_per_s
     if control is None:
         return
@@ -56,7 +56,7 @@ def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -
                 then = adjusted(axis, {key: end}, axis)
                 fault = filter_fault(then.filter, then.sway, period_s, rate)
             except ValueError as error:
-                # Whether two numbers of the swing go together is known when both are changed.
+                # Rules between two numbers of sway are checked when both have their new values.
                 fault = str(error) if str(error).startswith("filter") else None
             if fault:
                 place = ("control", "adjustable", text)
@@ -64,13 +64,13 @@ def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -
 
 
 def _parts(place: Place, axis: AxisSection) -> list[tuple[Place, AxisSection | Profile]]:
-    """The axis and its profiles, by their places."""
+    """Return the axis and its profiles, each with its place."""
     profiles = axis.profiles.items()
     return [(place, axis), *(((*place, "profiles", name), one) for name, one in profiles)]
 
 
 def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, Sway | None]]:
-    """Every filter that the axis may get, by its place, with the sway data that it runs with."""
+    """Return (place, filter, sway data) of every filter that the axis may use."""
     filters = [*at_ends(place, axis)]
     for at, part in _parts(place, axis):
         filters.append(((*at, "filter"), part.filter, axis.sway))
@@ -80,7 +80,7 @@ def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, S
 
 
 def at_ends(place: Place, axis: AxisSection) -> Iterator[tuple[Place, Filter, Sway | None]]:
-    """Filter and swing of an axis at the shortest and the longest rope that it follows."""
+    """Yield (place, filter, sway data) at the shortest and the longest rope of the axis."""
     sway, chosen = axis.sway, axis.filter
     follows = KINDS[chosen.kind].follows
     if sway is None or sway.length is None or follows is None:
@@ -100,7 +100,7 @@ def at_ends(place: Place, axis: AxisSection) -> Iterator[tuple[Place, Filter, Sw
 
 
 def check_rope(lookup: Lookup, place: Place, axis: AxisSection) -> None:
-    """Check that what an axis has goes with a measured length of its rope."""
+    """Check that filter and other sections of an axis suit a measured rope length, if any."""
     if axis.sway is None or axis.sway.length is None:
         return
     add, at = lookup.diagnostics.add, (*place, "sway", "length")
@@ -117,7 +117,7 @@ def check_rope(lookup: Lookup, place: Place, axis: AxisSection) -> None:
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Yield filters that were designed for another swing or valve than the file has: where, why."""
+    """Yield (place, reason) of filters designed for another swing or valve than the file has."""
     for name, axis in config.axes.items():
         for place, chosen, sway in every_filter(("axes", name), axis):
             design = chosen.design()
@@ -134,7 +134,7 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
 
 
 def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that a button for the next profile has profiles, and no switch that chooses them."""
+    """Check that next_profile of a joystick has profiles, and no section ``profile`` beside it."""
     for name, joystick in config.joysticks.items():
         if joystick.next_profile:
             place = ("joysticks", name, "next_profile")
@@ -146,7 +146,7 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that every adjustable number can be changed in motion, and speed while faults are."""
+    """Check that every adjustable number may change in motion, and speeds with rehearse_faults."""
     if config.control is None:
         return
     from canshaper.config.adjust import Key, faults
@@ -175,12 +175,12 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 def filter_fault(
     chosen: Filter, sway: Sway | None, period_s: float, valve_rate_per_s: float
 ) -> str | None:
-    """Why a filter cannot run, or None.
+    """Return why a filter cannot run, or None.
 
     Args:
         chosen: the filter.
         sway: sway data that it runs with.
-        period_s: time between two commands to the valve.
+        period_s: time between two commands to the valve, seconds.
         valve_rate_per_s: rate of the valve, full speeds per second.
     """
     mode = sway.mode() if sway else None
@@ -188,7 +188,7 @@ def filter_fault(
 
 
 def parameter_sets(sets: Sequence[Breakpoint]) -> list[ParameterSet]:
-    """Sets of an axis or of a profile as they run."""
+    """Return the parameter sets of a gain schedule, as the axis runs them."""
     return [
         ParameterSet(one.breakpoint, one.sway.mode(), one.filter.kind, one.filter.parameters())
         for one in sets
@@ -198,9 +198,9 @@ def parameter_sets(sets: Sequence[Breakpoint]) -> list[ParameterSet]:
 def _fault_between(
     sets: Sequence[Breakpoint], period_s: float, valve_rate_per_s: float
 ) -> str | None:
-    """Why a filter between two breakpoints cannot run, or None.
+    """Return why a filter between two breakpoints cannot run, or None.
 
-    Each that the load may ask for is built here, so that none is refused in motion.
+    Every filter that the load state may select is built here, so that none is refused in motion.
     """
     running = parameter_sets(sets)
     for steps in range((len(running) - 1) * STEPS_BETWEEN):

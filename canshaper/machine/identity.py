@@ -1,7 +1,7 @@
-"""Identity of what runs, by content: the deployment file, its DBC files and the program.
+"""Identity of what runs: hashes of the deployment file, its DBC files and the program.
 
-They are noted when a machine is signed off; a changed file or program shows in log, status and
-bundle.
+The hashes are recorded when a machine is signed off; log, status and bundle show a later change of
+a file or of the program.
 """
 
 import os
@@ -23,12 +23,12 @@ from canshaper.shipped import PACKAGE, version
 
 @dataclass(frozen=True)
 class Identity:
-    """SHA-256 of everything that decides what a valve gets, but for Python and its packages.
+    """SHA-256 of all that determines the valve commands, but for Python and its other packages.
 
     Attributes:
-        deployment: of the deployment file, in hexadecimal digits.
-        dbc: of its DBC files, by their names in the deployment file.
-        packages: of the modules of packages that make its checksums and filters, a line for each.
+        deployment: SHA-256 of the deployment file, in hexadecimal digits.
+        dbc: SHA-256 of each DBC file, by its name in the deployment file.
+        packages: log line with the SHA-256 of each package module that adds checksum or filter.
     """
 
     deployment: str
@@ -37,9 +37,9 @@ class Identity:
 
     @property
     def digest(self) -> int:
-        """16 bits for a display: equal only, but for 1 of 65 536, where all hashes are equal.
+        """Digest of all hashes in 16 bits, for a display; 1 of 65 536 changes keeps it equal.
 
-        The order of the DBC files counts, their names do not: a copy with other paths is the same.
+        The order of the DBC files counts, their names do not: a copy at other paths is equal.
         """
         parts = [program_sha256(), self.deployment, *self.content]
         together = "\n".join(parts)
@@ -47,11 +47,11 @@ class Identity:
 
     @property
     def content(self) -> list[str]:
-        """Hashes of the DBC files and packages, whatever names the files have."""
+        """Hashes of the DBC files, without their names, and lines of the packages."""
         return [*self.dbc.values(), *self.packages]
 
     def lines(self) -> list[str]:
-        """Lines for people and logs: the digest, then every hash in full."""
+        """Return the lines for people and logs: the digest, then every hash in full."""
         return [
             f"digest={self.digest:#06x}",
             f"program=sha256:{program_sha256()} version={version()}",
@@ -62,7 +62,7 @@ class Identity:
 
 
 def filter_lines(kinds: Iterable[str]) -> Iterator[str]:
-    """Which package added a filter, with the SHA-256 of its module; no line for one of ours."""
+    """Yield a log line with package and module SHA-256 of each filter kind that is not ours."""
     for kind in sorted(kinds):
         if point := ADDED.get(kind):
             program = sha256(Path(str(sys.modules[point.module].__file__)).read_bytes())
@@ -82,7 +82,7 @@ def program_sha256() -> str:
 
 def _modules() -> Iterator[Path]:
     for folder, inside, files in os.walk(PACKAGE, onerror=_unreadable):
-        # What Python makes comes and goes while another program starts.
+        # Python creates and removes these files while another program starts.
         inside[:] = (name for name in inside if name != "__pycache__")
         yield from (Path(folder, name) for name in files if name.endswith(".py"))
 
@@ -94,7 +94,7 @@ def _unreadable(error: OSError) -> None:
 def bind_status(
     lookup: Lookup, place: Place, status: Status | None, fields: Sequence[StatusField[Source]]
 ) -> tuple[StatusCodec[Source] | None, int]:
-    """A status message, and the ticks between two of them; (None, 0) where there is none."""
+    """Bind a status message; return its codec and its period in ticks, (None, 0) without one."""
     if status is None:
         return None, 0
     used = lookup.message(place, status, received=False)

@@ -1,4 +1,4 @@
-"""Messages that are received, bound to their DBC messages: all but the velocities of joysticks."""
+"""Binds received messages to their DBC messages: all but the velocities of joysticks."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,20 +21,20 @@ from canshaper.machine.protections import bind_protection
 from canshaper.machine.used_message import ENABLE, STOP, UsedMessage, key_path
 
 Choosing = LoadState | ProfileSwitch
-"""Sections of the load state, and of the operator's choice."""
+"""Sections whose value selects parameters: the load state, and the operator's profile."""
 Section_co = TypeVar("Section_co", bound=InputSection, covariant=True)
 
 
 @dataclass(frozen=True)
 class Bound(Generic[Section_co]):
-    """A message that is received; ``key`` is (bus, id, extended).
+    """A received message, bound to the DBC.
 
     Attributes:
-        config: its section in the deployment file.
-        message: its definition.
-        layout: where its signals lie.
-        protection: of its frames.
-        chosen: which frames are meant, where the message is multiplexed.
+        config: section of the deployment file.
+        message: definition of the message in the DBC, with the file's corrections.
+        layout: decodes its signals.
+        protection: protection of its frames.
+        chosen: which frames count, where the message is multiplexed.
     """
 
     config: Section_co
@@ -45,7 +45,7 @@ class Bound(Generic[Section_co]):
 
     @property
     def key(self) -> tuple[str, int, bool]:
-        """Where its frames are found; of J1939 with the source address, 254 for any."""
+        """(bus, id, extended) of its frames; in J1939 with the source address, 254 for any."""
         can_id, source = self.message.frame_id, self.config.source
         if source is not None:
             can_id = with_source(can_id, source)
@@ -53,7 +53,7 @@ class Bound(Generic[Section_co]):
 
     @property
     def keys(self) -> list[tuple[str, int, bool]]:
-        """Everything its frames may come as, where their source is known."""
+        """Every key that its frames may have: in J1939, with a known source, each priority."""
         bus, can_id, extended = self.key
         if not is_j1939(self.message) or self.any_source:
             return [self.key]
@@ -61,17 +61,17 @@ class Bound(Generic[Section_co]):
 
     @property
     def any_source(self) -> bool:
-        """Whether it may come from any source address."""
+        """Whether the message may come from any source address."""
         return is_j1939(self.message) and self.key[1] & 0xFF == NULL
 
     @property
     def by_group(self) -> bool:
-        """Whether its frames are known by group and source, whatever their priority."""
+        """Whether its frames are recognised by group and source, at any priority."""
         return is_j1939(self.message) and not has_destination(self.message.frame_id)
 
 
 BoundInput = Bound[InputSection]
-"""Whatever its section is."""
+"""A received message of any section."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class BoundValue(Bound[Section_co]):
 AnySection = TypeVar("AnySection", bound=InputSection)
 AnyValue = TypeVar("AnyValue", LoadState, ProfileSwitch, LoadState | ProfileSwitch, FeedbackSection)
 AnyPosition = TypeVar("AnyPosition", bound=Position)
-# What of a section is about its message: the same for every part that reads it.
+# Keys of a section that describe its message: equal in every section that reads the message.
 OF_MESSAGE = tuple(InputSection.model_fields)
 
 
@@ -97,15 +97,18 @@ def bind_input(
     enable: Iterable[tuple[Place, str]] = (),
     value: str | None = None,
 ) -> tuple[UsedMessage, Bound[AnySection]] | None:
-    """Bind a message that is received: its switches, its cycle and its protection.
+    """Bind a received message: its switches, its cycle and its protection.
 
     Args:
-        lookup: what it is bound with.
-        place: of its section in the deployment file.
-        config: that section.
+        lookup: shared data of the deployment.
+        place: place of the section in the deployment file.
+        config: the section.
         switches: keys of the section that name switches.
-        enable: signals that enable joysticks, with who names them.
+        enable: signals that enable joysticks, each with the place that names it.
         value: name of a signal that is a value and no switch.
+
+    Returns:
+        The message with its uses, and the bound message; None where the message does not exist.
     """
     used = lookup.message(place, config, received=True, source=config.source)
     if not used:
@@ -123,7 +126,7 @@ def bind_input(
         used.uses[value] = "signal"
     protection = bind_protection(used, config)
     most = protection.counts // 2
-    # Beyond half of its range a step back would look like a step forward.
+    # With a larger step than half of the counter's range, a step back would count as one forward.
     if protection.counts and (config.alive_max_step or 0) > most:
         text = f"expected up to {most} with a counter of {protection.counts} values"
         used.add("alive_max_step", f"{text}, got {config.alive_max_step}")
@@ -193,7 +196,7 @@ def _check_range(
     keys: Iterable[str],
     what: str,
 ) -> None:
-    """Check that a signal has a range, and that values of its section lie in it."""
+    """Check that a signal has a range, and that the values of these keys lie in the range."""
     used, bound = result
     signal = bound.signal
     if fault := ends_fault(signal, f"what lies outside is not {what}"):
@@ -209,7 +212,7 @@ def _check_range(
 def _bind_position(
     lookup: Lookup, place: Place, config: AnyPosition, what: str
 ) -> tuple[UsedMessage, BoundValue[AnyPosition]] | None:
-    """Bind a position in a message of its own, or in one that another section reads too."""
+    """Bind a position, in a message of its own or in one that another section reads too."""
     key = (config.bus, config.message)
     first = lookup.positions.get(key)
     if alone := first is None:
@@ -264,7 +267,7 @@ def bind_feedback(
 def _bind_value(
     lookup: Lookup, place: Place, config: AnyValue
 ) -> tuple[UsedMessage, BoundValue[AnyValue]] | None:
-    """Bind a message with one signal that is read."""
+    """Bind a message of which one signal is read."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result
@@ -273,7 +276,10 @@ def _bind_value(
 
 
 def check_source(used: UsedMessage, what: str) -> None:
-    """Check that the source address is known; else only the first sender would count."""
+    """Check that the file or the DBC names the source address of a message.
+
+    Without it the first sender would count, and no other.
+    """
     if used.any_source:
         text = f"missing: in the DBC {used.message.name} may come from any source address"
         used.add("source", f"{text}; {what} needs a known one")

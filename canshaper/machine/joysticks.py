@@ -1,4 +1,5 @@
-"""Joysticks of a deployment, bound to the DBC: velocities, enabling switches, ticks that follow."""
+"""Binds the joysticks of a deployment to the DBC: velocities, enabling switches, and the joystick
+that the ticks follow."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -31,9 +32,9 @@ class BoundJoystick(Bound[Joystick]):
     """A joystick with its message.
 
     Attributes:
-        name: of the joystick.
-        velocities: what its axes take from it.
-        conditions: what enables it; the first one is to be pressed.
+        name: name of the joystick.
+        velocities: readers of the velocities that its axes use.
+        conditions: switches that enable it; the operator presses the first one.
     """
 
     name: str
@@ -42,17 +43,18 @@ class BoundJoystick(Bound[Joystick]):
 
     @property
     def enable(self) -> str | None:
-        """The signal of its own message that is the switch to press; None where it is another."""
+        """Signal of the switch to press, if the joystick's own message has it; else None."""
         pressed = self.conditions[0]
         return pressed.name if pressed.joystick == self.name else None
 
     def decode(self, data: bytes) -> tuple[dict[str, Any], dict[str, float | Reason]]:
-        """Raw values of a frame, and the command or fault of each velocity, for a listener.
+        """Return the raw values of a frame, and command or fault by velocity, for a listener.
 
-        There is no command in frames that are not meant. See ``JoystickInput`` for the controller.
+        Frames with another multiplexor value hold no command. The controller uses
+        ``JoystickInput`` instead, which also checks protection and age.
 
         Raises:
-            ValueError: the frame has another length.
+            ValueError: the frame does not have the length of the message.
         """
         if len(data) != self.message.length:
             raise ValueError(f"expected {self.message.length} bytes, got {len(data)}")
@@ -63,17 +65,17 @@ class BoundJoystick(Bound[Joystick]):
 
 @dataclass(frozen=True)
 class BoundSwitches(Bound[SwitchSection]):
-    """A message with switches.
+    """A message with switches that enable joysticks.
 
     Attributes:
-        switches: signal and raw value that agrees, by name of the switch.
+        switches: (signal, raw value that enables), by name of the switch.
     """
 
     switches: Mapping[str, tuple[str, int]]
 
 
 def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
-    """Signals of the message of a joystick that enable any, each once, with who names it first."""
+    """Yield each signal in a joystick's message that enables a joystick, by its first mention."""
     seen: set[str] = set()
     for owner, section in lookup.config.joysticks.items():
         for i, condition in enumerate(named_by(lookup.config, owner)):
@@ -83,7 +85,7 @@ def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
 
 
 def check_conditions(lookup: Lookup) -> None:
-    """Report names in the lists that do not exist."""
+    """Report joysticks that ``enable`` or ``enable_of`` names and that do not exist."""
     config, add = lookup.config, lookup.diagnostics.add
     for name, section in config.joysticks.items():
         if (of := section.enable_of) is not None:
@@ -138,7 +140,7 @@ def _bind(lookup: Lookup, switches: dict[str, SwitchSection]) -> BoundSwitches |
 
 
 def _place(names: list[str] | None, joystick: str, i: int) -> Place:
-    """Where a name stands: in a list of one it may stand alone."""
+    """Return the place of a name in ``enable``, which may be one text instead of a list."""
     place: Place = ("joysticks", joystick, "enable")
     return (*place, i) if names and len(names) > 1 else place
 
@@ -176,7 +178,7 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
 
 
 def _check_scaling(used: UsedMessage, commands: dict[str, Command]) -> None:
-    """Check that a signal means the same to every axis that reads it."""
+    """Check that all axes that read a signal state the same scaling and codes for it."""
     first: dict[str, str] = {}
     for axis, command in commands.items():
         before = first.setdefault(command.signal, axis)
@@ -189,13 +191,13 @@ def _check_scaling(used: UsedMessage, commands: dict[str, Command]) -> None:
 def _bind_velocity(
     used: UsedMessage, axis: str, command: Command, moves: dict[str, str]
 ) -> VelocitySignal | FlaggedVelocity | None:
-    """Bind a signal that is positive one way and negative the other, or has a flag for each.
+    """Bind a signed velocity signal, or a magnitude with a flag for each direction.
 
     Args:
-        used: the message.
+        used: the joystick's message.
         axis: name of the axis.
-        command: what it names.
-        moves: what the signals are that move an axis, by name.
+        command: section ``command`` of the axis.
+        moves: use of each signal that moves an axis, by signal.
     """
     place: Place = ("axes", axis, "command")
     flags = command.flags.model_dump() if command.flags else {}
@@ -225,7 +227,7 @@ def _bind_velocity(
     velocity = VelocitySignal.of(signal)
     if not flags:
         return velocity
-    used.uses[signal.name] = moves[signal.name]  # with other flags it would be another one
+    used.uses[signal.name] = moves[signal.name]  # with other flags it would be another velocity
     return FlaggedVelocity(velocity, **flags)
 
 
@@ -266,7 +268,7 @@ def check_following(
     config: DeploymentConfig,
     joysticks: Mapping[str, BoundJoystick | None],
 ) -> None:
-    """Check that the joystick that ``tick`` names can be followed."""
+    """Check that the ticks can follow the joystick that the section ``tick`` names."""
     if config.tick is None:
         return
     name, place = config.tick.follow, ("tick", "follow")
@@ -278,7 +280,7 @@ def check_following(
 
 
 def follow_fault(config: DeploymentConfig, joystick: BoundJoystick) -> str | None:
-    """Why the ticks cannot follow a joystick; None where they can."""
+    """Return why the ticks cannot follow a joystick, or None."""
     bus = config.buses.get(joystick.config.bus)
     if bus is not None and bus.interface != "socketcan":
         return f"expected a bus of socketcan, which stamps frames, got {bus.interface}, the bus"

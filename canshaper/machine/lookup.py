@@ -1,4 +1,4 @@
-"""Messages that a deployment file names: loaded, found, and noted as used on their bus."""
+"""Finds the messages that a deployment file names, and records which bus and section uses each."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -30,14 +30,14 @@ from canshaper.machine.used_message import NamedCode, StartValue, UsedMessage, k
 
 @dataclass(frozen=True)
 class Lookup:
-    """Shared data with which the parts of a deployment are bound.
+    """Data that all parts of a deployment share while they are bound.
 
     Attributes:
-        diagnostics: gets every problem.
+        diagnostics: collects every problem.
         config: the deployment file.
-        messages: those of its DBC files.
-        used: those that are bound so far, by bus, id without priority, and whether it is extended.
-        positions: those of them with positions, and as they are bound, by bus and name.
+        messages: messages of its DBC files.
+        used: messages that are bound so far, by bus, id without priority, and whether extended.
+        positions: used and bound message of each measured position, by bus and message name.
     """
 
     diagnostics: Diagnostics
@@ -53,16 +53,19 @@ class Lookup:
     def message(
         self, place: Place, config: Protected, *, received: bool, source: int | None = None
     ) -> UsedMessage | None:
-        """Return the message, and note it as used on that bus, where no other part may use it.
+        """Find the message of a section, and record it as used: no other section may use it.
 
-        A message of J1939 that we send gets our address; one that is received the address that the
-        file names, else that of the DBC, where 254 means any.
+        A J1939 message that we send gets our source address. One that we receive has the address
+        that the file names, else the address of the DBC, where 254 means any.
 
         Args:
-            place: of the part of the deployment file that names it.
-            config: that part.
-            received: whether it is received, and not sent.
-            source: the address that the file names.
+            place: place of the section in the deployment file.
+            config: the section that names the message.
+            received: whether the message is received (True) or sent.
+            source: source address that the file names.
+
+        Returns:
+            The message, or None where no DBC file has it.
         """
         add, bus, name = self.diagnostics.add, config.bus, config.message
         if bus not in self.config.buses:
@@ -107,35 +110,35 @@ class Lookup:
         return used
 
     def own_address(self, bus: str) -> int | None:
-        """Our address on a bus of J1939; None where we have none."""
+        """Return our address on a bus of J1939; None where we have none."""
         config = self.config.buses.get(bus)
         return config.j1939.address if config and config.j1939 else None
 
     def sent(self, bus: str, message: Message, protection: Protection) -> SentMessage:
-        """Return a message that we send, under our address where it has one."""
+        """Return a message that we send, with our source address in J1939."""
         return SentMessage(bus, message, self.own_address(bus), protection)
 
     def fd(self) -> frozenset[tuple[str, int, bool]]:
-        """Bus, id and format of the messages of CAN FD that are used."""
+        """Return (bus, id, extended) of the used messages of CAN FD."""
         return frozenset(key for key, used in self.used.items() if is_fd(used.message))
 
     def starts(self) -> tuple[StartValue, ...]:
-        """Return what valve messages carry besides, of all messages."""
+        """Return the start values of all signals in valve messages that no axis uses."""
         return tuple(one for used in self.used.values() for one in used.starts)
 
     def codes(self) -> tuple[NamedCode, ...]:
-        """Named values of the signals that are read, with their meanings."""
+        """Return the named values of all signals that are read, with their meanings."""
         return tuple(code for used in self.used.values() for code in used.codes)
 
     def on_bus(self) -> dict[str, list[Message]]:
-        """Messages that are used, by bus."""
+        """Return the used messages, by bus."""
         messages: dict[str, list[Message]] = {}
         for (bus, _, _), used in self.used.items():
             messages.setdefault(bus, []).append(used.message)
         return messages
 
     def check_timeout(self, used: UsedMessage, timeout_ms: int) -> None:
-        """Check that a message is lost only after it, or a tick that reads it, was missed once."""
+        """Check that one missed frame, or one missed tick, does not make a message lost."""
         message, tick = used.message, self.config.tick_ms
         cycle = message.cycle_time or 0
         least = 2 * max(cycle, tick)
@@ -145,7 +148,7 @@ class Lookup:
             used.add("timeout_ms", text)
 
     def period(self, used: UsedMessage) -> int:
-        """Ticks between two sendings of a message, from its GenMsgCycleTime; 0 when impossible."""
+        """Return the ticks between two frames of a sent message; 0 if no multiple of the tick."""
         cycle, tick = used.message.cycle_time, self.config.tick_ms
         if not cycle or cycle % tick:
             got = f"{cycle} ms" if cycle else "none"
@@ -154,7 +157,7 @@ class Lookup:
         return cycle // tick
 
     def check_node(self, place: Place, bus: str, name: str | None) -> None:
-        """Check that a named node of CANopen is one of its bus."""
+        """Check that the bus has a CANopen node of this name, if one is named."""
         config = self.config.buses.get(bus)
         nodes = config.canopen.nodes if config and config.canopen else {}
         if name is not None and name not in nodes:
@@ -163,7 +166,7 @@ class Lookup:
             self.diagnostics.add((*place, "node"), text)
 
     def check_groups(self) -> None:
-        """Check that no other message is in a J1939 group that commands a valve."""
+        """Check that no received message is in a J1939 group with which we command a valve."""
         commanded: dict[tuple[str, int], UsedMessage] = {}
         read: list[tuple[tuple[str, int], UsedMessage]] = []
         for (bus, _, _), used in self.used.items():
@@ -205,7 +208,7 @@ class Lookup:
     def _check_j1939(
         self, used: UsedMessage, bus: str, *, received: bool, source: int | None
     ) -> None:
-        """Report impossible source addresses."""
+        """Report a J1939 message with an impossible or missing source address."""
         name, own = used.message.name, self.own_address(bus)
         if not is_j1939(used.message):
             if source is not None:
@@ -225,13 +228,13 @@ class Lookup:
 def load_messages(
     diagnostics: Diagnostics, config: DeploymentConfig, directory: Path, inside: Path | None
 ) -> Messages | None:
-    """Load the DBC files; None when one is none, so that its messages are not missed too.
+    """Load the DBC files; return None if one cannot be used, so that its messages cause no errors.
 
     Args:
-        diagnostics: gets every problem.
+        diagnostics: collects every problem.
         config: the deployment file.
-        directory: what the names of the DBC files are relative to.
-        inside: read none outside of this directory, whatever the deployment file says.
+        directory: directory to which the names of the DBC files are relative.
+        inside: directory outside of which no file is read, whatever the deployment file says.
     """
     add = diagnostics.add
     files = []
@@ -257,7 +260,7 @@ def load_messages(
         else:
             unusable_bytes += _size(directory / name)
         if unusable_bytes > MOST_PARSED:
-            break  # as much as all of them together may take; the others are not looked at
+            break  # unusable files alone exceed the limit of all files; skip the others
         if fault := too_many(files):
             add(("dbc",), fault)
             return None
@@ -265,12 +268,12 @@ def load_messages(
 
 
 def protected_sections(config: DeploymentConfig) -> list[Protected]:
-    """Every section of a deployment file that names a message."""
+    """Return every section of a deployment file that names a message."""
     return [section for _, section in sections(config) if isinstance(section, Protected)]
 
 
 def _size(path: Path) -> int:
-    """Bytes of a file; 0 for one that cannot be read, which is a problem of its own."""
+    """Return the bytes of a file; 0 if it cannot be read, which is reported elsewhere."""
     try:
         return path.stat().st_size
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Values that a DBC names (VAL_): a fault, or a value because the deployment file says so."""
+"""Meaning of values that a DBC names (VAL_): a fault, unless the deployment file says a value."""
 
 import json
 from collections import OrderedDict
@@ -22,12 +22,13 @@ class Listing:
     """The signals of one section, and which of their named values are measurements.
 
     Attributes:
-        place: of the key with the names.
+        place: place of the key ``codes`` in the file.
         signals: names of the signals.
-        codes: meaning by name.
-        values: values that other keys of the file list.
-        moves: the axis that they move; None where they move none.
-        choice: whether every value but an error is one, as it chooses nothing unless it is listed.
+        codes: meaning of named values, by name.
+        values: values that other keys of the file use, which makes them measurements.
+        moves: the axis that the signals move; None where they move none.
+        choice: whether every value without an error's name is a measurement, as a profile's code
+            is, which selects nothing unless the file lists it.
     """
 
     place: Place
@@ -38,13 +39,13 @@ class Listing:
     choice: bool = False
 
     def is_value(self, name: str, value: float) -> bool:
-        """Whether the file lists it as a measurement."""
+        """Return whether a named value is a measurement by the file."""
         if meaning := self.codes.get(name):
             return meaning == "value"
         return not named_fault(name) and (self.choice or value in self.values)
 
     def without_values(self, signal: Signal) -> Signal:
-        """The signal with names for what is no measurement only."""
+        """Return the signal without the names of measurements: the names left are faults."""
         choices = signal.choices or OrderedDict()
         values = [r for r, n in choices.items() if self.is_value(str(n), _value(signal, r))]
         if not values:
@@ -55,7 +56,7 @@ class Listing:
 
 
 def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
-    """Every signal that is read as a number, by bus and message."""
+    """Return a listing of every signal that is read as a number, by bus and message."""
     result: dict[tuple[str, str], list[Listing]] = {}
 
     def add(bus: str, message: str, listing: Listing) -> None:
@@ -96,7 +97,7 @@ def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
 
 
 def values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
-    """Values of the load state that the gain schedules name, by their places."""
+    """Return the breakpoints of all gain schedules (values of the load state), by place."""
     parts: dict[Place, AxisSection | Profile] = {}
     for name, axis in config.axes.items():
         parts["axes", name] = axis
@@ -111,12 +112,12 @@ def values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
 
 
 def check_codes(used: UsedMessage, in_dbc: Iterable[Signal], listing: Listing) -> None:
-    """Note what the named values of a section's signals mean; one that is a guess is a problem.
+    """Record what the named values of a section's signals mean; report each undecided one.
 
     Args:
-        used: the message, as it is bound.
-        in_dbc: its signals with all their names.
-        listing: the section.
+        used: the message, which collects the meanings.
+        in_dbc: signals of the DBC with all their named values.
+        listing: the signals of the section.
     """
     named = [s for s in in_dbc if s.name in listing.signals and s.choices]
     names = list(dict.fromkeys(str(n) for s in named for n in (s.choices or {}).values()))
@@ -134,14 +135,14 @@ def check_codes(used: UsedMessage, in_dbc: Iterable[Signal], listing: Listing) -
 
 
 def is_guess(signal: Signal, raw: float, name: str) -> bool:
-    """Whether the DBC leaves open if a named value is a measurement."""
+    """Return whether the DBC leaves it open if a named value is a measurement or a fault."""
     if named_fault(name) or is_neutral(signal, raw, name):
         return False
     return in_range(signal, _value(signal, raw))
 
 
 def _meaning(used: UsedMessage, listing: Listing, signal: Signal, raw: float, name: str) -> str:
-    """Say for people how a value is taken; note a problem where the file has to decide."""
+    """Return the meaning of a named value in words; report it where the file has to decide."""
     value, neutral, listed = _value(signal, raw), is_neutral(signal, raw, name), listing.codes
     needed = "value" if neutral else "fault" if not in_range(signal, value) else None
     if needed and listed.get(name, needed) != needed:
@@ -162,7 +163,7 @@ def _meaning(used: UsedMessage, listing: Listing, signal: Signal, raw: float, na
 
 
 def _effect(listing: Listing, signal: Signal, value: float) -> str:
-    """Effect of a value, for people."""
+    """Return the effect of a value in words."""
     if listing.moves is None:
         return f"{value:g} {signal.unit or ''}".strip()
     if not value:
@@ -174,5 +175,5 @@ def _effect(listing: Listing, signal: Signal, value: float) -> str:
 
 
 def _value(signal: Signal, raw: float) -> float:
-    """Its value in the unit of the DBC."""
+    """Return the value of a raw value in the unit of the DBC."""
     return float(raw * signal.scale + signal.offset)

@@ -1,4 +1,4 @@
-"""Protection of messages, received and sent, bound to the DBC."""
+"""Binds the protection of received and sent messages to the DBC."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from canshaper.checksums.kinds import Checksum
     from canshaper.codec.e2e import E2e
 
-# What a checksum of so many bits has to fill.
+# Part of a frame that a checksum of so many bits has to fill.
 PARTS = {4: "half of a byte", 8: "byte", 16: "pair of bytes"}
 
 
 def bind_protection(used: UsedMessage, config: Protected) -> Protection:
-    """Bind the protection of a message; its signals are noted as used."""
+    """Bind the protection of a message, and record its signals as used."""
     if config.e2e is not None:
         return _bind_e2e(used, config)
     place: Place = (*used.place, "alive_counter")
@@ -65,7 +65,7 @@ def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> "Checksum | Non
         add(place, f"{text}, got {message.name} from any")
     try:
         checksum.protect(bytes(message.length), 0)
-    except Exception as error:  # of a package: now, and not in the first tick
+    except Exception as error:  # raised by a package: report it now, not in the first tick
         text = f"{kind!r} fails on {message.name}: {type(error).__name__}: {error}"
         add(place, text)
     return checksum
@@ -119,7 +119,7 @@ def _bits(signal: Signal) -> list[int]:
 
 
 def _fills(signal: Signal, bits: int) -> bool:
-    """Whether an unsigned integer signal has so many bits, which fill bytes or half of one."""
+    """Return whether a signal is unsigned, has this many bits, and fills whole bytes or a half."""
     places = _bits(signal)
     whole = min(places) % min(bits, 8) == 0 and max(places) - min(places) == bits - 1
     return whole and signal.length == bits and not signal.is_float and not signal.is_signed

@@ -1,6 +1,6 @@
-"""Routing: the role of each frame on the buses, one table, built once when they are bound.
+"""Routing table: the role of each frame on the buses, built once for a bound deployment.
 
-Sockets are filtered by it, the controller and the tools that only listen look frames up in it.
+Sockets filter by it; the controller, and tools that only listen, look frames up in it.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
@@ -26,27 +26,27 @@ from canshaper.machine.inputs import BoundInput
 from canshaper.machine.valves import BoundAxis
 
 Key = tuple[str, int, bool]
-"""Bus, id, and whether that is extended."""
+"""(bus, id, whether the id is extended)."""
 
 
 class Role(Enum):
     """Role of a frame with a certain id."""
 
     RECEIVED = "received"
-    """An input."""
+    """A message that we receive."""
     NODE = "node"
     """Heartbeat or emergency of a node of CANopen."""
     VALVE = "valve"
-    """Our command to a valve; from others it is that of a second sender."""
+    """Our command to a valve; from any other node it is a second sender's."""
     SENT = "sent"
-    """Any other message that we send; from others it is that of a second sender."""
+    """Any other message that we send; from any other node it is a second sender's."""
     CLAIM = "claim"
-    """Message of our J1939 node about its address: other nodes send it too."""
+    """Address message of our J1939 node: other nodes may send the same id."""
 
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """One id on one bus; ``input`` is the input that is received by it."""
+    """Role of one id on one bus; ``input`` is the input that receives its frames, or None."""
 
     role: Role
     input: BoundInput | None = None
@@ -54,12 +54,12 @@ class Route:
 
 @dataclass(frozen=True, slots=True)
 class GroupRoute:
-    """A group of J1939 on one bus.
+    """Roles of one J1939 group on one bus.
 
     Attributes:
-        inputs: those that are received by it, whatever their priority.
-        axes: names of those whose valves it commands, from whatever address it comes.
-        claims: whether nodes say by it what address they have.
+        inputs: inputs that receive frames of the group, at any priority.
+        axes: names of the axes whose valves the group commands, from any source address.
+        claims: whether nodes claim or request addresses with the group.
     """
 
     inputs: tuple[BoundInput, ...] = ()
@@ -72,17 +72,17 @@ class BusRoutes:
     """Routes of one bus as sets of (id, extended), for its sockets.
 
     Attributes:
-        received: messages that are received by their id.
-        sent: messages that we send, and no one else may.
-        valves: the messages among ``sent`` that move something.
+        received: messages that we receive by their id.
+        sent: messages that we send, and no one else may send.
+        valves: the messages among ``sent`` that command valves.
         known: all messages of the DBC files; any other message is a fault.
-        received_groups: groups of J1939 that are received, from whatever address.
-        sent_groups: groups that we send, and no one else may.
-        claims: messages of ours in groups that are received: they come back among these.
-        j1939: the bus is one of J1939, where unknown ids of 29 bits are normal.
-        canopen: the bus is one of CANopen, where ids of SDO, SYNC and the like are normal.
-        in_line: the bus is one of an inline gateway, which forwards every unknown id.
-        fd: messages that are sent in frames of CAN FD, by us and by others.
+        received_groups: J1939 groups that we receive, from any source address.
+        sent_groups: J1939 groups that we send, and no one else may send.
+        claims: address messages of ours, whose echoes come back among the received groups.
+        j1939: whether the bus is one of J1939, where unknown ids of 29 bits are normal.
+        canopen: whether the bus is one of CANopen, where ids of SDO, SYNC and so on are normal.
+        in_line: whether the bus is one of an inline gateway, which forwards every unknown id.
+        fd: messages in frames of CAN FD, ours and those of others.
     """
 
     received: frozenset[tuple[int, bool]]
@@ -103,11 +103,10 @@ class Routing:
     """Routing table of all buses.
 
     Attributes:
-        routes: routes of ids, by bus, id and whether that is extended.
-        groups: routes of groups of J1939, by bus and group.
-        valves: names of the axes whose commands a message carries; also where another controller
-            sends it.
-        others: messages of the DBC files that are neither received nor sent: other traffic.
+        routes: route of each id, by (bus, id, extended).
+        groups: route of each J1939 group, by (bus, group).
+        valves: names of the axes whose commands a message carries, whoever sends it.
+        others: messages of the DBC files that we neither receive nor send.
         buses: routes of each bus, for its sockets.
     """
 
@@ -119,23 +118,23 @@ class Routing:
 
     @property
     def sent(self) -> frozenset[Key]:
-        """Messages that we send, and no one else may."""
+        """Messages that we send, and no one else may send."""
         return frozenset(k for k, r in self.routes.items() if r.role in (Role.VALVE, Role.SENT))
 
     def received(self, key: Key) -> bool:
-        """Whether a message of the DBC files matters to us when others send it."""
+        """Return whether we receive a message: it has a route, or no DBC file lists it."""
         bus, can_id, extended = key
         group = extended and (bus, group_of(can_id)) in self.groups
         return key in self.routes or group or key[1:] not in self.others
 
 
 def exact_inputs(inputs: Iterable[BoundInput]) -> dict[Key, BoundInput]:
-    """Inputs by every id that their frames may have, where their source is known."""
+    """Return the inputs from a known source, by every id that their frames may have."""
     return {key: bound for bound in inputs if not bound.any_source for key in bound.keys}
 
 
 def grouped_inputs(inputs: Iterable[BoundInput]) -> dict[tuple[str, int], tuple[BoundInput, ...]]:
-    """Inputs that are known by their group, by bus and group."""
+    """Return the inputs that are received by their J1939 group, by bus and group."""
     groups: dict[tuple[str, int], tuple[BoundInput, ...]] = {}
     for bound in inputs:
         if bound.by_group:
@@ -159,13 +158,13 @@ def build_routing(
 
     Args:
         config: the deployment file.
-        inputs: every message that is received.
+        inputs: every message that we receive.
         axes: the axes.
-        statuses: status messages that are sent.
+        statuses: status messages that we send.
         known: every message of the DBC files.
         j1939: buses on which a message of J1939 is used.
         fd: messages of CAN FD that are used.
-        listen_only: nothing is sent but status, and the valves are those of another controller.
+        listen_only: whether we send only status, and another controller drives the valves.
     """
     axes = list(axes)
     valves: dict[Key, tuple[str, ...]] = {}
@@ -203,7 +202,7 @@ def build_routing(
 
 
 def _ids(routes: Mapping[Key, Route], bus: str, *roles: Role) -> frozenset[tuple[int, bool]]:
-    """Ids of one bus with these roles; without inputs that are received by their group."""
+    """Return the ids of one bus with these roles, but not of inputs received by their group."""
     return frozenset(
         key[1:]
         for key, route in routes.items()
@@ -212,7 +211,7 @@ def _ids(routes: Mapping[Key, Route], bus: str, *roles: Role) -> frozenset[tuple
 
 
 def _node_routes(name: str, bus: Bus, listen_only: bool) -> Iterator[tuple[Key, Route]]:
-    """Yield what our node and others send on a bus of J1939 or CANopen about themselves."""
+    """Yield the routes of messages with which J1939 or CANopen nodes report themselves on a bus."""
     if bus.canopen:
         for node in bus.canopen.nodes.values():
             for base in (HEARTBEAT, EMERGENCY):
@@ -233,10 +232,10 @@ def _node_routes(name: str, bus: Bus, listen_only: bool) -> Iterator[tuple[Key, 
 def _group_routes(
     config: DeploymentConfig, inputs: Iterable[BoundInput], axes: Iterable[BoundAxis]
 ) -> dict[tuple[str, int], GroupRoute]:
-    """Groups of J1939: commands to our valves, inputs, and what nodes say about addresses."""
+    """Return the routes of J1939 groups: valve commands, inputs, claims and requests."""
     commanded: dict[tuple[str, int], tuple[str, ...]] = {}
     for axis in axes:
-        # Not those of joysticks whose frames we forward: others send the same group.
+        # Joystick frames that we forward are left out: the joystick itself sends the same group.
         if is_j1939(axis.valve_message) and not axis.rewrites:
             bus, can_id, _ = axis.valve.message.key
             at = (bus, group_of(can_id))

@@ -1,4 +1,4 @@
-"""Stopping distance of an axis at the tip, against its bound; measured or rehearsed numbers."""
+"""Stopping distance of an axis at the tip against its limit; numbers of a simulated crane."""
 
 import math
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ from canshaper.config.source import Place
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.limits import OutputLimits
 
-# Farthest that limits allow without a word of the file: what a tip at 1 m/s, a usual speed of
-# near-far, travels in the default tail of 2 s. A person next to the load needs to know of more.
+# Longest stopping distance that the file need not state: a tip at 1 m/s, a usual speed of near-far,
+# travels as far in the default tail of 2 s. A person next to the load has to know of a longer one.
 MOST_UNSTATED_M = 2.0
 
 
@@ -21,8 +21,8 @@ class FullSpeed:
     """Full speed of an axis.
 
     Attributes:
-        m_s: speed of the tip; None where the file does not say.
-        rad_s: angular speed of an axis that slews; None where it does not, or none is given.
+        m_s: speed of the tip, m/s; None where the file does not state it.
+        rad_s: angular speed of a slewing axis, rad/s; None for any other axis.
     """
 
     m_s: float | None
@@ -30,7 +30,7 @@ class FullSpeed:
 
 
 def full_speed(axis: AxisSection) -> FullSpeed:
-    """Full speed of an axis, of one that slews at its largest radius where that is known."""
+    """Return the full speed of an axis; the tip of a slewing axis is at its largest radius."""
     slewing = axis.slewing
     speed_m_s = axis.sway.full_speed_m_s if axis.sway else None
     if slewing:
@@ -40,10 +40,10 @@ def full_speed(axis: AxisSection) -> FullSpeed:
 
 
 def output_limits(axis: AxisSection, *, timeout_ms: int, period_s: float) -> OutputLimits:
-    """Limits of an axis, with the run-on that its ``stop_distance_m`` leaves.
+    """Return the limits of an axis, with the run-on that its ``stop_distance_m`` leaves.
 
-    The tip travels at full speed until a lost joystick is seen, and while a command waits; what is
-    left of the distance is for the run-on. Arguments as ``allowed_m``.
+    The tip travels at full speed until a lost joystick is seen, and while a command waits; the
+    run-on may use the rest of the distance. Arguments as of ``allowed_m``.
     """
     limits = axis.limits.output_limits()
     stated, speed = axis.limits.stop_distance_m, full_speed(axis).m_s
@@ -54,22 +54,22 @@ def output_limits(axis: AxisSection, *, timeout_ms: int, period_s: float) -> Out
 
 
 def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s: float) -> float:
-    """Travel that the limits allow after release or a lost joystick, whatever the filter does.
+    """Return the travel that the limits allow after release or a lost joystick, for any filter.
 
-    Full speed until the event is seen, full speed for the whole tail, then the slowest fall; where
-    the run-on is bounded no farther than that, and a period for the tick in which it ends.
+    The axis moves at full speed until the event is seen, at full speed for the whole tail, then by
+    the slowest fall. A bounded run-on ends earlier, plus one period for the tick in which it ends.
 
     Args:
         limits: limits of the axis.
-        stop_s: longest duration of STOPPING.
-        timeout_s: age at which the joystick counts as lost.
-        period_s: time between two commands to the valve; an event waits so long at most.
+        stop_s: longest duration of STOPPING, seconds.
+        timeout_s: age at which the joystick counts as lost, seconds.
+        period_s: time between two commands to the valve, seconds: the longest wait of an event.
 
     Returns:
         Seconds of full speed.
     """
     full, fall = limits.maximum, limits.fall_per_s
-    # Durations are whole ticks; the longest that rounding makes of them.
+    # Durations are rounded to whole ticks; these are the longest results.
     tail_s, stop_s = limits.tail_s + 0.5 * period_s, max(stop_s + 0.5 * period_s, period_s)
     falling_s = min(full / fall, max(0.0, stop_s - tail_s))
     stop = full * min(tail_s, stop_s) + (full - 0.5 * fall * falling_s) * falling_s
@@ -80,12 +80,14 @@ def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s
 
 
 def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float | None:
-    """Farthest that the limits allow the tip to travel when it stops; None without its speed.
+    """Return the longest stopping distance of the tip (m) that the limits allow.
+
+    It is None where the file does not state the speed of the tip.
 
     Args:
         axis: the axis.
-        timeout_ms: that of its joystick.
-        period_s: time between two commands to the valve.
+        timeout_ms: timeout of its joystick, milliseconds.
+        period_s: time between two commands to the valve, seconds.
     """
     speed = full_speed(axis).m_s
     if speed is None:
@@ -99,7 +101,10 @@ def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float |
 
 
 def stated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
-    """Why no limit keeps an axis within its ``stop_distance_m``, or None; as ``allowed_m``."""
+    """Return why no limit can keep an axis within its ``stop_distance_m``, or None.
+
+    Arguments as of ``allowed_m``.
+    """
     stated, speed = axis.limits.stop_distance_m, full_speed(axis).m_s
     if stated is None:
         return None
@@ -116,7 +121,10 @@ def stated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str 
 
 
 def unstated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
-    """Why an axis may not move without a ``stop_distance_m``, or None; as ``allowed_m``."""
+    """Return why an axis may not move without a ``stop_distance_m``, or None.
+
+    Arguments as of ``allowed_m``.
+    """
     allowed = allowed_m(axis, timeout_ms=timeout_ms, period_s=period_s)
     if axis.limits.stop_distance_m is not None or allowed is None or allowed <= MOST_UNSTATED_M:
         return None
@@ -127,33 +135,33 @@ def unstated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> st
 
 
 def stop_fault(deployment: Deployment, name: str, axis: AxisSection) -> str | None:
-    """Why the stopping distance of an axis is too long, stated in the file or not; None if not.
+    """Return the fault of the axis' stopping distance, stated or unstated; None without one.
 
     Args:
         deployment: the machine.
-        name: the axis.
-        axis: its configuration, or another one that it shall have.
+        name: name of the axis.
+        axis: configuration to check: the present one of the axis, or a new one.
     """
     times = when(deployment, name)
     return stated_fault(axis, **times) or unstated_fault(axis, **times)
 
 
 def unstated(deployment: Deployment) -> Iterator[tuple[Place, str]]:
-    """Axes that stop over a long way which the file does not state: where, and why."""
+    """Yield (place, fault) of axes with a long stopping distance that the file does not state."""
     for name, axis in deployment.axes.items():
         if fault := unstated_fault(axis.config, **when(deployment, name)):
             yield ("axes", name, "limits", "stop_distance_m"), fault
 
 
 class When(TypedDict):
-    """Times on which the stopping distance of an axis depends, see ``allowed_m``."""
+    """Times on which the stopping distance of an axis depends: arguments of ``allowed_m``."""
 
     timeout_ms: int
     period_s: float
 
 
 def when(deployment: Deployment, name: str) -> When:
-    """When an axis sees an event: timeout of its joystick, time between two commands."""
+    """Return the times of an axis: timeout of its joystick, time between two commands."""
     axis = deployment.axes[name]
     return {
         "timeout_ms": axis.timeout_ms,
@@ -162,18 +170,18 @@ def when(deployment: Deployment, name: str) -> When:
 
 
 def _up(distance_m: float) -> str:
-    """Rounded up to the centimetre, so that it can be written as it is shown."""
+    """Return a distance rounded up to the centimetre, so that the shown value is accepted."""
     return f"{math.ceil(100.0 * distance_m - 1e-9) / 100.0:g}"
 
 
 def rehearsed(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Sections with numbers of a simulated crane: where, and what to do."""
+    """Yield (place, what to do) of sections with numbers of a simulated crane."""
     for place in simulated(config):
         yield place, "measured on a simulated crane; measure it on the machine"
 
 
 def rehearsed_valves(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Valve curves of a simulated crane that would move valves on a real bus: where, and why."""
+    """Yield (place, fault) of valve curves of a simulated crane whose valve is on a real bus."""
     for name, axis in config.axes.items():
         bus = config.buses[axis.valve.bus]
         if not bus.is_virtual:

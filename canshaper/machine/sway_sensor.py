@@ -1,4 +1,4 @@
-"""Sway sensors of a deployment, bound to the DBC."""
+"""Binds the sway sensors of a deployment to the DBC."""
 
 import math
 from collections.abc import Mapping
@@ -21,17 +21,17 @@ UNITS = {
     Measured.ANGLE: _ANGLES,
     Measured.RATE: {f"{unit}/s": factor for unit, factor in _ANGLES.items()},
 }
-"""Units that a DBC may have, with their factors to rad or rad/s."""
-# Measurements in a swing, at least: with fewer the observer is behind it.
+"""Units that a DBC may give, by quantity, with their factors to rad or rad/s."""
+# Fewest measurements in a swing: with fewer the observer lags behind the swing.
 LEAST_SAMPLES = 6.0
-# Largest delay, part of a swing: what is older says little about the swing now.
+# Largest delay, part of a swing: an older measurement says little about the present swing.
 MOST_DELAY = 0.25
 # Least time constant, in swings, with which an inclinometer corrects its gyro. Accelerations show
-# no swing of a free pendulum: with less they hide it, and what is left of it comes ahead of time.
+# no swing of a free pendulum: a shorter constant hides the swing and shifts the rest ahead in time.
 LEAST_FUSION = 1.5
-# Longest period of a second swing, part of the first: one that is slower cannot be kept apart.
+# Longest period of a second swing, part of the first: a slower one cannot be separated from it.
 MOST_SECOND = 0.5
-# A second swing of long logs is about as much damped; the first one's damping says little of it.
+# Typical damping ratio of the second swing, of long logs; that of the first says little about it.
 SECOND_DAMPING = 0.04
 
 
@@ -40,8 +40,8 @@ class SensorMessage(Bound[SwaySensorSection]):
     """A message with measurements of sway.
 
     Attributes:
-        signals: those that are read.
-        merits: names of their figures of merit, by their own; of those that have one.
+        signals: signals that axes read.
+        merits: name of a signal's figure of merit, by signal, where it has one.
     """
 
     signals: tuple[Signal, ...]
@@ -53,14 +53,14 @@ class BoundSwaySensor:
     """Sway sensor of an axis.
 
     Attributes:
-        config: its section.
-        message: its message, which other axes may read too.
-        signal: its signal.
+        config: section of the sensor.
+        message: message of the sensor, which other axes may read too.
+        signal: signal with the measurement.
         factor: rad or rad/s per unit of the signal, with the sign of the sway model.
-        cycle_s: time between two frames.
-        timing: when it measures.
-        limits: what it may show.
-        gains: of its observer, computed here because no loop may wait for them.
+        cycle_s: time between two frames, seconds.
+        timing: period, delay and lags of the measurements.
+        limits: noise, offset and other bounds of the measurements.
+        gains: gains of its observer, computed in advance because no control loop may wait for it.
     """
 
     config: SwaySensorSection
@@ -74,12 +74,12 @@ class BoundSwaySensor:
 
     @property
     def name(self) -> str:
-        """MESSAGE.SIGNAL."""
+        """Name of the sensor, MESSAGE.SIGNAL."""
         return f"{self.message.message.name}.{self.signal.name}"
 
 
 def sensor_limits(config: SwaySensorSection) -> SensorLimits:
-    """Bounds of the measurements of a sensor."""
+    """Return the bounds of the measurements of a sensor."""
     noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
     second_s = config.second_period_s
     second = SwayMode.from_period(second_s, SECOND_DAMPING) if second_s else None
@@ -87,7 +87,7 @@ def sensor_limits(config: SwaySensorSection) -> SensorLimits:
 
 
 def sensor_timing(config: SwaySensorSection, cycle_s: float, period_s: float) -> SensorTiming:
-    """When a sensor measures, on an axis whose command is sent every so many seconds."""
+    """Return the timing of a sensor with this cycle, on an axis commanded every ``period_s``."""
     return SensorTiming(
         config.measured,
         period_s=max(cycle_s, period_s),
@@ -98,11 +98,11 @@ def sensor_timing(config: SwaySensorSection, cycle_s: float, period_s: float) ->
 
 
 def bind_sway_sensors(lookup: Lookup, periods: Mapping[str, float]) -> dict[str, BoundSwaySensor]:
-    """Every sway sensor of an axis without a problem, by the name of the axis.
+    """Bind the sway sensors; return the sensor of each axis without a problem, by axis.
 
     Args:
-        lookup: what it is bound with.
-        periods: seconds between two commands of an axis, of those without a problem.
+        lookup: shared data of the deployment.
+        periods: seconds between two commands of an axis, by axis without a problem.
     """
     readers: dict[tuple[str, str], dict[str, SwaySensorSection]] = {}
     for name, axis in lookup.config.axes.items():
@@ -117,7 +117,7 @@ def bind_sway_sensors(lookup: Lookup, periods: Mapping[str, float]) -> dict[str,
 def _bind_message(
     lookup: Lookup, sensors: dict[str, SwaySensorSection], periods: Mapping[str, float]
 ) -> dict[str, BoundSwaySensor]:
-    """The axes that read one message."""
+    """Bind the sensors of all axes that read one message; return them by axis."""
     first, *others = sensors
     config = sensors[first]
     for other in others:
@@ -155,7 +155,7 @@ def _place(axis: str) -> Place:
 
 
 def _factor(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> tuple[Signal, float] | None:
-    """The signal of an axis, and rad or rad/s per unit of it, with the sign of the model."""
+    """Return the sensor signal of an axis, and its factor to rad or rad/s with the model's sign."""
     place = (*_place(axis), "signal")
     signal = used.find(place, sensor.signal)
     if signal is None:
@@ -171,7 +171,7 @@ def _factor(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> tuple[Si
 
 
 def _merit(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> str | None:
-    """The figure of merit of the measurements of an axis, which several may share."""
+    """Return the signal of the figure of merit of an axis' sensor, which several may share."""
     place = (*_place(axis), "merit")
     signal = used.find(place, sensor.merit)
     if signal is None:
@@ -213,7 +213,7 @@ def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensorSecti
 
 
 def _fusion_fault(sensor: SwaySensorSection, swing_s: float) -> str | None:
-    """Why ``fusion_s`` does not suit the sensor; None where it does."""
+    """Return why ``fusion_s`` does not suit the sensor, or None."""
     fusion_s, least_s = sensor.fusion_s, LEAST_FUSION * swing_s
     if sensor.kind != "inclination":
         text = f"expected it with the kind inclination only, got it with {sensor.kind}"

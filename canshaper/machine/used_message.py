@@ -1,7 +1,7 @@
-"""A message that a part of a deployment uses, and its signals while they are bound.
+"""A message that a section of a deployment uses, and the uses of its signals while it is bound.
 
-A switch whose values mean the contrary in the DBC is refused, with what it would do, and what to
-write.
+A switch is refused if its values mean the contrary in the DBC; the message says what the switch
+would do, and what to write instead.
 """
 
 from collections.abc import Mapping
@@ -22,13 +22,14 @@ _OTHER = "name another signal, or correct VAL_ where the DBC is wrong or says ne
 
 
 class Contrary(NamedTuple):
-    """Effect of a switch that is taken for its contrary, and the cure.
+    """Texts for a switch whose names in the DBC mean the contrary: its effect, and the cure.
 
     Attributes:
-        effect: in words that end before the position of the switch.
+        effect: effect in words, to be followed by the position of the switch.
         cure: what to write instead.
-        stop: whether it is an emergency stop.
-        known: whether a name that says neither is refused too: it would let a valve move.
+        stop: whether the switch is an emergency stop.
+        known: whether a name that says neither on nor off is refused too, as it may be a fault
+            under which a valve would move.
     """
 
     effect: str
@@ -57,12 +58,12 @@ SWITCHES = {
 
 
 def flag_of(key: str) -> Contrary:
-    """A flag of the direction of a joystick."""
+    """Return the texts for a direction flag of a joystick."""
     return Contrary(f"be taken as {key} while")
 
 
 def contrary_fault(signal: Signal, key: str | int, wrong: Contrary) -> str | None:
-    """Why a switch does the contrary by its names, or None; ``key`` is what names it."""
+    """Return why a switch does the contrary by its names, or None; ``key`` is its key."""
     choices: Mapping[int, object] = signal.choices or {}
     names = {raw: str(n) for raw, n in choices.items() if not names_broken(str(n))}
     off = key == "anti_sway_off"  # whose own name says off, as it should
@@ -79,7 +80,7 @@ def contrary_fault(signal: Signal, key: str | int, wrong: Contrary) -> str | Non
 
 
 class NamedCode(NamedTuple):
-    """A value that the DBC names (VAL_) of a signal that is read, and what it means."""
+    """A named value (VAL_ of the DBC) of a signal that is read, and its meaning for us."""
 
     message: str
     signal: str
@@ -99,19 +100,19 @@ class StartValue(NamedTuple):
 
 @dataclass(frozen=True)
 class UsedMessage:
-    """A message with the part of the deployment file that names it.
+    """A message with the section of the deployment file that names it.
 
     Attributes:
-        diagnostics: gets every problem.
-        place: of that part.
-        file: its DBC file.
-        message: the message.
+        diagnostics: collects every problem.
+        place: place of the section.
+        file: DBC file of the message.
+        message: the message, with the file's corrections.
         can_id: its identifier on the bus; in J1939 with the source address, 254 for any.
         any_source: whether it may come from any source address.
-        chosen: which frames are meant, where the message is multiplexed.
-        uses: what its signals are used for, by name: each has one use, or a switch could move an
+        chosen: which frames count, where the message is multiplexed.
+        uses: use of each signal, by name. A signal has one use only; else a switch could move an
             axis.
-        codes: what the named values of its signals mean.
+        codes: meanings of the named values of its signals.
         starts: start values of signals that no axis uses, in a valve message.
     """
 
@@ -127,16 +128,16 @@ class UsedMessage:
     starts: list[StartValue] = field(default_factory=list)
 
     def add(self, key: str, text: str) -> None:
-        """Note a problem at a key of its part of the deployment file."""
+        """Add a problem at a key of the section."""
         self.diagnostics.add((*self.place, key), text)
 
     def add_fault(self, fault: str | None) -> None:
-        """Note a problem in the DBC file; None is no problem."""
+        """Add a problem at the message in its DBC file; None is no problem."""
         if fault is not None:
             self.diagnostics.problems.append(self.file.problem(self.message, fault))
 
     def find(self, place: Place, name: str | None) -> Signal | None:
-        """The signal; None when there is none of that name, or none was named."""
+        """Return the signal; None without a name, and with a problem if there is no such signal."""
         if name is None:
             return None
         signal = find_signal(self.message, name)
@@ -149,7 +150,7 @@ class UsedMessage:
     def integer(
         self, place: Place, name: str | None, use: str, *, signed: bool = True
     ) -> Signal | None:
-        """The signal of a switch, counter or code, which is known by its raw value."""
+        """Return the integer signal of a switch, counter or code, and record its use."""
         if signal := self.find(place, name):
             self.check_integer(place, signal, signed=signed)
             self.use(place, signal, use)
@@ -163,15 +164,15 @@ class UsedMessage:
         other: str,
         wrong: Contrary | None = None,
     ) -> None:
-        """Note what the codes of a switch mean, and a problem where the DBC has them otherwise.
+        """Record what the codes of a switch mean; add a problem where the DBC contradicts.
 
         Args:
-            place: of the key that names it.
-            name: its signal; one that is missing is noted elsewhere.
-            means: what the codes mean that count.
-            other: what all others mean.
-            wrong: what it would do where its names mean the contrary; None where the file says
-                which code counts.
+            place: place of the key that names the switch.
+            name: name of its signal; a missing signal is reported elsewhere.
+            means: meaning of each code that counts.
+            other: meaning of every other code.
+            wrong: texts for names that mean the contrary; None where the file states which code
+                counts.
         """
         signal = None if name is None else find_signal(self.message, name)
         if signal is None:
@@ -191,10 +192,10 @@ class UsedMessage:
                 self.diagnostics.add(place, f'{text}, whose {raw} is "{code.name}" in the DBC')
 
     def check_start_values(self, start: Mapping[str, float]) -> None:
-        """Check that signals that no axis uses rest: every frame carries their start value.
+        """Check that the start value of each unused signal is at rest: every frame carries it.
 
         Args:
-            start: raw start value of every signal of the message that is sent.
+            start: raw start value of every signal of the sent message, by name.
         """
         for signal in self.message.signals:
             raw = start[signal.name]
@@ -213,21 +214,21 @@ class UsedMessage:
                 self.add_fault(f"{signal.name}: GenSigStartValue: {text} {unit}".rstrip())
 
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
-        """Check that a raw value is a whole number."""
+        """Check that a signal is an integer, and unsigned unless ``signed``."""
         if signal.is_float or (signal.is_signed and not signed):
             got = "a float" if signal.is_float else "a signed one"
             kind = "an integer" if signed else "an unsigned integer"
             self.diagnostics.add(place, f"{signal.name}: expected {kind} signal, got {got}")
 
     def use(self, place: Place, signal: Signal, use: str) -> None:
-        """Note the one use of a signal."""
+        """Record the use of a signal; add a problem if it has one already."""
         self.check_unused(place, signal)
         self.uses[signal.name] = use
 
     def check_unused(
         self, place: Place, signal: Signal, also: dict[str, str] | None = None
     ) -> None:
-        """Note a problem where the signal has a use already, by ``uses`` or by ``also``."""
+        """Add a problem if ``uses`` or ``also`` already has a use of the signal."""
         if use := self.uses.get(signal.name) or (also or {}).get(signal.name):
             self.diagnostics.add(
                 place,
@@ -235,12 +236,12 @@ class UsedMessage:
             )
 
     def check_state_bits(self, place: Place, signal: Signal) -> None:
-        """Check that control and status word of CiA 408 have the state in their low bits."""
+        """Check that a control or status word of CiA 408 is long enough for the state bits."""
         if signal.length < STATE_BITS:
             text = f"{signal.name}: expected {STATE_BITS} bits or more, got {signal.length}"
             self.diagnostics.add(place, text)
 
 
 def key_path(place: Place) -> str:
-    """A place as it is written: axes.slew.valve."""
+    """Return a place as text, such as axes.slew.valve."""
     return ".".join(str(part) for part in place)

@@ -1,4 +1,4 @@
-"""Valve messages of a deployment, bound to the DBC: one for each axis, or shared by several."""
+"""Binds valve messages to the DBC: each carries the command of one axis, or of several."""
 
 import re
 from dataclasses import dataclass
@@ -40,18 +40,18 @@ from canshaper.machine.used_message import UsedMessage, key_path
 if TYPE_CHECKING:
     from canshaper.machine.sway_sensor import BoundSwaySensor
 
-# A valve learns of a stop no sooner than with its next frame.
+# Longest cycle of a valve message: a valve learns of a stop no sooner than with its next frame.
 SLOWEST_VALVE_MS = 200
-# Frames that a valve may miss but one before it closes by itself.
+# Cycles within the timeout of a valve: it may miss one frame fewer before it closes by itself.
 FRAMES_PER_TIMEOUT = 3
-# What is about a message, not about one of the axes in it.
+# Keys of the section valve that describe the message: equal for all axes in it.
 MESSAGE_KEYS = ("alive_counter", "checksum", "e2e", "cycle_ms", "multiplexor")
 _FLOAT = re.compile("float", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class SharedValve:
-    """A valve message that is bound: what its other axes may not use again."""
+    """A bound valve message, kept for the other axes whose commands it carries."""
 
     used: UsedMessage
     ticks: int
@@ -65,14 +65,14 @@ SharedValves = dict[tuple[str, str], SharedValve]
 def bind_valve(
     lookup: Lookup, shared_valves: SharedValves, place: Place, valve: Valve, command: Command
 ) -> tuple[ValveCodec, int] | None:
-    """Bind the valve of an axis: its codec, and its period in ticks.
+    """Bind the valve of an axis; return its codec and its period in ticks, None with problems.
 
     Args:
-        lookup: what it is bound with.
-        shared_valves: valve messages bound so far, by bus and name; this one is noted in it.
-        place: of the valve in the deployment file.
-        valve: the valve.
-        command: the command of its axis.
+        lookup: shared data of the deployment.
+        shared_valves: valve messages bound so far, by bus and name; a new one is added.
+        place: place of the section in the deployment file.
+        valve: section ``valve`` of the axis.
+        command: section ``command`` of the axis.
     """
     before = len(lookup.diagnostics.problems)
     name = _rewritten_joystick(lookup.config, valve)
@@ -113,7 +113,7 @@ def bind_valve(
 
 
 def _check_cycle(lookup: Lookup, place: Place, valve: Valve, shared: SharedValve) -> None:
-    """Check that its frames come soon and often enough."""
+    """Check that a valve message is sent often enough, for a stop and for the valve's timeout."""
     cycle_ms = shared.ticks * lookup.config.tick_ms
     least_ms = cycle_ms * FRAMES_PER_TIMEOUT
     if cycle_ms > SLOWEST_VALVE_MS:
@@ -128,7 +128,7 @@ def _check_cycle(lookup: Lookup, place: Place, valve: Valve, shared: SharedValve
 
 
 def _rewritten_joystick(config: DeploymentConfig, valve: Valve) -> str | None:
-    """Name of the joystick whose frames leave as this message, through the gateway."""
+    """Return the joystick whose frames leave as this valve message through the gateway, or None."""
     gateway = config.gateway
     if gateway is None or (bus := gateway.other(valve.bus)) is None:
         return None
@@ -139,7 +139,7 @@ def _rewritten_joystick(config: DeploymentConfig, valve: Valve) -> str | None:
 def _check_rewritten(
     lookup: Lookup, place: Place, valve: Valve, command: Command, name: str
 ) -> None:
-    """Check that only its own axes rewrite a joystick's frames, with the same protection."""
+    """Check that only a joystick's own axes rewrite its frames, with the joystick's protection."""
     add, joystick = lookup.diagnostics.add, lookup.config.joysticks[name]
     if command.joystick != name:
         text = f"expected the message of joystick {command.joystick}, or one of no joystick"
@@ -159,7 +159,7 @@ def _check_rewritten(
             add((*place, key), f"{text}, got one")
     text = f"joystick {name}, got another"
     lookup.diagnostics.check_same(place, valve, MESSAGE_KEYS, joystick, text)
-    # What stands in for a lost joystick comes with the first tick after its timeout.
+    # Our frames for a lost joystick begin with the first tick after its timeout.
     lost_ms = joystick.timeout_ms + lookup.config.tick_ms
     if valve.timeout_ms <= lost_ms:
         text = f"expected more than {lost_ms} ms, a tick more than joystick {name}, whose receiver"
@@ -170,13 +170,13 @@ def _check_rewritten(
 def _bind_message(
     lookup: Lookup, shared_valves: SharedValves, place: Place, valve: Valve, joystick: str | None
 ) -> SharedValve | None:
-    """Bind the message of a valve, new or already that of another axis."""
+    """Bind the message of a valve, or return it if another axis has bound it already."""
     key = (valve.bus, valve.message)
     if shared := shared_valves.get(key):
         text = f"the other axes of {valve.message}, got another"
         lookup.diagnostics.check_same(place, valve, MESSAGE_KEYS, shared.config, text)
         return shared
-    # A joystick's message keeps the address of its sender, who is not on this bus.
+    # A joystick's message keeps the address of its sender, which is on the other bus.
     source = lookup.config.joysticks[joystick].source if joystick is not None else None
     used = lookup.message(place, valve, received=joystick is not None, source=source)
     if not used:
@@ -193,7 +193,7 @@ def _bind_message(
 def _rewritten_message(
     config: DeploymentConfig, used: UsedMessage, valve: Valve, joystick: str, protection: Protection
 ) -> SentMessage:
-    """The message of a joystick as it leaves, with the switch that enables it."""
+    """Return the joystick message that we rewrite, with the switch that enables the joystick."""
     if (enable := own_switch(config, joystick)) is None:
         text = "expected one switch of its own message, where its frames leave through the gateway"
         used.diagnostics.add(("joysticks", joystick, "enable"), f"{text}, got another")
@@ -219,7 +219,7 @@ def _rewritten_message(
 
 
 def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -> Signal | None:
-    """Bind the signal of the command, or of its magnitude where the direction stands apart."""
+    """Bind the signal of the command, or of its magnitude where other signals say the direction."""
     signal = used.find(place, name)
     if signal is None:
         return None
@@ -261,18 +261,19 @@ def _bind_direction(
 
 
 def _alike(one: Signal, other: Signal) -> bool:
-    """Whether two signals count the same way."""
+    """Return whether two signals have the same scaling, maximum and length."""
     kind = attrgetter("scale", "offset", "maximum", "length")
     return bool(kind(one) == kind(other))
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoundAxis:
-    """An axis with its valve message and, where it has one, its status message.
+    """An axis with all its messages, bound to the DBC.
 
     Attributes:
         period_ticks: ticks from one command to the next.
         timeout_ms: longest time until its joystick, or a switch that enables it, counts as lost.
+        status_ticks: ticks from one status message to the next.
     """
 
     name: str
@@ -290,10 +291,10 @@ class BoundAxis:
 
     @property
     def valve_message(self) -> Message:
-        """The message of its valve."""
+        """The DBC message of its valve."""
         return self.valve.message.fields.message
 
     @property
     def rewrites(self) -> bool:
-        """Whether its command leaves in the frames of its own joystick, through a gateway."""
+        """Whether the command leaves through a gateway, in the frames of the axis' own joystick."""
         return self.valve.message.rewrites

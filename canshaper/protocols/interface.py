@@ -19,7 +19,7 @@ MessageKey = tuple[str, int, bool]
 
 
 class Event(Protocol):
-    """Anything that is logged."""
+    """An event that is logged."""
 
     @property
     def text(self) -> str:
@@ -31,15 +31,15 @@ class DrivenAxis(Protocol):
 
     @property
     def bound(self) -> BoundAxis:
-        """The axis with its codecs."""
+        """Configuration and codecs of the axis."""
 
     @property
     def valve(self) -> Sender:
-        """Sends the message of its valve."""
+        """Sender of the message of its valve."""
 
     @property
     def axis(self) -> ShapedAxis:
-        """Its state machine."""
+        """The shaped axis: state machine, filter and limits."""
 
     @property
     def feedback(self) -> Feedback | None:
@@ -47,17 +47,17 @@ class DrivenAxis(Protocol):
 
     @property
     def stops(self) -> StopCauses:
-        """Why it stops or may not begin."""
+        """Causes that stop the axis or keep it from starting."""
 
     def put(self, steps: int) -> None:
-        """Put a command into the message of its valve."""
+        """Put a command (raw steps) into the message of its valve."""
 
     def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of its sway sensor only while this node works."""
 
 
 class FrameHandler(Protocol):
-    """Receives frames that are known by more than their identifier."""
+    """Receives frames that no exact identifier selects, such as those of a J1939 group."""
 
     def receive(self, frame: Frame, arrived_ns: int, /) -> FrameFault:
         """Receive a frame, and return its fault."""
@@ -71,24 +71,27 @@ class ForwardingRule(Protocol):
         """Whether the last frame may move a valve."""
 
     def new_frame(self) -> bool:
-        """Whether a valid frame of the joystick came since the last call."""
+        """Return whether a valid frame of the joystick came since the last call."""
 
     def forward(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
-        """Return the frame of the joystick as it leaves; neutral where ``stopped``."""
+        """Return the joystick's frame with our velocities; these are 0 where ``stopped``."""
 
     def own(self, now_ns: int) -> Frame | None:
-        """Return a frame of our own, where the axes have just moved and the joystick has none."""
+        """Return a frame of our own where joystick frames are missing and a motion has to end."""
 
     def last(self) -> list[Frame]:
-        """Return the last frames before we go."""
+        """Return the last frames before we leave the bus."""
 
 
 class BusProtocol:
-    """One protocol on all buses of a machine; by default it does nothing; each defines ``usual``.
+    """One protocol on all buses of a machine.
+
+    By default every method does nothing; each protocol has to define ``usual``.
 
     Attributes:
-        inputs: what receives its own messages, by their identifiers.
-        forwarding: what leaves in the place of a valve message, by the identifier of that.
+        inputs: receivers of the protocol's own messages, by identifier.
+        forwarding: rules for joystick frames that leave instead of a valve message, by the
+            identifier of the valve message.
     """
 
     inputs: Mapping[MessageKey, MessageInput] = {}
@@ -96,22 +99,22 @@ class BusProtocol:
 
     @property
     def silent(self) -> frozenset[str]:
-        """Buses on which nothing but frames of this protocol may be sent now."""
+        """Buses on which only this protocol may send now."""
         return frozenset()
 
     def handler(self, frame: Frame) -> FrameHandler | None:
-        """Return the handler of a frame that is none of ``inputs``."""
+        """Return the handler of a frame that ``inputs`` does not receive, or None."""
 
     def usual(self, frame: Frame) -> bool:
-        """Whether such a frame is no fault although no DBC file has it."""
+        """Return whether a frame that no DBC file lists is normal, and no fault, here."""
         raise NotImplementedError
 
     def silence(self, now_ns: int) -> FrameFault:
-        """Return a fault where something has just fallen silent."""
+        """Return a fault where another node has just fallen silent."""
         return FrameFault.NONE
 
     def frames(self, now_ns: int) -> Iterable[Frame]:
-        """Return the frames due now, besides commands and status."""
+        """Return the protocol's own frames that are due now (not commands or status)."""
         return ()
 
     def changes(self) -> Iterable[Event]:
@@ -128,11 +131,11 @@ class BusProtocol:
         """Take note that a frame did not reach its bus."""
 
     def invalidate(self, bus: str | None = None) -> None:
-        """Invalidate what was received so far, of one bus or of all; but for ``inputs``."""
+        """Invalidate what was received on one bus or on all, except in ``inputs``."""
 
     def leave(self) -> None:
         """Prepare the end: the next frame of every valve is the last one."""
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
-        """Yield parts that a reload carries over besides ``inputs``; ``places``: keys of buses."""
+        """Yield parts that a reload carries over besides ``inputs``; ``places``: keys by bus."""
         yield from ()

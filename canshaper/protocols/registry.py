@@ -1,4 +1,4 @@
-"""Every protocol that a machine may speak; the daemon loads those of its file only."""
+"""Every protocol that a machine may speak; only those that its file needs are imported."""
 
 from collections.abc import Mapping, Sequence
 
@@ -19,9 +19,9 @@ def protocols(
 
     Args:
         deployment: the machine.
-        axes: its axes; protocols add their interlocks to them.
-        joysticks: its joysticks.
-        inputs: its inputs with their messages.
+        axes: axes of the machine; protocols add interlocks to them.
+        joysticks: joysticks of the machine.
+        inputs: inputs of the machine, each as bound and as received.
     """
     config = deployment.config
     canopen, bound = None, [*inputs]

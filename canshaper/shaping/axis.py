@@ -28,8 +28,8 @@ from canshaper.shaping.transfer import BumplessTransfer
 if TYPE_CHECKING:
     from canshaper.shaping.sensed import SensedSway
 
-# Missed ticks that the filter and the model go through at most: after so many of them nothing moves
-# any more, and the first neutral frame must not wait.
+# Most missed ticks that filter and model catch up: after more of them nothing moves any more, and
+# the first neutral frame must not wait.
 MOST_HELD = 2000
 
 
@@ -37,26 +37,25 @@ class ShapedAxis:
     """State machine, filter and output stage of one axis.
 
     Args:
-        tick_s: time between two calls of ``tick``.
-        limits, shaper: its output limits, and its filter.
-        sway: sway model, or None where the axis has none.
+        tick_s: time between two calls of ``tick``, seconds.
+        limits, shaper: output limits and filter of the axis.
+        sway: sway model of the axis, or None.
         neutral_band: largest |joystick| that counts as neutral.
-        stop_s: longest duration of STOPPING.
+        stop_s: longest duration of STOPPING, seconds.
         grid_steps: steps of the valve frame from zero to full command.
 
     Attributes:
-        command: what the operator demanded in the last tick, [-1, 1], scaled.
-        output: what the axis sends, with its parts: one object, which every tick overwrites.
+        command: demand of the operator in the last tick, [-1, 1], times ``scale``.
+        output: output of the axis with its parts: one object, which every tick overwrites.
         sway: the sway model.
-        sensed: what a sway sensor adds to the model, where there is a sensor.
+        sensed: the sway sensor's observer and trust, or None without a sensor.
         scale: factor of the operator's demand in front of the filter, 0 to 1.
-        bounds: smallest and largest demand in front of the filter and of that factor, and of what
-            is added to damp a swing.
+        bounds: smallest and largest demand before ``scale`` and filter; they also bound the
+            velocity that is added to damp a swing.
         added_time: how long a motion may still move the axis.
-        bends: whether it takes an added velocity into the range of its own demands: it never moves
-            without them.
-        error: how the filter has failed, see ``Transition``; empty unless it has while the axis
-            entered TRIPPED or was in it.
+        bends: whether the axis takes an added velocity only within the range of its own demands,
+            so that it never moves without a demand.
+        error: error of the filter in TRIPPED, see ``Transition``; empty without one.
     """
 
     def __init__(
@@ -92,7 +91,7 @@ class ShapedAxis:
 
     @property
     def sent(self) -> float:
-        """Velocity that these steps give, [-1, 1] of full speed."""
+        """Velocity that the steps of the valve frame give, [-1, 1] of full speed."""
         return self.output.setpoint
 
     @property
@@ -126,7 +125,7 @@ class ShapedAxis:
             added: velocity that the motion of two axes asks this axis to add, [-1, 1] of full
                 speed. The axis adds it while it is ACTIVE and anti-sway is on, and where no one
                 commands it, for a limited time. A value that is no velocity trips the axis.
-            damps: the other axis of the motion makes this one swing, and this one shall damp that.
+            damps: whether the axis shall damp the swing that the other axis of the motion causes.
                 It does so while a trusted sensor shows the swing and no one commands the axis.
 
         Returns:
@@ -150,7 +149,7 @@ class ShapedAxis:
         try:
             held = demand = damping = 0.0
             if state is ACTIVE or state is BYPASS_ON:
-                if not size < math.inf:  # it would stay in the memory of the filter
+                if not size < math.inf:  # the value would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
                 if size > self._neutral_band:
                     held, (low, high) = joystick.command, self.bounds
@@ -187,8 +186,8 @@ class ShapedAxis:
     def hold(self, ticks: int) -> Transition | None:
         """Count missed ticks, in which the valve kept the last output; return as ``act`` does.
 
-        They lengthen neither the run-on nor a stop, and in each of them the filter saw the last
-        demand. Only the ramp does not catch up.
+        Missed ticks lengthen neither the run-on nor a stop, and the filter takes the last demand in
+        each of them. Only the ramp does not catch up.
         """
         demand, output, time = self._clamped_demand(), self.output, self.added_time
         self._states.hold(ticks)
@@ -208,8 +207,8 @@ class ShapedAxis:
         """Change sway data and filter, in motion too, without a jump of the output.
 
         The model keeps the physical swing. The difference between both filters at this moment fades
-        with ``transfer.BLEND_S``. With the ``past``, ``applied`` in each tick since the axis was at
-        rest, it has swung by the new mode since then, and the filter damps what that has left.
+        with ``transfer.BLEND_S``. With ``past`` (``applied`` in each tick since the axis was at
+        rest) the model swings through it by the new mode, and the filter damps the swing left.
 
         Raises:
             ValueError: mode or filter does not suit the tick; model and filter stay as they were.
@@ -229,22 +228,22 @@ class ShapedAxis:
             self.sensed.retune(sway)
 
     def prepare(self, least: float, most: float) -> None:
-        """Prepare the filter, which has not run, for ``follow`` from least to most."""
+        """Prepare the filter, which has not run, for ``follow`` with factors from least to most."""
         self._transfer.prepare(least, most)
 
     def follow(self, mode: SwayMode, factor: float) -> None:
-        """Go on with the swing of another rope length; ``factor``: its period, of the filter's."""
+        """Continue with another rope length; ``factor``: its period over that of the filter."""
         assert self.sway is not None  # checked with the deployment
         self.sway.follow(mode)
         self._transfer.follow(factor)
 
     def allow_added(self, largest: float, time_s: float) -> None:
-        """Let a motion of two axes move this one, up to so fast and so long, unless commanded."""
+        """Let a motion of two axes move this one while no one commands it, within both limits."""
         self._stage.largest_added = largest
         self.added_time = AddedTime(round(time_s / self._tick_s), self._stage.tail)
 
     def drop_added(self) -> None:
-        """End what was added at once: the motion has lost the right to move this axis."""
+        """End the added velocity at once: the motion has lost the right to move this axis."""
         self._stage.drop_added()
 
     def restore(self, state: State, reason: Reason) -> None:
@@ -255,7 +254,7 @@ class ShapedAxis:
         """Change maximum and rates, but not the tail.
 
         Raises:
-            ValueError: the axis moves, and would become faster without its operator.
+            ValueError: the axis moves, and could become faster without its operator.
         """
         if not self.neutral:
             raise ValueError("limits change in neutral only")
@@ -273,7 +272,7 @@ class ShapedAxis:
             self.error = ""
 
     def _clamped_demand(self) -> float:
-        """The last demand as the filter got it."""
+        """Return the last demand as the filter got it, clamped to the maximum."""
         return within(self.command, -self._stage.limits.maximum, self._stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:

@@ -1,9 +1,8 @@
 """Demands in front of the filters: bounded ahead of end stops, and scaled by the oil there is.
 
-A stop takes its speed from the tip at once, and the grapple swings. So the demand is bounded by the
-distance that is left once everything has come that the axis still asks for without any demand. It
-dies away with ``TIME_S``, the filter shapes that as any other demand, and an operator can creep up
-to the stop.
+An end stop halts the tip at once, and the grapple swings. So the demand is bounded by the distance
+that is left after the run-on of all demands so far. Ahead of a stop the demand decays with
+``TIME_S``; the filter shapes it as any other demand, and an operator can creep up to the stop.
 
 A filter cancels the swing of the speeds that it asks for. Where the pump delivers less, the valves
 give other speeds, and swing is left. So the demands of all axes are scaled by one factor: the tip
@@ -19,8 +18,8 @@ from operator import mul
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.sway import SwayModel
 
-# Time constant with which the demand dies away ahead of a stop. A swing that is damped meanwhile
-# may take the axis to and fro: with half of it that met the stop.
+# Time constant with which the demand decays ahead of a stop. Damping of a swing meanwhile moves the
+# axis to and fro: with half of this time that motion met the stop.
 TIME_S = 0.6
 # Part of a demand that counts as nothing.
 NOTHING_S = 1e-3
@@ -29,13 +28,13 @@ UNBOUNDED = -math.inf, math.inf
 
 @dataclass(frozen=True, slots=True)
 class EndStops:
-    """Where an axis has to stop.
+    """Positions at which an axis has to stop.
 
     Attributes:
-        lowest, highest: positions at which it stops.
+        lowest, highest: lowest and highest position of the axis.
         full_speed: change of the position per second at full positive command; not 0.
-        lag_s: how long it moves on with the velocity that was sent last: lag of the valve, and age
-            of the position.
+        lag_s: seconds for which the axis goes on with the velocity that was sent last: lag of the
+            valve, and age of the position.
     """
 
     lowest: float
@@ -46,14 +45,14 @@ class EndStops:
     def room(
         self, position: float, velocity: float, run_on: tuple[float, float]
     ) -> tuple[float, float]:
-        """How far the axis may still move in both directions, full speed times seconds.
+        """Return how far the axis may still move each way, full speed times seconds.
 
-        What still comes away from a stop gives no room: it may be cut off.
+        Run-on away from a stop gives no room ahead of it, because limits may cut it off.
 
         Args:
-            position: measured now.
-            velocity: sent last, [-1, 1].
-            run_on: see ``RunOn``.
+            position: position measured now.
+            velocity: velocity sent last, [-1, 1].
+            run_on: ``RunOn.travel`` of the filter.
 
         Returns:
             (negative or 0, positive or 0).
@@ -70,14 +69,13 @@ class EndStops:
 class RunOn:
     """Travel that a filter still asks for when its demand ends.
 
-    It is that of the filter alone: what limits cut off, and what damps the swing of that, moves the
-    axis to and fro.
+    It counts the filter alone, not what limits cut off or what damps the swing of such a cut.
 
     Args:
-        shaper: a filter without a memory, which is used up.
-        sway: its sway model.
-        tick_s: time between two demands.
-        tail_s: how long anything may run on.
+        shaper: a fresh filter, of which this object uses up the state.
+        sway: sway model of the filter.
+        tick_s: time between two demands, seconds.
+        tail_s: longest run-on, seconds.
     """
 
     __slots__ = ("_left", "_negative", "_positive")
@@ -94,7 +92,7 @@ class RunOn:
             after.append(left * tick_s)
         while after and abs(after[-1]) < NOTHING_S * tick_s:
             after.pop()
-        self._left = after  # of a full demand so many ticks ago, full speed times seconds
+        self._left = after  # travel left of a full demand n ticks ago, full speed times seconds
         nothing = [0.0] * len(after)
         self._negative = deque(nothing, maxlen=len(after))
         self._positive = deque(nothing, maxlen=len(after))
@@ -107,9 +105,9 @@ class RunOn:
             self._positive.appendleft(ahead)
 
     def travel(self) -> tuple[float, float]:
-        """Return what negative and what positive demands still ask for, each by itself.
+        """Return the travel left of negative and of positive demands, full speed times seconds.
 
-        Where a reversal cuts off what is left of the one, all of the other comes.
+        They are not summed: where a reversal cuts off one of them, all of the other still comes.
         """
         left, negative, positive = self._left, self._negative, self._positive
         return (
@@ -119,11 +117,12 @@ class RunOn:
 
 
 def bounds(room: tuple[float, float], displaced: float) -> tuple[float, float]:
-    """Smallest and largest demand, [-1, 1], with so much room.
+    """Return the smallest and the largest demand, [-1, 1], ahead of the end stops.
 
     Args:
-        room: see ``EndStops.room``.
-        displaced: how far a motion has moved the axis, full speed times seconds; it moves it back.
+        room: result of ``EndStops.room``.
+        displaced: how far a motion has moved the axis, full speed times seconds; the motion will
+            move it back.
     """
     back, ahead = room
     low = (back + max(displaced, 0.0)) / TIME_S
@@ -131,17 +130,17 @@ def bounds(room: tuple[float, float], displaced: float) -> tuple[float, float]:
     return min(max(low, -1.0), 0.0), max(min(high, 1.0), 0.0)
 
 
-# The factor falls at once: oil that is not there comes from no valve. It rises so slowly that the
-# operator sees no jump where another axis stops.
+# The factor falls at once, because missing oil flows through no valve. It rises so slowly that the
+# operator sees no jump when another axis stops.
 RISE_S = 0.5
 
 
 class FlowBudget:
-    """The factor of all demands, tick by tick.
+    """Finds the factor of all demands that the pump's flow allows, tick by tick.
 
     Args:
-        shares: of each axis at full speed, full axis flows.
-        tick_s: time between two calls of ``step``.
+        shares: flow of each axis at full speed, full axis flows.
+        tick_s: time between two calls of ``step``, seconds.
 
     Attributes:
         scale: the factor, 0 to 1.
@@ -157,15 +156,15 @@ class FlowBudget:
     def step(
         self, flow: float, demands: Sequence[float], outputs: Sequence[float], ticks: int = 1
     ) -> float:
-        """Find the factor of this tick.
+        """Return the factor of this tick.
 
-        An axis whose demand has ended, or was reversed, still asks for what its filter lets run on.
+        An axis whose demand has ended, or was reversed, still takes oil for its run-on.
 
         Args:
-            flow: what the pump delivers, full axis flows, less what others take.
-            demands: of the operator, by axis, [-1, 1].
+            flow: flow of the pump without what others take, full axis flows.
+            demands: demands of the operator, by axis, [-1, 1].
             outputs: velocities sent in the last tick, by axis, [-1, 1] of full speed.
-            ticks: that have passed; more than 1 where deadlines were missed.
+            ticks: ticks that have passed; more than 1 where deadlines were missed.
         """
         asked, free = 0.0, flow
         for share, demand, output in zip(self._shares, demands, outputs, strict=True):

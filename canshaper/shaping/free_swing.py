@@ -1,4 +1,4 @@
-"""Free swing, which own motion does not explain, corrected with Kalman gains."""
+"""Free swing: the swing that own motion does not explain, estimated with Kalman gains."""
 
 import math
 from collections.abc import Sequence
@@ -77,9 +77,9 @@ class SensorGains(NamedTuple):
     """Gains of one sensor on one axis; their computation takes longer than a tick.
 
     Attributes:
-        period_s: time between two measurements, a whole number of ticks.
-        one: of angle, rate and offset.
-        two: of angle and rate of a second mode besides; () without one.
+        period_s: time between two measurements, seconds, a whole number of ticks.
+        one: gains of angle, rate and offset.
+        two: gains of these and of angle and rate of a second mode; () without a second mode.
     """
 
     period_s: float
@@ -92,12 +92,12 @@ class FreeSwing:
 
     Args:
         measured: angle or rate.
-        gains: of angle, rate and offset, for one measurement after the other from the first one;
-            the last ones stay.
+        gains: gains of angle, rate and offset for each measurement from the first on; the last
+            ones stay.
 
     Attributes:
-        angle, rate: of the free swing, rad and rad/s, at the time of the measurement.
-        offset: of the sensor, in its unit.
+        angle, rate: free swing at the time of the measurement, rad and rad/s.
+        offset: offset of the sensor, rad or rad/s.
     """
 
     __slots__ = ("_first", "_gains", "_rates", "_steady", "angle", "offset", "rate")
@@ -109,13 +109,13 @@ class FreeSwing:
         self.angle = self.rate = self.offset = 0.0
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Advance a tick, in which an undriven swing changes by these factors."""
+        """Advance a tick; ``by`` is the change of an undriven swing, as of ``swing_over``."""
         angle, rate = self.angle, self.rate
         self.angle = angle + by[0] * angle + by[1] * rate
         self.rate = rate + by[2] * angle + by[3] * rate
 
     def error(self, unexplained: float) -> float:
-        """Return ``unexplained`` (by the late model) less free swing and offset."""
+        """Return ``unexplained`` (measurement less own motion) less free swing and offset."""
         return unexplained - (self.rate if self._rates else self.angle) - self.offset
 
     def glide(self, tick_s: float) -> None:
@@ -142,8 +142,8 @@ class TwoFreeSwings(FreeSwing):
 
     Args:
         measured: angle or rate.
-        gains: those of the first mode and offset, and then of angle and rate of the second mode.
-        by: what the second mode changes by in a tick, see ``step``.
+        gains: gains of the first mode and offset, then those of angle and rate of the second mode.
+        by: change of the second mode in a tick, as of ``swing_over``.
     """
 
     __slots__ = ("_by", "_first_of_second", "_gains_of_second", "_second")
@@ -187,15 +187,15 @@ class TwoFreeSwings(FreeSwing):
 def observer_gains(
     mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
 ) -> Gains:
-    """Kalman gains of the first measurements, and at last those of the steady state.
+    """Return the Kalman gains of the first measurements, the steady state's last.
 
-    Of angle, rate and offset; of angle and rate of a second mode besides.
+    Each has the gains of angle, rate and offset, then of angle and rate of any second mode.
 
     Args:
-        mode: of the swing.
-        tick_s: time between two measurements.
-        timing: of the sensor.
-        limits: what it may show.
+        mode: sway mode of the axis.
+        tick_s: time between two measurements, seconds.
+        timing: timing of the sensor.
+        limits: bounds of its measurements.
     """
     swing, ticks, offset = swing_over(mode, tick_s), tick_s / TICK_OF_NOISE_S, limits.offset
     rates, second = timing.measured is Measured.RATE, limits.second
@@ -220,13 +220,13 @@ def observer_gains(
 def sensor_gains(
     mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
 ) -> SensorGains:
-    """Gains of a sensor on an axis.
+    """Return the gains of a sensor on an axis.
 
     Args:
-        mode: swing of the axis.
-        tick_s: period of the axis.
-        timing: of the sensor.
-        limits: what it may show.
+        mode: sway mode of the axis.
+        tick_s: period of the axis, seconds.
+        timing: timing of the sensor.
+        limits: bounds of its measurements.
     """
     period_s = max(1, round(timing.period_s / tick_s)) * tick_s
     one = observer_gains(mode, period_s, timing, replace(limits, second=None))

@@ -1,7 +1,7 @@
 """Output limits: the last line before the frame, pure functions, the same for every filter.
 
 Order: range the operator allows -> minimum and maximum -> rise and fall rate -> grid of the frame.
-Comparisons stand here for min and max, which take ten times as long, on the way to every frame.
+The code compares instead of calling min and max, which take ten times as long in every frame.
 Velocities are fractions of full speed in [-1, 1]; "command" is what the frame carries, with the
 valve's deadband already added, or by the measured curve of the valve.
 """
@@ -18,7 +18,7 @@ class ValveCurve:
     """Speed over command of one valve, in straight lines between measured points.
 
     Args:
-        commands: rising from -1 to 1.
+        commands: commands, rising from -1 to 1.
         speeds: speed at each command as a part of full, rising; zero at two neighbouring points,
             the ends of the dead band, of which the first is at a command up to 0 and the second
             from 0 on.
@@ -36,7 +36,7 @@ class ValveCurve:
         self.speeds = tuple(speeds)
 
     def command(self, velocity: float) -> float:
-        """Command for a velocity; beyond what the valve gives, full command."""
+        """Return the command for a velocity; full command beyond what the valve gives."""
         if velocity == 0.0:
             return 0.0
         speeds, commands = self.speeds, self._commands
@@ -77,7 +77,7 @@ def _faults(commands: Sequence[float], speeds: Sequence[float]) -> Iterator[str]
 
 
 def _between(value: float, xs: Sequence[float], ys: Sequence[float], high: int) -> float:
-    """On the line through the points ``high - 1`` and ``high``."""
+    """Return y at ``value`` on the line through the points ``high - 1`` and ``high``."""
     x0, x1, y0, y1 = xs[high - 1], xs[high], ys[high - 1], ys[high]
     return y0 + (value - x0) * (y1 - y0) / (x1 - x0)
 
@@ -94,14 +94,14 @@ class OutputLimits:
         fall_per_s: fastest fall of |velocity| towards zero, full scales per second.
         deadband: fraction of the command in which the valve does not open; added to every
             command that is not zero.
-        curve: instead of the deadband: the measured valve.
-        tail_s: how long after the operator asked for a speed the output may still be as fast.
-        allow_faster: the output may exceed what the operator asks or asked within the tail.
+        curve: curve of the measured valve, instead of the deadband.
+        tail_s: how long the output may stay as fast as the operator demanded before, seconds.
+        allow_faster: the output may exceed the demands now and within the tail.
         allow_reverse: the output may go against the joystick.
         reversal_s: how long after a reversal of the joystick the output may run on in the old
-            direction, the fall included; 0: it falls at once.
-        run_on: how far the output may run beyond what the operator asks now, the fall included,
-            full speed times seconds.
+            direction, the fall included, seconds; 0: it falls at once.
+        run_on: how far the output may run beyond the present demand, the fall included, full speed
+            times seconds.
     """
 
     maximum: float = 1.0
@@ -117,7 +117,7 @@ class OutputLimits:
     run_on: float = math.inf
 
     def velocity(self, command: float) -> float:
-        """Velocity that a command to the valve gives, both as parts of full."""
+        """Return the velocity for a command to the valve, both as parts of full."""
         curve, deadband = self.curve, self.deadband
         return curve.velocity(command) if curve else without_deadband(command, deadband)
 
@@ -158,7 +158,7 @@ class RecentCommand:
         self._now += ticks
 
     def add(self, command: float) -> None:
-        """Take this tick's command; then ``low <= 0 <= high`` bound the recent ones."""
+        """Take this tick's command; then ``low <= 0 <= high`` bound all recent commands."""
         now = self._now = self._now + 1
         largest, smallest = self._largest, self._smallest
         if command > 0.0:
@@ -183,7 +183,7 @@ class RecentCommand:
 def allowed_range(
     recent_low: float, recent_high: float, limits: OutputLimits
 ) -> tuple[float, float]:
-    """Range the operator allows now: never faster than asked in that direction.
+    """Return the range that the operator allows: never faster than demanded in that direction.
 
     Args:
         recent_low: smallest command within the tail, 0 or negative.
@@ -205,7 +205,7 @@ def allowed_range(
 
 
 def within(velocity: float, low: float, high: float, minimum: float) -> float:
-    """Clip to [low, high]; below ``minimum`` in magnitude the result is zero.
+    """Clamp to [low, high]; below ``minimum`` in magnitude the result is zero.
 
     Raises:
         ValueError: the velocity is not a number; a filter gone wrong must not reach a valve.
@@ -222,8 +222,8 @@ def within(velocity: float, low: float, high: float, minimum: float) -> float:
 def rate_limited(target: float, last: float, rise: float, fall: float) -> float:
     """Move from ``last`` towards ``target`` by at most ``rise`` (away from zero) or ``fall``.
 
-    Both are steps per tick. A change of sign falls to zero first and uses what is left of the
-    tick to rise.
+    Both are changes per tick. A change of sign falls to zero first, and rises in the rest of the
+    tick.
     """
     if last < 0.0:
         return -rate_limited(-target, -last, rise, fall)
@@ -260,7 +260,7 @@ def on_grid(
     *,
     curve: ValveCurve | None = None,
 ) -> tuple[int, float]:
-    """Round to what the frame can carry.
+    """Round a velocity to a step that the frame can carry.
 
     Args:
         velocity: limited velocity, [-1, 1].
@@ -268,10 +268,10 @@ def on_grid(
         high: upper bound that rounding must not pass.
         deadband: deadband to add, fraction of full command.
         steps: raw steps of the frame from zero to full command.
-        curve: instead of the deadband, where the valve is measured.
+        curve: curve of the measured valve, instead of the deadband.
 
     Returns:
-        (raw step of the frame, velocity which that step gives: what the filter must be given).
+        (raw step of the frame, velocity that this step gives, with which the filter goes on).
     """
     if curve is not None:
         return _on_curve(velocity, low, high, curve, steps)

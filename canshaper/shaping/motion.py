@@ -40,11 +40,11 @@ _LEAST_RADIUS_M = 0.5
 
 
 def farthest_m(path_m: float, *, damps: bool) -> float:
-    """How far near-far is moved at most while its operator leaves it alone.
+    """Return how far near-far may be moved while its operator leaves it alone, m.
 
     Args:
-        path_m: for what slewing adds, m.
-        damps: a sway sensor of near-far damps; it may move it as far again.
+        path_m: farthest that slewing may move near-far, m.
+        damps: whether a sway sensor of near-far damps, which may move it as far again.
     """
     return 2.0 * path_m if damps else path_m
 
@@ -59,8 +59,9 @@ class TwoAxisMotion:
 
     Attributes:
         luffing: the axis that turns the boom up, or None. It adds to its own commands only.
-        height_m: of the tip above the joint of the boom.
-        unattended: every joystick of it rested for longer than the tail: way and time begin again.
+        height_m: height of the tip above the joint of the boom, m.
+        unattended: whether the joysticks of all its axes rested for longer than the tail, so that
+            the limits of way and time begin again.
     """
 
     __slots__ = (
@@ -87,12 +88,12 @@ class TwoAxisMotion:
         self.unattended = False
 
     def step(self, elapsed_s: float, tip_m: float | None, circle_m: float | None = None) -> None:
-        """Find what is added from now on, by each axis whose period begins now: its ``added``.
+        """Set ``added`` of each axis whose period begins now.
 
         Args:
-            elapsed_s: time since the last step.
+            elapsed_s: time since the last step, seconds.
             tip_m: measured radius of the tip, or None where it is not known.
-            circle_m: instead of it: radius of the grapple, where that is a number of the file.
+            circle_m: radius of the grapple as a number of the file, instead of ``tip_m``.
         """
         slew, near_far, luffing = self._slew, self._near_far, self.luffing
         commanded = slew.commanded or (near_far is not None and near_far.commanded)
@@ -166,7 +167,7 @@ class TwoAxisMotion:
         luffing.add(target, self._weight)
 
     def _luffed(self, luffing: MovingAxis, after_s: float) -> GrapplePath:
-        """How luffing alone moves tip and grapple outwards; see ``MovingAxis.path``."""
+        """Return how luffing alone moves tip and grapple outwards, as ``MovingAxis.path`` does."""
         height_m = self.height_m
         if not luffing.commanded:
             return _REST
@@ -174,7 +175,7 @@ class TwoAxisMotion:
         return -height_m * lead, -height_m * rate, -height_m * speed, -height_m * acceleration
 
     def _moved(self, near_far: MovingAxis, elapsed_s: float) -> None:
-        """Count how far near-far was moved; it damps no farther than it may be moved."""
+        """Count how far near-far was moved, and let it damp only within that limit."""
         if near_far.commanded or self.unattended:
             near_far.damps, near_far.damped, near_far.way = False, 0.0, 0.0
             return
@@ -190,7 +191,7 @@ class TwoAxisMotion:
     def _carried_m(
         self, near_far: MovingAxis, elapsed_s: float, tip_m: float | None
     ) -> float | None:
-        """Radius of the grapple: carried on by the near-far model, corrected by the tip's."""
+        """Return the grapple's radius: predicted by near-far's model, corrected by the tip's."""
         sway, full = near_far.sway, near_far.full_speed
         luffed_m, _, luffed_m_s, _ = self._luffed(self.luffing, 0.0) if self.luffing else _REST
         ahead_m = full * sway.angle + near_far.reached + luffed_m
@@ -206,11 +207,11 @@ class TwoAxisMotion:
     def _tip(
         self, turn: GrapplePath, after_s: float, near_far: MovingAxis, radius_m: float
     ) -> tuple[float, float]:
-        """Where the tip has to be: psi, and R - rho - D.
+        """Return where the tip has to be: psi, and R - rho - D (see the formulas above).
 
         Args:
-            turn: the path of slew at that time.
-            after_s: the time, from now.
+            turn: path of slew at that time.
+            after_s: time from now, seconds.
             near_far: the other axis. At rest it has no speed, whatever its model has left.
             radius_m: radius of the grapple now.
         """

@@ -1,4 +1,4 @@
-"""One axis of a two-axis motion: path of its grapple, how far and how long it may be moved."""
+"""One axis of a two-axis motion: path of its grapple, and how far and long it may be moved."""
 
 import math
 from dataclasses import dataclass, field
@@ -18,28 +18,28 @@ class MovingAxis:
 
     Attributes:
         full_speed: rad/s of slew, m/s of near-far.
-        period_s: time for which an added velocity is held.
-        sway: sway model, stepped without the added part.
-        applied: velocity that the model was driven by last, [-1, 1].
-        ahead_s: from now to the time of the model's state: to the end of the period that runs, 0
-            where the next one begins now.
-        commanded: the operator asked for motion within the tail.
-        unattended: its joystick rested for longer than the tail, see ``ShapedAxis``.
-        able: it may carry out what is added.
-        room_m: how far it may still move in both directions ahead of its end stops, rad or m.
-        added: velocity to add now, [-1, 1]; the result.
-        sent: velocity that its valve was given last, [-1, 1].
-        farthest: how far this axis may be moved from where its operator left it, rad or m; see
+        period_s: time for which an added velocity is held, seconds.
+        sway: sway model, stepped without the added velocity.
+        applied: velocity that last drove the model, [-1, 1].
+        ahead_s: time from now to the model's state, which is at the end of the present period; 0
+            where the next period begins now.
+        commanded: whether the operator demanded motion within the tail.
+        unattended: whether its joystick rested for longer than the tail, see ``AddedTime``.
+        able: whether the axis may carry out an added velocity.
+        room_m: how far the axis may still move each way ahead of its end stops, rad or m.
+        added: velocity to add now, [-1, 1]; a result.
+        sent: velocity that its valve got last, [-1, 1].
+        farthest: how far the axis may be moved from where its operator left it, rad or m; see
             ``farthest_m``.
-        largest: fastest velocity that it has there, [0, 1].
+        largest: largest velocity of the axis while its operator leaves it alone, [0, 1].
         fall_per_s: fastest fall of its velocity, full speeds per second.
-        damps: the other axis makes this one swing, which may be damped; a result.
-        damped: how far the tip was moved for that, m.
-        way: how far it was moved since its operator left it, rad or m.
+        damps: whether the axis may damp the swing that the other axis causes; a result.
+        damped: how far this damping has moved the tip, m.
+        way: how far the axis was moved since its operator left it, rad or m.
         reached: position that the added velocities reach at the end of the period, rad or m.
-        joins: the other axis moves already; what was not added before is not made up for.
-        stiffness, damping: w^2 and 2 zeta w of the sway mode, rad/s.
-        lag_s: 2 zeta / w.
+        joins: the axis joins a motion under way, and does not make up for what it did not add.
+        stiffness, damping: w^2 (1/s^2) and 2 zeta w (1/s) of the sway mode.
+        lag_s: 2 zeta / w, seconds.
     """
 
     full_speed: float
@@ -69,18 +69,18 @@ class MovingAxis:
         self.follow(self.sway)
 
     def follow(self, sway: SwayModel) -> None:
-        """Take the sway model of the axis."""
+        """Use this sway model of the axis from now on."""
         omega, ratio = sway.mode.omega_rad_s, sway.mode.damping_ratio
         self.sway = sway
         self.stiffness, self.damping = omega * omega, 2.0 * ratio * omega
         self.lag_s = 2.0 * ratio / omega
 
     def held(self, seconds: float) -> None:
-        """Account for a time in which the last output was held."""
+        """Add the way of the seconds in which the last output was held."""
         self.reached += self.added * self.full_speed * seconds
 
     def path(self, after_s: float) -> GrapplePath:
-        """The grapple's motion at a time from now, the applied velocity held until then."""
+        """Return the grapple's motion after a time, with the applied velocity held until then."""
         after_s -= self.ahead_s
         sway, full, applied = self.sway, self.full_speed, self.applied
         stiffness, damping = self.stiffness, self.damping
@@ -93,7 +93,7 @@ class MovingAxis:
         return full * angle, full * rate, full * (applied - rate), full * pull
 
     def room(self, sign: float) -> float:
-        """Fastest velocity in a direction from which it still stops before ``farthest``."""
+        """Return the largest velocity in a direction from which it stops before ``farthest``."""
         way = (self.farthest - sign * self.way) / self.full_speed
         if not way > 0.0:
             return 0.0
@@ -102,11 +102,11 @@ class MovingAxis:
         return 0.5 * (math.sqrt(step * step + 8.0 * self.fall_per_s * way) - step)
 
     def add(self, target: float, weight: float) -> None:
-        """Run to a position of the added part within the period.
+        """Set ``added`` so that the added position reaches a target at the end of the period.
 
         Args:
-            target: the position, rad or m.
-            weight: 1, or less where the added part ends.
+            target: target of the added position, rad or m.
+            weight: 1, or less while the motion fades out.
         """
         back, ahead = self.room_m
         target = min(max(target, self.reached + back), self.reached + ahead)
@@ -131,8 +131,8 @@ class MovingAxis:
         self.reached = target if weight < 1.0 else self.reached + velocity * way
 
 
-# Ticks beyond the tail until an axis counts as unattended. The gate counts them by the tail alone:
-# what it gives back, it never gives back later than the axis does.
+# Ticks beyond the tail until an axis counts as unattended. The gate waits for the tail alone, so it
+# never renews the time of an axis later than the axis does.
 UNATTENDED_TICKS = 3
 
 
@@ -144,8 +144,8 @@ class AddedTime:
         tail: ticks for which the output may run on.
 
     Attributes:
-        asked: whether the motion asked for something in the last tick.
-        unattended: whether the joystick rested longer than the tail, in whatever state.
+        asked: whether the motion wanted to move the axis in the last tick.
+        unattended: whether the joystick rested longer than the tail, in any state of the axis.
     """
 
     __slots__ = ("_left", "_rested", "_ticks", "_unattended", "asked", "unattended")
@@ -157,7 +157,7 @@ class AddedTime:
         self._rested = 0  # ticks since the joystick was deflected
 
     def renew(self) -> None:
-        """Give the axis its full time back: neither of its motion's operators is at work."""
+        """Give the axis its full time back, because no joystick of its motion is deflected."""
         self._left = self._ticks
 
     def allows(
@@ -168,15 +168,15 @@ class AddedTime:
         deflected: bool = False,
         ticks: int = 1,
     ) -> bool:
-        """Count time, and say whether the motion may move the axis now.
+        """Count time, and return whether the motion may move the axis now.
 
         Args:
-            asked: the motion asks for it.
-            commanded: the operator demanded motion within the tail. The axis gets its full time
-                back.
-            moved: the valve was open. An axis that stands uses up no time, and gets none back.
-            deflected: the joystick is.
-            ticks: how many ticks have passed.
+            asked: whether the motion wants to move the axis.
+            commanded: whether the operator demanded motion within the tail; then the axis gets its
+                full time back.
+            moved: whether the valve was open. An axis at rest uses no time, and gets none back.
+            deflected: whether the joystick is deflected.
+            ticks: number of ticks that have passed.
         """
         self.asked = asked
         self._rested = 0 if deflected else self._rested + ticks

@@ -40,8 +40,8 @@ class Late:
         tick_s: time between two ticks, s.
 
     Attributes:
-        now: part of full speed at the end of the tick.
-        middle: part of full speed in its middle.
+        now: velocity at the end of the tick, part of full speed.
+        middle: velocity in the middle of the tick, part of full speed.
     """
 
     __slots__ = ("_half", "_sent", "_share", "_whole", "middle", "now")
@@ -74,10 +74,10 @@ class LateModel:
 
     Args:
         sway: sway model of the axis.
-        timing: delay and lag.
+        timing: delay of the sensor and lag of the valve.
 
     Attributes:
-        speed: of the tip, full speeds.
+        speed: speed of the tip, full speeds.
     """
 
     __slots__ = ("_added", "_lead", "_own", "speed", "sway")
@@ -89,7 +89,7 @@ class LateModel:
         self._lead = self.speed = 0.0
 
     def step(self, velocity: float, added: float) -> None:
-        """Advance a tick in which ``velocity`` was sent for the axis itself, ``added`` besides."""
+        """Advance a tick in which the axis' own ``velocity`` was sent, and ``added`` besides."""
         own, tick_s = self._own, self.sway.tick_s
         own.step(velocity)
         self.sway.step(own.middle)
@@ -118,7 +118,7 @@ class LateModel:
         self.sway.angle = self.sway.rate = self._lead = 0.0
 
     def retune(self, mode: SwayMode) -> None:
-        """Go on with another mode at the same physical swing."""
+        """Continue with another mode at the same physical swing."""
         self.sway = self.sway.retuned(mode, self._own.now)
 
 
@@ -131,16 +131,16 @@ class SwayObserver:
 
     Args:
         sway: sway model of the axis.
-        timing: of the sensor.
-        limits: what it may show.
-        gains: for both of them, by ``sensor_gains``.
+        timing: timing of the sensor.
+        limits: bounds of its measurements.
+        gains: gains for this timing and these limits, by ``sensor_gains``.
 
     Attributes:
         late: the late model.
         free: free swing, if the sensor shows this axis.
-        negated: the same, if it shows the opposite.
-        alone: the measurement itself, if that is no swing at all, only smooth.
-        dragged: the same, of a grapple on the ground that the tip turns as it moves.
+        negated: free swing, if the sensor shows this axis with the opposite sign.
+        alone: smooth motion, if the measurement is no swing at all.
+        dragged: smooth motion, if the grapple is on the ground and the moving tip turns it.
     """
 
     __slots__ = (
@@ -172,7 +172,7 @@ class SwayObserver:
             self.free, self.negated = (TwoFreeSwings(measured, gains.two, by) for _ in range(2))
         smooth = [(*one[:2], 0.0) for one in gains.one]
         self.alone, self.dragged = (FreeSwing(measured, smooth) for _ in range(2))
-        self._way = 0.0  # of the tip since the last measurement, normalised
+        self._way = 0.0  # way of the tip since the last measurement, normalised
         self._bend = (gains.two or gains.one)[-1][1] / gains.period_s
         self._tick_s = sway.tick_s
 
@@ -181,7 +181,7 @@ class SwayObserver:
         self._ahead = swing_over(sway.mode, self._ahead_s)
 
     def retune(self, sway: SwayModel) -> None:
-        """Go on with the mode of another model of the axis; the gains stay."""
+        """Continue with the mode of another model of the axis; the gains stay."""
         self.late.retune(sway.mode)
         self._set_mode(sway)
 
@@ -190,7 +190,7 @@ class SwayObserver:
         self.late.restart()
 
     def begin(self, value: float, scale: float) -> None:
-        """Take the first measurement, see ``errors``."""
+        """Start every hypothesis from the first measurement; arguments as of ``errors``."""
         own = self.own(scale)
         self.free.begin(value - own)
         self.negated.begin(-value - own)
@@ -201,7 +201,7 @@ class SwayObserver:
     def errors(self, value: float, scale: float) -> Errors:
         """Return the errors of a measurement under each of the four hypotheses.
 
-        To be called once for each.
+        Call it once for each measurement.
 
         Args:
             value: the measurement, rad or rad/s.
@@ -225,7 +225,7 @@ class SwayObserver:
         return error * self._bend
 
     def correct(self, errors: Errors) -> float:
-        """Correct by the errors of a measurement, and return what is left of the first one."""
+        """Correct every hypothesis by its error; return the error that is left of the first."""
         self.dragged.correct(errors[3])
         self.negated.correct(errors[1])
         self.alone.correct(errors[2])
@@ -247,10 +247,10 @@ class SwayObserver:
         self._way += tick_s * self.late.speed
 
     def swing(self, free: FreeSwing) -> None:
-        """Let another free swing swing on for a tick."""
+        """Advance another free swing by a tick."""
         free.step(self._by)
 
     def ahead(self, free: FreeSwing) -> tuple[float, float]:
-        """A free swing when the model's state is the grapple's: angle, rate; rad, rad/s."""
+        """Predict a free swing to the time of the model's state; return (rad, rad/s)."""
         by, angle, rate = self._ahead, free.angle, free.rate
         return angle + by[0] * angle + by[1] * rate, rate + by[2] * angle + by[3] * rate

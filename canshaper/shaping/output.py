@@ -9,11 +9,11 @@ In every tick in which the axis moves, ``OutputStage.drive`` takes five steps:
    to this range. The run-on ends sooner where it has gone as far as the limits allow, or against
    the joystick for as long as they allow. For a tail after anti-sway was switched on in motion, or
    a motion was cut off by a trip or the end of a stop, there is no run-on: the output is never
-   faster than he demands now, and rests in neutral. What the axis did without the filter, or has
-   not run to its end, is in the memory and in the sway model of the filter, which would run it
+   faster than he demands now, and rests in neutral. Memory and sway model of the filter still hold
+   a motion that the axis made without the filter, or did not complete: the filter would make it
    once more, also after a rest.
 2. Small strokes. A filter may spread a tap of the joystick over time, in pieces smaller than a step
-   of the frame. The axis makes one short movement of them.
+   of the frame. The axis joins them into one short movement.
 3. Added velocity. The motion of two axes may add to that, in a range of its own. It counts every
    demand within the tail, also one before a stop or a trip, after which nothing of it runs on.
 4. Ramp. The output changes by at most the rise or the fall of the axis.
@@ -51,12 +51,12 @@ class Output:
     Velocities are fractions of full speed, [-1, 1].
 
     Attributes:
-        steps: what the valve frame carries, in steps of its grid, deadband included.
+        steps: command in the valve frame, in steps of its grid, deadband included.
         setpoint: the velocity that these steps give.
         path: velocity that the motion of two axes adds to keep the grapple on its path. It causes
-            no swing, so the sway model is not driven by it.
+            no swing, so it does not drive the sway model.
         damping: velocity that is added to damp the swing which the other axis has caused. It is
-            meant to move the grapple, so the sway model is driven by it.
+            meant to move the grapple, so it drives the sway model.
         applied: the part of the setpoint that drives the sway model: all but ``path``.
         commanded: whether the operator demanded motion within the tail, so that it may run on.
     """
@@ -70,12 +70,12 @@ class Output:
 
 
 class OutputStage:
-    """Limits of one axis, and what they remember from one tick to the next.
+    """Output stage of one axis: its limits, and their state from one tick to the next.
 
     Args:
         limits: limits of the axis.
         grid_steps: steps of the valve frame from zero to full command.
-        tick_s: time between two ticks.
+        tick_s: time between two ticks, seconds.
         spreads: whether the filter spreads the demand over time, see ``Shaper``.
 
     Attributes:
@@ -127,11 +127,11 @@ class OutputStage:
 
         Args:
             held: velocity at which the operator holds the joystick.
-            demand: what the filter gets of it.
-            reference: velocity that the filter asks for; it may be anything.
+            demand: demand that the filter got.
+            reference: velocity that the filter asks for; any value.
             path, damping: velocities that are added, see ``Output``.
-            sensor_damps: a trusted sensor shows the swing, and the filter damps it. That takes more
-                than the one movement of a small stroke.
+            sensor_damps: whether the filter damps a swing that a trusted sensor shows, which takes
+                more than the one movement of a small stroke.
 
         Raises:
             ValueError: the reference is no number, or the added velocity is no velocity.
@@ -189,7 +189,7 @@ class OutputStage:
     def _ramp_with_added(
         self, held: float, own: float, added: float, *, no_run_on: bool
     ) -> tuple[float, float, float]:
-        """Advance both ramps; return own and added velocity together, and the range of that.
+        """Advance both ramps; return (sum of own and added velocity, low end, high end of range).
 
         An added velocity is slow: a few steps of the grid, or less than one. What rounding leaves
         out of it is carried, and corrected in the next ticks by at most one step in each. The carry
@@ -215,11 +215,11 @@ class OutputStage:
         return total, low, high
 
     def _end_run_on(self, held: float) -> bool:
-        """End what runs on beyond the joystick, by the fall, where it reaches a limit.
+        """End the run-on beyond the joystick, by the fall, where it reaches a limit.
 
-        After a reversal that is a time, and always a way: what will be left of it once the axis has
-        fallen from its velocity. A joystick that asks for so much velocity begins the way again.
-        Returns whether the way is at its end.
+        Limits are a time after a reversal, and always a way, which includes the way of the fall. A
+        joystick that demands as much velocity lets the way begin again. Returns whether the way is
+        at its end.
         """
         recent = self._recent
         if held * self._side < 0.0:
@@ -233,7 +233,7 @@ class OutputStage:
         return over
 
     def _beyond(self, held: float) -> float:
-        """How much faster than asked: the own part; or all (see gate), less what may be added."""
+        """Excess over the demand: of the own part, or of all (see gate) less what may be added."""
         own, sent = self._own_ramp, self.output.setpoint
         own_asked, asked = held if own > 0.0 else -held, held if sent > 0.0 else -held
         own_beyond = abs(own) - max(own_asked, 0.0)
@@ -247,7 +247,7 @@ class OutputStage:
         self._carry = 0.0
 
     def stop_against(self, held: float) -> None:
-        """End the run-on of a stop held against: by the fall, or after the time of a reversal."""
+        """End the run-on of a stop held against, by the fall, or after the time of a reversal."""
         if held * self._side < 0.0:
             self._side, self._crossed = -self._side, 0
         if not self._reversal and held * self.ramp < 0.0:
@@ -255,11 +255,11 @@ class OutputStage:
             self.output.commanded = False
 
     def hold_run_on(self) -> None:
-        """Let nothing run on for a tail: the filter remembers what it did not drive, or was cut."""
+        """Allow no run-on for a tail: the filter remembers motion that it did not drive or end."""
         self._no_run_on = self.tail
 
     def rest(self) -> None:
-        """Go to neutral at once, and forget all that may run on."""
+        """Set the output to neutral at once, and forget all demands that may run on."""
         output = self.output
         if output.commanded:
             self._recent.clear()
@@ -282,7 +282,7 @@ class OutputStage:
         self._small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:
-        """Take other limits, at rest. Demands within the tail still count."""
+        """Use other limits from now on, at rest. Demands within the tail still count."""
         self.limits = limits
         self._rates = limits.rise_per_s * self._tick_s, limits.fall_per_s * self._tick_s
         fall_s = limits.maximum / limits.fall_per_s
@@ -291,7 +291,7 @@ class OutputStage:
         self._small = SmallStrokes(limits, self._grid_steps, self._tick_s)
 
     def change_filter(self, *, spreads: bool) -> None:
-        """Go on with another filter. A stroke under way belongs to the old one."""
+        """Continue with another filter; a stroke under way, of the old one, counts as not small."""
         self._spreads = spreads
         self._small.lose()
 

@@ -24,11 +24,11 @@ BUILT_IN = (OFF, *gff.KINDS, *smoothing.KINDS, *fir.KINDS, *limit_aware.KINDS)
 def with_entry_points(
     kinds: Iterable[ShaperKind], points: Iterable[EntryPoint]
 ) -> tuple[dict[str, ShaperKind], dict[str, EntryPoint], list[tuple[str, str]]]:
-    """Kinds by their names, those of other packages after the given ones.
+    """Return all kinds by name: the given ones, then those of other packages.
 
     Returns:
-        (the kinds, the entry points of those that were added, and for each entry point that gives
-        none: its package, and why).
+        (kinds by name, entry points of the added kinds by name, and (package, fault) of each entry
+        point that gives no kind).
     """
     known, added, faults = {kind.name: kind for kind in kinds}, {}, []
     for point in sorted(points):
@@ -50,8 +50,8 @@ def with_entry_points(
 
 
 KINDS, ADDED, FAULTS = with_entry_points(BUILT_IN, entry_points(group=GROUP))
-"""Every kind by its name; entry points of those of other packages; faults of such packages, with
-which no deployment is loaded."""
+"""Every kind by its name; entry points of kinds of other packages; faults of such packages, which
+keep every deployment from loading."""
 
 
 def build_shaper(
@@ -65,14 +65,14 @@ def build_shaper(
     """Make a filter.
 
     Args:
-        kind: its name, one of ``KINDS``.
-        tick_s: time between two ticks of the axis.
+        kind: name of the filter, one of ``KINDS``.
+        tick_s: time between two ticks of the axis, seconds.
         sway: sway model of the axis; the filter may keep it, its owner steps it.
         valve_rate_per_s: rate of the valve, full speeds per second, for filters that feed back.
-        parameters: those of the filter, by their names in the deployment file.
+        parameters: parameters of the filter, by their names in the deployment file.
 
     Raises:
-        ValueError: the parameters make no filter, or it needs sway data and there is none.
+        ValueError: the parameters make no filter, or the filter needs sway data and has none.
 
     Returns:
         The filter, in neutral.
@@ -102,13 +102,13 @@ STEPS_BETWEEN = 64
 
 @dataclass(frozen=True, slots=True)
 class ParameterSet:
-    """Sway of an axis and its filter.
+    """Sway mode and filter of an axis at one value of the load state.
 
     Attributes:
-        at: value of the signal at which it holds.
-        mode: the sway.
+        at: value of the load state.
+        mode: sway mode.
         kind: name of the filter in the registry.
-        parameters: its parameters by the names of the registry.
+        parameters: parameters of the filter, by their names in the registry.
     """
 
     at: float
@@ -118,7 +118,7 @@ class ParameterSet:
 
 
 def position(sets: Sequence[ParameterSet], value: float) -> int:
-    """Where a value lies among sets in rising order, in steps; beyond the ends at the ends."""
+    """Return the position of a value among rising sets, in steps, clamped to the ends."""
     values = [one.at for one in sets]
     if value <= values[0]:
         return 0
@@ -130,10 +130,10 @@ def position(sets: Sequence[ParameterSet], value: float) -> int:
 
 
 def at_position(sets: Sequence[ParameterSet], steps: int) -> ParameterSet:
-    """The set at a position, between two of them interpolated.
+    """Return the set at a position, interpolated between two sets.
 
-    Period, damping ratio, poles, taps and every other number run in straight lines; so poles stay
-    real and negative, and taps stay taps with the sum 1.
+    Period, damping ratio, poles, taps and every other number are interpolated linearly; so poles
+    stay real and negative, and taps keep the sum 1.
     """
     low, part = divmod(steps, STEPS_BETWEEN)
     if not part:

@@ -1,4 +1,4 @@
-"""A sway sensor at work on one axis: what it adds to the sway model, as far as it is trusted."""
+"""A sway sensor on one axis: adds free swing to the sway model, as far as it is trusted."""
 
 from canshaper.shaping.free_swing import FreeSwing, SensorGains
 from canshaper.shaping.observer import SwayObserver
@@ -32,19 +32,19 @@ UNDOUBTED = (Trust.LOST, Trust.JUMP, Trust.UNPROVED)
 
 
 class SensedSway:
-    """Observer and trust of one axis.
+    """Observer and trust of the sway sensor of one axis.
 
     Args:
-        sway: sway model of the axis; gets the free swing as far as it is trusted.
-        timing: when the sensor measures what.
-        limits: what it may show.
-        gains: of its observer.
-        damps: the free swing is fed back; else it is only watched.
+        sway: sway model of the axis, which gets the free swing as far as the sensor is trusted.
+        timing: quantity and timing of the sensor.
+        limits: bounds of its measurements.
+        gains: gains of its observer.
+        damps: whether the free swing is fed back; else it is only watched.
 
     Attributes:
         state: trust state of the sensor.
-        weight: how much of the free swing is fed back, 0 to 1.
-        length: how long the pendulum seems to be.
+        weight: part of the free swing that is fed back, 0 to 1.
+        length: estimate of the pendulum's length.
     """
 
     def __init__(
@@ -87,16 +87,16 @@ class SensedSway:
         damps: bool = False,
         other: float | None = None,
     ) -> None:
-        """Take what has come for this tick, before the filter runs.
+        """Take the measurement of this tick, if there is one, before the filter runs.
 
         Args:
             value: a new measurement, rad or rad/s, with the sign of the model; None without one.
             scale: rad per normalised angle of the model.
-            commanded: the operator asked for motion within the tail. Else nothing is fed back to
-                the valve, and swing that another axis makes says nothing about the sensor.
-            damps: it damps a swing that another axis makes.
-            other: what a sensor of that axis would show by its own motion: with it that swing does
-                prove a sensor that nothing has spoken against, see ``CrossedSway``.
+            commanded: whether the operator demanded motion within the tail. Else nothing is fed
+                back to the valve, and swing that another axis makes proves nothing of the sensor.
+            damps: whether the axis damps a swing that another axis makes.
+            other: measurement that the other axis' sensor would show by that axis' own motion.
+                With it such a swing proves a sensor that has had no fault, see ``CrossedSway``.
         """
         self._commanded = commanded
         if not commanded and self.state is not Trust.CONTACT:
@@ -116,20 +116,20 @@ class SensedSway:
         self._feed_back(scale)
 
     def own(self, scale: float) -> float:
-        """Return what the sensor would show by own motion alone, see ``measure``."""
+        """Return the measurement that own motion alone would give; ``scale`` as in ``measure``."""
         return self._observer.own(scale)
 
     def step(self, velocity: float, command: float, added: float = 0.0) -> None:
         """Advance a tick.
 
         Args:
-            velocity: what was sent in it, [-1, 1], without the added part.
-            command: what the operator asked for, [-1, 1].
-            added: what a motion of two axes added.
+            velocity: velocity sent in the tick without the added one, [-1, 1].
+            command: demand of the operator, [-1, 1].
+            added: velocity that a motion of two axes added, [-1, 1].
         """
         self._age_s += self._tick_s
         self._command_active = command != 0.0
-        # What another axis makes this one do has bounds of its own.
+        # Motion for another axis has bounds of its own.
         own = velocity if self._commanded else 0.0
         if self._restlessness.add(own, command) and self.state is Trust.TRUSTED:
             self._doubt(Trust.RESTLESS, again=True)
@@ -140,13 +140,13 @@ class SensedSway:
             self._observer.swing(self._fading)
 
     def retune(self, sway: SwayModel) -> None:
-        """Go on with another model of the axis."""
+        """Continue with another model of the axis."""
         self._sway = sway
         self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
         self._observer.retune(sway)
 
     def restart(self) -> None:
-        """Restart with the model, which does not know its swing: nothing is fed back."""
+        """Restart because the model restarts and does not know its swing; feed nothing back."""
         self._observer.restart()
         self.weight = 0.0
         self._sway.free_angle = self._sway.free_rate = 0.0
@@ -190,7 +190,7 @@ class SensedSway:
                 self.state = Trust.TRUSTED
 
     def _refuted(self, value: float, other: float | None, error: float) -> bool:
-        """Whether it does not show the other axis, which makes it swing; see ``CrossedSway``."""
+        """Return whether the sensor is shown not to measure the other axis; see ``CrossedSway``."""
         if other is None:
             if self._crossed and self.state is not Trust.TRUSTED:
                 self._evidence.clear()  # that is no proof without the other axis

@@ -1,11 +1,11 @@
-"""One movement from a tap of the joystick, as long as the tap asked for.
+"""Small strokes: makes one movement of a tap of the joystick, as long as the tap demanded.
 
-A filter that spreads a tap over a second or two wants less in a tick than the least step of the
+A filter that spreads a tap over a second or two asks for less in a tick than the least step of the
 valve's frame. Rounded to steps that is a row of twitches, and limit-aware feedback adds its own for
-what rounding leaves out. So while the joystick is back in neutral after a small stroke, the travel
-still due decides: the axis moves by the least step where less is commanded, never further than is
-due, and then rests. Of a large stroke that would cut the feedback which damps its swing: what was
-commanded since the axis was at rest has to be small altogether.
+the rounding. So while the joystick is back in neutral after a small stroke, the travel still due
+decides: the axis moves by the least step where less is commanded, never further than is due, and
+then rests. In a large stroke this would cut off the feedback that damps its swing: therefore all
+commands since the axis was at rest have to be small together.
 """
 
 import math
@@ -20,7 +20,7 @@ LEFT = 0.5
 
 
 class SmallStrokes:
-    """Travel that is still due to the operator, and the output that gives it in small strokes.
+    """Counts the travel still due to the operator, and finds the output that makes it.
 
     Args:
         limits: output limits of the axis.
@@ -53,7 +53,7 @@ class SmallStrokes:
     def output(
         self, command: float, applied: float, target: float, low: float, high: float
     ) -> float:
-        """Find what the axis is to be sent.
+        """Return the velocity of the axis in this tick.
 
         Args:
             command: the operator's command now.
@@ -88,7 +88,7 @@ class SmallStrokes:
 
 
 def least_velocity(limits: OutputLimits, grid_steps: int) -> float:
-    """Smallest velocity that a frame of so many steps can give, not below the minimum.
+    """Return the least velocity that a frame of so many steps can give, not below the minimum.
 
     A first step that gives less than half of the others does not count: to the valve it is neutral.
     """

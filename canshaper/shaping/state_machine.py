@@ -59,7 +59,7 @@ PRESSED = 1 << 5  # reset or enable was just pressed, and no cause for neutral i
 SHAPED = 1 << 6  # anti-sway is on
 UNSHAPED = 1 << 7  # anti-sway is off
 ADDED = 1 << 8  # the motion of two axes moves this axis
-NOT_ADDED = 1 << 9  # it does not
+NOT_ADDED = 1 << 9  # no motion of two axes moves this axis
 AT_REST = 1 << 10  # the valve gets neutral, and nothing was commanded within the tail
 STOP_OVER = 1 << 11  # STOPPING has lasted as long as it may
 
@@ -182,7 +182,7 @@ class StateMachine:
             added: the motion of two axes moves this axis.
 
         Returns:
-            The state after it.
+            The state after this tick.
         """
         state = self.state
         command, fault, enabled, bypass, reset, trip = joystick

@@ -90,7 +90,7 @@ class Reaction(Enum):
 
 
 Lost = Literal["longest", "hold", "neutral"]
-"""Reaction while the length of a rope is not known: follow the longest, hold the last, or stop."""
+"""Reaction to an unknown rope length: filter of the longest rope, of the last length, or stop."""
 
 
 def _reaction(reason: Reason) -> Reaction:
@@ -102,7 +102,7 @@ def _reaction(reason: Reason) -> Reaction:
 
 
 REACTION_OF: Mapping[Reason, Reaction] = {reason: _reaction(reason) for reason in Reason}
-"""The number decides, so that a reader of a log knows the reaction without this table."""
+"""Reaction by reason. The reason's number decides it: a reader of a log needs no table."""
 
 
 class CommandInput(NamedTuple):
@@ -111,7 +111,7 @@ class CommandInput(NamedTuple):
     Attributes:
         command: position of the joystick, [-1, 1]; 0 where it is not valid.
         fault: why the axis must not follow the joystick: it is not valid, or a switch, a node or
-            the loop has a fault; None: it may.
+            the loop has a fault; None where it may follow.
         enabled: False when a message showed the enable switch released. A lost message leaves it
             True: lost is a fault, which stops the axis through its filter; released trips it.
         bypass: the operator has switched anti-sway off.
@@ -148,7 +148,7 @@ class Transition:
 class Trust(IntEnum):
     """Trust state of a sway sensor; codes of the status message.
 
-    After a fault its name stays until the sensor is trusted again.
+    After a fault the state names the fault until the sensor is trusted again.
     """
 
     NO_DATA = 0

@@ -52,7 +52,7 @@ class SwayMode:
 
     @classmethod
     def from_grapple(cls, length_m: float, damping_nms: float, mass_kg: float) -> Self:
-        """Mode from grapple data: omega^2 = g/l, 2 zeta omega = c/(m l^2) (paper Eq. 12-13)."""
+        """Return the mode of a grapple: omega^2 = g/l, 2 zeta omega = c/(m l^2) (Eq. 12-13)."""
         _require("pendulum length", length_m, 0.05, 150.0, "m")
         _require("joint damping", damping_nms, 0.0, 1e6, "N m s/rad")
         _require("mass", mass_kg, 1.0, 1e5, "kg")
@@ -67,14 +67,14 @@ class SwayMode:
 
     @classmethod
     def from_period(cls, period_s: float, damping_ratio: float) -> Self:
-        """Mode from the period seen on a stopwatch (that of the damped swing) and damping ratio."""
+        """Return the mode by the period of the damped swing (as on a stopwatch) and its damping."""
         _require("period", period_s, 0.15, 25.0, "s")
         _require("damping ratio", damping_ratio, 0.0, 0.95, "")
         return cls(_omega_rad_s(period_s, damping_ratio), damping_ratio)
 
     @classmethod
     def from_decay(cls, period_s: float, decay_per_swing: float) -> Self:
-        """Mode from period and decay: amplitude lost over one full swing, as a fraction.
+        """Return the mode by period and decay: the fraction of amplitude lost over a full swing.
 
         0.2 says that each swing is 20 % smaller than the one before. The logarithmic decrement
         d = -ln(1 - decay) gives zeta = d / sqrt(4 pi^2 + d^2).
@@ -84,10 +84,10 @@ class SwayMode:
         return cls.from_period(period_s, decrement / math.hypot(2.0 * math.pi, decrement))
 
     def towards(self, other: "SwayMode", share: float) -> "SwayMode":
-        """Mode between this one and another, whatever both are: never an error.
+        """Return a mode between this one and another; it never raises.
 
-        Period and damping ratio run in straight lines. Where the damping of both differs much, the
-        swing between them may be slower than a mode can be; it then is the slowest one.
+        Period and damping ratio are interpolated linearly. Where both dampings differ much, the
+        result may be slower than a mode can be; it is then the slowest mode.
 
         Args:
             other: the other mode.
@@ -95,7 +95,7 @@ class SwayMode:
         """
         period_s = self.period_s + share * (other.period_s - self.period_s)
         ratio = self.damping_ratio + share * (other.damping_ratio - self.damping_ratio)
-        # Not from_period: its range is of what a stopwatch shows. A mode of length and mass may
+        # Not from_period: its range is for a stopwatch. A mode of length and mass may
         # have a longer period, and 25 s may have become a little more by rounding.
         omega = _omega_rad_s(period_s, ratio)
         return SwayMode(min(max(omega, SLOWEST_RAD_S), FASTEST_RAD_S), ratio)
@@ -113,7 +113,7 @@ class SwayMode:
 
     @property
     def angle_per_speed_rad(self) -> float:
-        """Swing angle in rad per m/s of the normalised model angle (``SwayModel.angle``)."""
+        """Swing angle (rad) per normalised angle (``SwayModel.angle``) and m/s of full speed."""
         return self.omega_rad_s**2 / GRAVITY_M_S2
 
 
@@ -145,9 +145,9 @@ class SwayModel:
     One step is x += F (angle, rate + v) with F = Ad - I: docs/decisions.md#sway-in-increments.
 
     Attributes:
-        free_angle: swing that the velocity does not explain, as a sensor shows it; 0 without one.
-            It is no part of the model: filters add it where they feed the swing back.
-        free_rate: the rate of that.
+        free_angle: swing that the velocity does not explain, as a sensor shows it; 0 without a
+            sensor. It is no part of the model: filters add it where they feed the swing back.
+        free_rate: rate of that swing.
 
     Raises:
         ValueError: the tick is outside 0.1 to 200 ms, or too long for the mode.
@@ -201,12 +201,12 @@ class SwayModel:
         return model
 
     def follow(self, mode: SwayMode) -> None:
-        """Go on with the mode of a rope that is being hoisted or lowered.
+        """Continue with the mode of a rope that is being hoisted or lowered.
 
-        The state stays as it is. Of a load on a rope it is its way from the trolley and its speed,
-        V angle = l theta and V (rate + v) = (l theta)', and these know of the length by their
-        acceleration g theta alone: (l theta)'' = a - (g - l'') theta. So the term 2 l' theta' of
-        the angle is in it.
+        The state stays as it is. For a load on a rope the state is its distance from the trolley
+        and its speed, V angle = l theta and V (rate + v) = (l theta)'. The length enters only their
+        acceleration, (l theta)'' = a - (g - l'') theta, so the state includes the term 2 l' theta'
+        of the angle.
 
         Raises:
             ValueError: the mode does not suit the tick.
@@ -238,10 +238,10 @@ class SensorTiming:
 
     Attributes:
         measured: angle or rate.
-        period_s: time between two measurements.
-        delay_s: age of a measurement when it is received.
-        lag_s: time constant of the valve: from what is sent to the speed of the tip.
-        lost_s: time without a measurement after which it is lost.
+        period_s: time between two measurements, seconds.
+        delay_s: age of a measurement when it is received, seconds.
+        lag_s: time constant from the sent velocity to the speed of the tip, seconds.
+        lost_s: time without a measurement after which the sensor is lost, seconds.
         quickness: process noise of the rate over a tick, against a measurement noise of 1.
     """
 
@@ -260,9 +260,9 @@ class SensorLimits:
     Attributes:
         noise: standard deviation, rad or rad/s.
         offset: largest offset, rad or rad/s.
-        length_range: how much longer the pendulum may be than in the file, part of that, and how
-            many times shorter.
-        second: second mode that it shows too, such as that of long logs.
+        length_range: permitted difference of the pendulum's length, part of the length in the file:
+            1 + ``length_range`` times longer, or shorter.
+        second: second mode that the sensor shows too, such as that of long logs; or None.
     """
 
     noise: float

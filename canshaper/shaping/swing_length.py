@@ -1,4 +1,4 @@
-"""Length and damping of the pendulum as it swings now, from a sway sensor and own motion.
+"""Estimates length and damping of the swinging pendulum from a sway sensor and own motion.
 
 A grapple that hung still before the tip moved swings as
 
@@ -6,8 +6,8 @@ A grapple that hung still before the tip moved swings as
 
 Angle (or rate) and speed of the tip pass the same second-order filter, which gives the derivatives
 of both; least squares over the time from the press on give length and damping. A grapple that
-swung before, that is held, or that someone pushes would give a length too, of nothing: only what
-begins at rest, and is explained by own motion, counts.
+swung before, that is held, or that someone pushes would give a length without meaning: a result
+counts only if the motion begins at rest, and own motion explains the swing.
 """
 
 import math
@@ -37,8 +37,8 @@ class SwingLength:
     """Length and damping of the pendulum from one window of measurements.
 
     Attributes:
-        length_m: of the pendulum.
-        damping_ratio: of it.
+        length_m: length of the pendulum, m.
+        damping_ratio: damping ratio of the pendulum.
         sd_pct: standard deviation of the length, percent.
     """
 
@@ -51,8 +51,8 @@ class Derivatives:
     """A signal behind a second-order filter, with its first two derivatives.
 
     Args:
-        corner: of the filter, rad/s, two equal poles.
-        period_s: time between two values.
+        corner: corner frequency of the filter, rad/s, with two equal poles.
+        period_s: time between two values, seconds.
     """
 
     __slots__ = ("_corner", "_decay", "_last", "_period_s", "first", "second", "value")
@@ -63,7 +63,7 @@ class Derivatives:
         self.value = self.first = self.second = self._last = 0.0
 
     def add(self, signal: float) -> None:
-        """Take the next value; the signal is straight between two values."""
+        """Take the next value; the signal is linear between two values."""
         corner, step, decay = self._corner, self._period_s, self._decay
         slope = (signal - self._last) / step
         # In steady state the answer to a ramp is the ramp, two time constants late.
@@ -83,11 +83,11 @@ class SwingLengthEstimate:
     Args:
         mode: sway data of the file.
         measured: angle or rate.
-        limits: what the sensor may show.
-        period_s: time between two measurements.
+        limits: bounds of the sensor's measurements.
+        period_s: time between two measurements, seconds.
 
     Attributes:
-        result: of the last window that has shown one; None before.
+        result: result of the last window that gave one; None before.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class SwingLengthEstimate:
         self._count = max(1, round(MEAN_SWINGS * mode.period_s / period_s))
         self._period_s = self._count * period_s
         self._waiting = 0
-        self._value = self._way = 0.0  # sums of those that wait
+        self._value = self._way = 0.0  # sums of the measurements not yet averaged
         self._swing, self._speed = (Derivatives(corner, self._period_s) for _ in range(2))
         self._rest = math.radians(REST_DEG) * (mode.omega_rad_s if self._rates else 1.0)
         self._rest += REST_NOISE * limits.noise
@@ -108,7 +108,7 @@ class SwingLengthEstimate:
         per_length = mode.omega_rad_s**2 / GRAVITY_M_S2
         self._range = per_length / longest, per_length * longest
         self._damping = 2.0 * mode.damping_ratio * mode.omega_rad_s
-        self._time_s = math.inf  # since the press; none that counts
+        self._time_s = math.inf  # since the press; infinite without one
         self._offset = 0.0
         self._sums = [0.0] * 6
         self.result: SwingLength | None = None
@@ -119,11 +119,11 @@ class SwingLengthEstimate:
         """Take a measurement.
 
         Args:
-            value: rad or rad/s.
-            offset: of the sensor, as it is known now.
-            speed_m_s: of the tip at that time.
-            pressed: the operator moves the axis, or has within the tail.
-            free: nothing speaks against a grapple that hangs free.
+            value: measurement, rad or rad/s.
+            offset: present estimate of the sensor's offset, rad or rad/s.
+            speed_m_s: speed of the tip at the time of the measurement.
+            pressed: whether the operator demanded motion within the tail.
+            free: whether nothing contradicts a grapple that hangs free.
         """
         if pressed and not free:
             self._time_s = math.inf

@@ -1,4 +1,4 @@
-"""Reference of an axis with its filter or without one, and bumpless transfer between both."""
+"""Reference of an axis with its filter or in bypass, and bumpless transfer between both."""
 
 import math
 
@@ -37,8 +37,8 @@ class BumplessTransfer:
         tick_s: time between two ticks.
 
     Attributes:
-        offset: the transfer offset, which fades; an axis at rest has nothing to join to, and sets
-            it to 0.
+        offset: the transfer offset, which fades; an axis at rest sets it to 0, as there is no
+            motion to join.
     """
 
     __slots__ = ("_bypassed", "_fade", "_joins", "_shaper", "offset")
@@ -47,7 +47,7 @@ class BumplessTransfer:
         self._shaper = shaper
         self._fade = math.exp(-tick_s / BLEND_S)
         self.offset = 0.0
-        self._joins = False  # it is to be taken at the next command
+        self._joins = False  # whether the next command sets the offset
         self._bypassed = False
 
     def entered(self, state: State, old: State) -> None:
@@ -63,9 +63,10 @@ class BumplessTransfer:
 
         Args:
             command: the operator's demand.
-            maximum: largest |velocity| of the axis: a filter that is cut off damps nothing.
-            applied: what was sent in the last tick.
-            added: what another axis adds in this one.
+            maximum: largest |velocity| of the axis, which clamps the demand: a filter whose output
+                is cut off would damp nothing.
+            applied: velocity that was sent in the last tick.
+            added: velocity that another axis adds in this tick.
         """
         if abs(command) > maximum:
             command = math.copysign(maximum, command)
@@ -91,17 +92,17 @@ class BumplessTransfer:
         self._shaper.prepare(least, most)
 
     def follow(self, factor: float) -> None:
-        """Let the filter follow the sway model to so many times the period of its file."""
+        """Let the filter follow the sway model to ``factor`` times the period of the file."""
         assert isinstance(self._shaper, Following)
         self._shaper.follow(factor)
 
     def replace(self, shaper: Shaper, command: float, *, anew: bool) -> None:
-        """Go on with another filter.
+        """Continue with another filter.
 
         Args:
-            shaper: the filter.
-            command: the one that is in force.
-            anew: the axis has swung by its sway model since it was at rest.
+            shaper: the new filter.
+            command: the present demand.
+            anew: whether the sway model has been run again from rest by the new mode.
         """
         carry_over(self._shaper, shaper, command)
         if anew and hasattr(shaper, "swing_anew"):

@@ -1,7 +1,7 @@
-"""Trust in the sway sensor: named states, by measurements that the model does not explain.
+"""Trust in the sway sensor: tests of measurements against the model, which give named states.
 
-It is believed once driven motion has proved that it shows the swing of this axis with this sign,
-and no longer when it contradicts motion, stands still, jumps, or the load does not hang free.
+The sensor is trusted once driven motion has proved that it shows the swing of this axis with this
+sign, until it contradicts motion, stands still or jumps, or the load does not hang free.
 """
 
 import math
@@ -44,13 +44,13 @@ class Evidence:
 
     Args:
         measured: angle or rate.
-        noise: standard deviation of it, rad or rad/s.
-        period_s: time between two measurements.
+        noise: standard deviation of the measurement, rad or rad/s.
+        period_s: time between two measurements, seconds.
 
     Attributes:
-        sign: for the sign against the opposite one.
-        own: for own motion against none.
-        free: for a grapple that hangs against one that is dragged.
+        sign: log-likelihood ratio of the right sign against the opposite one.
+        own: log-likelihood ratio of own motion against none.
+        free: log-likelihood ratio of a hanging grapple against a dragged one.
     """
 
     __slots__ = ("_count", "_energies", "_fade", "_least", "free", "own", "sign")
@@ -79,7 +79,7 @@ class Evidence:
 
     @property
     def surprise(self) -> float:
-        """Root mean square of the last errors under the idea that it shows this axis."""
+        """Root mean square of the last errors under the hypothesis of this axis and sign."""
         return math.sqrt(self._energies[0])
 
     def _added(self, ratio: float, other: float, known: float) -> float:
@@ -100,14 +100,14 @@ class Evidence:
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:
-        """Return the fault whose hypothesis is the better one, by a ratio below ``least``."""
+        """Return the fault whose hypothesis wins by a ratio below ``least``, or None."""
         contact = min(self.own, self.free)
         if min(self.sign, contact) >= least:
             return None
         return Trust.WRONG_SIGN if self.sign < contact else Trust.CONTACT
 
     def clear(self) -> None:
-        """Begin again; what speaks against the sensor stays."""
+        """Begin again without the evidence for the sensor; evidence against it stays."""
         self.sign, self.own = min(self.sign, 0.0), min(self.own, 0.0)
         self.free = min(self.free, 0.0)
         self._energies = 0.0, 0.0, 0.0, 0.0
@@ -116,16 +116,16 @@ class Evidence:
 class CrossedSway:
     """Two more hypotheses of what a sensor shows: the other axis' swing, with either sign.
 
-    While slew moves and no one commands near-far, near-far's sensor shows what slewing makes along
-    the boom. That proves it too, if it is not what slew's sensor would show: signals of two axes
-    are easily swapped, and a swing that was there before fits either of them.
+    While slew moves and no one commands near-far, near-far's sensor shows the swing along the boom
+    that slewing makes. That proves the sensor too, if slew's sensor would not show the same:
+    signals of two axes are easily swapped, and a swing from before fits either of them.
 
     Args:
-        timing: of the sensor.
-        noise: its standard deviation, rad or rad/s.
-        gains: for the free swing of each hypothesis, of angle, rate and offset.
+        timing: timing of the sensor.
+        noise: standard deviation of the measurement, rad or rad/s.
+        gains: gains of angle, rate and offset, for the free swing of each hypothesis.
         value: the first measurement, rad or rad/s.
-        other: what the other axis' sensor would show by that axis' own motion.
+        other: measurement that the other axis' sensor would show by that axis' own motion.
     """
 
     __slots__ = ("_evidence", "_negated", "_same")
@@ -139,7 +139,7 @@ class CrossedSway:
         self._evidence = Evidence(timing.measured, noise, timing.period_s)
 
     def refuted(self, value: float, other: float, error: float) -> bool:
-        """Take a measurement with its own ``error``; return whether both are refuted."""
+        """Take a measurement and its error under this axis; return whether both are refuted."""
         errors = self._same.error(value - other), self._negated.error(value + other)
         self._same.correct(errors[0])
         self._negated.correct(errors[1])
@@ -153,7 +153,7 @@ class CrossedSway:
 
 
 def largest_jump(measured: Measured, noise: float, period_s: float) -> float:
-    """Farthest that a measurement may jump beyond what was expected, rad or rad/s."""
+    """Return the largest jump of a measurement from its expected value, rad or rad/s."""
     jump = math.radians(JUMP_DEG_S if measured is Measured.RATE else JUMP_DEG)
     return jump * max(1.0, period_s / TICK_OF_NOISE_S) + JUMP_NOISE * noise
 
@@ -163,9 +163,9 @@ class Standstill:
 
     Args:
         measured: angle or rate.
-        noise: standard deviation of it, rad or rad/s.
-        period_s: time between two measurements.
-        swing_s: period of the swing.
+        noise: standard deviation of the measurement, rad or rad/s.
+        period_s: time between two measurements, seconds.
+        swing_s: period of the swing, seconds.
     """
 
     __slots__ = ("_held", "_stuck")
@@ -185,11 +185,11 @@ class Standstill:
         """Return STUCK or CONTACT where the measurement shows a standstill, else None.
 
         Args:
-            value: the measurement.
-            bent: what it changed the rate of the free swing by, rad/s.
-            command_active: the operator asks for motion now. Else a swing that turns, of a
-                pendulum that is far shorter than the model, counts for more than a contact: the
-                tail ends.
+            value: the measurement, rad or rad/s.
+            bent: change of the free swing's rate that the measurement caused, rad/s.
+            command_active: whether the operator demands motion now. Else a still value is not taken
+                for contact: at the end of the tail it may be the turn of a swing, of a pendulum
+                that is far shorter than the model.
         """
         stuck, held = self._stuck.check(value, bent), self._held.check(value, bent)
         return Trust.STUCK if stuck else Trust.CONTACT if held and command_active else None
@@ -199,10 +199,10 @@ class Still:
     """Detects a value that stays constant while a swing would change it.
 
     Args:
-        least_s: for how long; at least so many measurements as ``LEAST_STILL``.
-        period_s: time between two measurements.
-        within: how far it may move in that time.
-        least_deg_s: what a swing would change its rate by in that time.
+        least_s: time for which the value is constant, s; at least ``LEAST_STILL`` measurements.
+        period_s: time between two measurements, seconds.
+        within: largest change of the value in that time, rad or rad/s.
+        least_deg_s: least change of rate that a swing would make in that time, deg/s.
     """
 
     __slots__ = ("_bends", "_bent", "_count", "_least", "_stays", "_values", "_within")
@@ -212,7 +212,7 @@ class Still:
         self._values: deque[float] = deque(maxlen=self._count)
         self._bends: deque[float] = deque(maxlen=self._count)
         self._within, self._least = within, math.radians(least_deg_s)
-        self._bent = 0.0  # in the time in which it stays
+        self._bent = 0.0  # change of rate while the value is constant
         self._stays = False
 
     def clear(self) -> None:
@@ -222,7 +222,7 @@ class Still:
         self._stays = False
 
     def check(self, value: float, bent: float) -> bool:
-        """Whether it has stayed too long; see ``Standstill.check``."""
+        """Return whether the value was constant for too long; see ``Standstill.check``."""
         values, bends = self._values, self._bends
         values.append(value)
         bends.append(bent)

@@ -1,10 +1,10 @@
 """CANopen on the buses of a deployment: our nodes, and the valves of CiA 408.
 
-A valve is brought step by step into the state in which it follows its set point. Control and status
-word as a maker's own driver uses them: init, disabled, hold, active, at least 50 ms apart, each
-when the status word shows the state before. The set point stays 0 until then, because the axis is
-neutral until then. A fault is reset by an edge of the ready bit; the axis stays tripped until the
-operator resets it.
+We bring a valve step by step into the state in which it follows its setpoint. The control word goes
+through init, disabled, hold and active, as a maker's own driver does: at least 50 ms apart, each
+once the status word shows the state before. The setpoint stays 0 until active, because the axis
+stays neutral until then. An edge of the ready bit resets a fault of the valve; the axis stays
+tripped until the operator resets it.
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,19 +39,19 @@ STATE_MASK = (1 << STATE_BITS) - 1
 
 
 class ValveControl(Input):
-    """Control word of one valve, by its status word.
+    """State machine of one valve: reads its status word and writes its control word.
 
     Args:
         bound: message with the status word.
         control: name of the signal with the control word.
-        message: sends the message of the valve, which the control word is put into.
+        message: sender of the valve's message, which carries the control word.
     """
 
     # Set by _go and _put.
     _step: int
     _reached: bool
     _word: int
-    _since_ns: int | None  # when this word was first put; None: at the next tick
+    _since_ns: int | None  # when this word was first sent; None: the next tick sends it
 
     def __init__(self, bound: Bound[StatusWord], control: str, message: Sender) -> None:
         super().__init__(bound)
@@ -61,12 +61,12 @@ class ValveControl(Input):
         self._message = message
         self._state: int | None = None
         self._state_ns = 0
-        self._left = False  # it was in another state than ACTIVE since it was looked at
+        self._left = False  # the valve was in another state than ACTIVE since the last gate()
         self._reset_ns = 0
         self._go(0, None)
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take the state in the low four bits; leaving ACTIVE counts in any frame."""
+        """Store the valve's state (low four bits); a state but ACTIVE counts in any frame."""
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
         if accepted:
@@ -74,7 +74,7 @@ class ValveControl(Input):
         return GOOD
 
     def gate(self, neutral: bool, now_ns: int) -> Reason | None:
-        """Return why the axis may not move; move the control word on when it is time."""
+        """Return why the axis may not move, or None; advance the control word when it is time."""
         if self._state is None or now_ns - self._state_ns > self._status_timeout_ns:
             self.resync()
         self._next(now_ns)
@@ -119,7 +119,7 @@ class ValveControl(Input):
         self._message.raw[self._control] = word
 
     def hold(self) -> None:
-        """Let a valve that is active hold: its last command."""
+        """Command an active valve to hold, as the last command before we leave."""
         if self._word == ValveState.ACTIVE:
             self._message.raw[self._control] = int(ValveState.HOLD)
 
@@ -130,17 +130,17 @@ class ValveControl(Input):
 
 
 class CanopenNetwork(BusProtocol):
-    """Our nodes, those of others, and the state machines of valves, on all buses.
+    """Our nodes, the nodes of others, and the state machines of valves, on all buses.
 
     Args:
         deployment: the machine.
-        axes: its axes, whose interlocks are the nodes of joystick and valve, and the valve itself;
-            their sway sensors measure while their nodes work.
+        axes: axes of the machine. Nodes of joystick and valve, and the valve itself, become
+            interlocks of each; its sway sensor counts only while the sensor's node works.
 
     Attributes:
-        nodes: our node on each bus of CANopen.
+        nodes: our node on each bus of CANopen, by bus.
         controls: the state machine of a valve of CiA 408, by the name of its axis.
-        bound: the same with their messages.
+        bound: the same state machines, each with its status message.
     """
 
     def __init__(self, deployment: Deployment, axes: Mapping[str, DrivenAxis]) -> None:
@@ -181,7 +181,7 @@ class CanopenNetwork(BusProtocol):
             runner.measured_by(self.nodes[sensor.config.bus].nodes[sensor.config.node])
 
     def usual(self, frame: Frame) -> bool:
-        """Whether the frame is of a service that other nodes use and no DBC file has."""
+        """Return whether the frame is of a CANopen service, which DBC files do not list."""
         return (
             not frame.extended and frame.bus in self.nodes and service_of(frame.can_id) is not None
         )
@@ -192,7 +192,7 @@ class CanopenNetwork(BusProtocol):
         return FrameFault.HEARTBEAT_LOST if lost else FrameFault.NONE
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """Yield our boot-up messages and heartbeats, and commands to start others."""
+        """Yield our boot-up messages and heartbeats, and commands to start other nodes."""
         for nodes in self.nodes.values():
             yield from nodes.frames(now_ns)
 
@@ -202,7 +202,7 @@ class CanopenNetwork(BusProtocol):
             yield from nodes.changes()
 
     def leave(self) -> None:
-        """Let active valves hold."""
+        """Command active valves to hold."""
         for control in self.controls.values():
             control.hold()
 
@@ -213,12 +213,13 @@ class CanopenNetwork(BusProtocol):
 
 
 class NodeGate:
-    """Interlock by the node of an axis' joystick or valve.
+    """Interlock of an axis on the CANopen node of its joystick or valve.
 
     Args:
-        node: that node.
-        in_motion: reason for an axis in motion when it no longer works.
-        control: state machine of the valve, which begins again with a node that does.
+        node: the node.
+        in_motion: reason that stops an axis in motion when the node does not work.
+        control: state machine of the valve, which starts again whenever the node was not
+            operational.
     """
 
     def __init__(

@@ -18,14 +18,14 @@ from canshaper.codec.frame import (
 )
 from canshaper.config.bus import Canopen, CanopenNode
 
-# Between two commands to start one node: what it needs to answer with a heartbeat.
+# Time between two commands to start one node: it needs as long to answer with a heartbeat.
 START_AGAIN_NS = 500_000_000
 BOOT_UP, OPERATIONAL = bytes((NodeState.BOOT_UP,)), bytes((NodeState.OPERATIONAL,))
 
 
 @dataclass(frozen=True, slots=True)
 class NodeEvent:
-    """Change of what another node reports."""
+    """Another node changed its state or emergency code: ``status`` says to what."""
 
     bus: str
     node: str
@@ -41,9 +41,9 @@ class RemoteNode:
     """Another node, as its heartbeats and emergency messages show it.
 
     Attributes:
-        state: what it said last; None before its first frame, and after its silence.
-        emergency: its error code, 0 for none.
-        stops: how often it said another state than OPERATIONAL, or fell silent.
+        state: state in its last heartbeat; None before the first one, and after silence.
+        emergency: error code of its last emergency message, 0 for none.
+        stops: how often it reported a state other than OPERATIONAL, or fell silent.
         alarms: how often it reported an error.
     """
 
@@ -57,7 +57,7 @@ class RemoteNode:
         self._start_ns = 0
 
     def heartbeat(self, data: bytes, arrived_ns: int) -> FrameFault:
-        """Receive a heartbeat; a node that boots has no emergency any more."""
+        """Receive a heartbeat; a boot-up clears the emergency of the node."""
         if len(data) != 1:
             return FrameFault.WRONG_LENGTH
         if self.state is not None and arrived_ns - self._last_frame_ns > self._timeout_ns:
@@ -74,7 +74,7 @@ class RemoteNode:
     def alarm(self, data: bytes, _arrived_ns: int) -> FrameFault:
         """Receive an emergency message.
 
-        Error code 0 says that one error is over; only with an error register of 0 are all.
+        Error code 0 says that one error is over; all are over only if the error register is 0 too.
         """
         if len(data) != 8:
             return FrameFault.WRONG_LENGTH
@@ -89,7 +89,7 @@ class RemoteNode:
         return FrameFault.NODE_EMERGENCY
 
     def lost(self, now_ns: int) -> bool:
-        """Whether it has just fallen silent; its state is not known any more then."""
+        """Return whether the node has just fallen silent; its state is then unknown."""
         if self.state is None or now_ns - self._last_frame_ns <= self._timeout_ns:
             return False
         self.state = None
@@ -97,16 +97,16 @@ class RemoteNode:
         return True
 
     def invalidate(self) -> None:
-        """Its state counts no more; an error that it reported does until it reports its end."""
+        """Forget the state; a reported error stays until the node reports its end."""
         self.state = None
 
     def copy_state(self, before: Self) -> None:
-        """Copy the last message of the same node, and its time."""
+        """Copy state, emergency and times of the same node."""
         self.state, self.emergency = before.state, before.emergency
         self._last_frame_ns, self._start_ns = before._last_frame_ns, before._start_ns
 
     def to_start(self, now_ns: int) -> bool:
-        """Whether it is to be started now."""
+        """Return whether to command the node to start now; the next command waits 0.5 s."""
         if self.state in (NodeState.OPERATIONAL, None) or now_ns < self._start_ns:
             return False
         self._start_ns = now_ns + START_AGAIN_NS
@@ -114,33 +114,33 @@ class RemoteNode:
 
     @property
     def works(self) -> bool:
-        """Whether the node is operational without an emergency, so that its data count."""
+        """Return whether the node is operational without an emergency, so that its data count."""
         return self.state == NodeState.OPERATIONAL and self.emergency == NO_EMERGENCY
 
 
 class _NodeMessage:
-    """One kind of message of another node."""
+    """Input for one kind of message of another node: its heartbeat or its emergency message."""
 
     def __init__(self, node: RemoteNode, receive: Callable[[bytes, int], FrameFault]) -> None:
         self._node = node
         self.receive = receive
 
     def invalidate(self) -> None:
-        """Invalidate everything good received so far."""
+        """Forget the state of the node; its errors stay."""
         self._node.invalidate()
 
     def copy_state(self, before: Self) -> None:
-        """Continue with what the same node said."""
+        """Continue with the state of the same node."""
         self._node.copy_state(before._node)
 
 
 class CanopenBus:
-    """All that CANopen asks of us on one bus.
+    """Our node and the other nodes on one bus of CANopen.
 
     Attributes:
         own: our node id.
         nodes: the other nodes, by name.
-        inputs: what takes their messages, by id.
+        inputs: receivers of the other nodes' messages, by id.
     """
 
     def __init__(self, bus: str, config: Canopen) -> None:
@@ -175,7 +175,7 @@ class CanopenBus:
                     yield Frame(self._bus, NMT, False, bytes((START, node.id)))
 
     def lost(self, now_ns: int) -> int:
-        """How many nodes have just fallen silent."""
+        """Return how many nodes have just fallen silent."""
         return sum(node.lost(now_ns) for node in self.nodes.values())
 
     def changes(self) -> Iterator[NodeEvent]:

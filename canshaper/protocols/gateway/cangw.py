@@ -1,9 +1,9 @@
 """Rules of the kernel's CAN gateway (module can-gw): list, add and remove them over netlink.
 
-A rule hands the frames of one interface that fit a pattern to another interface, perhaps changed:
-bytes AND, then OR, then a new checksum. Formats and their order: linux/can/gw.h, and
-net/can/gw.c of the kernel, which compares all of a rule when one is removed. To list takes no
-right, to change CAP_NET_ADMIN.
+A rule passes the frames of one interface that fit a pattern to another interface, unchanged or
+changed: bytes AND, then OR, then a new checksum. linux/can/gw.h and net/can/gw.c of the kernel
+define the formats and their order; to remove a rule every part of it has to match. Listing rules
+takes no privilege, changing them CAP_NET_ADMIN.
 """
 
 import errno
@@ -33,14 +33,14 @@ MODIFYING = frozenset((AND, OR, XOR, SET, CS_XOR, CS_CRC8, UID, *FD_MODIFICATION
 
 @dataclass(frozen=True, order=True)
 class Rule:
-    """A rule.
+    """A rule of can-gw.
 
     Attributes:
         source: interface that the frames come from.
-        destination: interface that they go to.
-        pattern: which they are.
-        changes: attributes that change them, by number, as the kernel has them.
-        flags: those of the rule.
+        destination: interface that the frames go to.
+        pattern: ids of the frames that the rule passes.
+        changes: (number, content) of each netlink attribute that changes the frames.
+        flags: flags of the rule.
         hops: how many rules may pass one frame on.
     """
 
@@ -61,12 +61,12 @@ class Rule:
 
 
 def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], ...]:
-    """Changes of the bytes of a frame.
+    """Return the attributes of a rule that change the bytes of a frame.
 
     Args:
-        keep: bits that stay, byte 0 the lowest.
-        put: bits that are set after that.
-        length: bytes of the frame; those behind it stay.
+        keep: mask of the bits that stay, byte 0 the lowest; all others are cleared.
+        put: bits that are set afterwards.
+        length: bytes of the frame; bytes beyond stay unchanged.
     """
     behind = (1 << 64) - (1 << 8 * length)
     modifications = []
@@ -77,16 +77,16 @@ def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], 
 
 
 def load_module() -> None:
-    """Load the module, where it is none of the kernel's own parts and not there yet."""
+    """Load the module can-gw, if it is neither built into the kernel nor loaded."""
     if not Path("/sys/module/can_gw").exists():
         subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # add() says why
 
 
 def rules() -> list[Rule]:
-    """All rules of the kernel.
+    """Return all rules of can-gw in the kernel.
 
     Raises:
-        GatewayError: it cannot be asked.
+        GatewayError: the kernel does not list them.
     """
     names: dict[int, str] = {}
     try:
@@ -110,7 +110,7 @@ def remove(rule: Rule) -> None:
     """Remove a rule.
 
     Raises:
-        GatewayError: the kernel refuses, or there is none.
+        GatewayError: the kernel refuses, or has no such rule.
     """
     _change(DELETE, rule)
 
@@ -160,10 +160,12 @@ def _read(body: bytes, names: dict[int, str]) -> Rule:
 
 
 def make(interfaces: Iterable[str], expected: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
-    """Make the rules between these interfaces exactly these; others stay as they are.
+    """Replace all rules between these interfaces by the expected ones; other rules stay.
+
+    Rules are removed first, so that for a moment fewer frames pass, and never more.
 
     Returns:
-        (removed, added). Removed first: for a moment less passes, and never more.
+        (removed rules, added rules).
 
     Raises:
         GatewayError: the kernel refuses.
@@ -177,7 +179,7 @@ def make(interfaces: Iterable[str], expected: Iterable[Rule]) -> tuple[list[Rule
 
 
 def difference(present: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
-    """(rules that are too many, rules that are missing)."""
+    """Return (present rules that are not expected, expected rules that are missing)."""
     more, missing = list(present), []
     for rule in expected:
         if rule in more:

@@ -1,4 +1,4 @@
-"""The frames of joysticks on their way through a gateway, and which others the kernel passes."""
+"""Forwarding of joystick frames through a gateway; patterns of the ids that the kernel passes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,17 +15,17 @@ LATE_CYCLES = 2
 
 
 class ForwardedJoystick:
-    """One joystick message between two buses.
+    """One joystick message that we forward from one bus to the other.
 
-    A frame of the joystick that counts leaves at once with the velocities of the last tick. Without
-    one there is no frame, but for the end of a motion: the shaped stop after the joystick was lost,
-    and neutral after a trip.
+    A valid frame of the joystick leaves at once with the velocities of the last tick. Without a
+    joystick frame we send none, except to end a motion: the shaped stop after the joystick was
+    lost, and neutral after a trip.
 
     Args:
-        message: sends what leaves.
+        message: sender of the rewritten frames.
         cycle_ms: time between two frames of the joystick.
         joystick: the joystick.
-        runners: the axes with their velocities in it.
+        runners: axes whose velocities are in the message.
 
     Attributes:
         moves: whether the last frame may move a valve.
@@ -42,23 +42,23 @@ class ForwardedJoystick:
         self._joystick = joystick
         self._runners = runners
         self._seen = joystick.raw
-        self._releases = 0  # as the axes know them
+        self._releases = 0  # releases of the joystick that the axes have seen
         self.moves = False
         self._passed_ns = 0
         self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
 
     def new_frame(self) -> bool:
-        """Whether a valid frame of the joystick came since the last call."""
+        """Return whether a valid frame of the joystick came since the last call."""
         before, self._seen = self._seen, self._joystick.raw
         return self._seen is not before
 
     def forward(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
-        """Return the frame of the joystick as it leaves; only the velocities are changed.
+        """Return the joystick's frame with our velocities; nothing else but protection changes.
 
         Args:
-            data: the frame.
-            arrived_ns: when it arrived.
-            stopped: the emergency stop is pressed, or missing.
+            data: bytes of the frame.
+            arrived_ns: monotonic time at which the frame arrived.
+            stopped: whether the emergency stop is pressed, or missing.
         """
         self._passed_ns = arrived_ns
         stopped = stopped or self._joystick.releases != self._releases  # they trip with the tick
@@ -69,7 +69,7 @@ class ForwardedJoystick:
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:
-        """Return a frame of our own, where the axes have just moved and the joystick has none."""
+        """Return a frame of our own where joystick frames are missing and a motion has to end."""
         self._releases = self._joystick.releases
         stopping = any(runner.axis.state in MOVING for runner in self._runners)
         tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
@@ -81,7 +81,7 @@ class ForwardedJoystick:
         return self._message.own(enabled=stopping)
 
     def last(self) -> list[Frame]:
-        """Return the last frames before we go: neutral, where the last frame was not."""
+        """Return the last frames before we leave: neutral, if the last frame may move a valve."""
         return [self._message.own(enabled=False)] if self.moves else []
 
     def _any_moves(self) -> bool:
@@ -89,12 +89,12 @@ class ForwardedJoystick:
 
 
 class Gateway(BusProtocol):
-    """All joysticks whose frames leave as commands.
+    """The gateway as a protocol: all joysticks whose frames we forward as commands.
 
     Args:
-        deployment: one with a gateway.
-        axes: its axes.
-        joysticks: its joysticks.
+        deployment: a machine with a gateway.
+        axes: axes of the machine.
+        joysticks: joysticks of the machine.
     """
 
     def __init__(
@@ -118,31 +118,31 @@ class Gateway(BusProtocol):
             self.forwarding[key] = ForwardedJoystick(message, cycle_ms, joystick, runners)
 
     def usual(self, frame: Frame) -> bool:
-        """Whether the frame is forwarded traffic, and so no unknown id."""
+        """Return whether the frame is on a bus of the gateway, where no id is unknown."""
         return frame.bus in self._buses
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Pattern:
-    """Ids that are ``value`` in the bits of ``mask``: the words of ``struct can_filter``.
+    """Ids that equal ``value`` in the bits of ``mask``, as in ``struct can_filter``.
 
-    The flag of 29 bits is in the mask; that of remote frames is not, so a pattern fits them too.
+    The mask has the flag of 29-bit ids, but not that of remote frames: a pattern fits these too.
     """
 
     value: int
     mask: int
 
     def fits(self, word: int) -> bool:
-        """Whether a frame with this id of the kernel (29 bits with their flag) is one of them."""
+        """Return whether the pattern fits a kernel id (29 bits with their flag)."""
         return word & self.mask == self.value
 
 
 EVERYTHING = (Pattern(0, EFF_FLAG), Pattern(EFF_FLAG, EFF_FLAG))
-"""Ids of 11 bits, and ids of 29 bits."""
+"""Patterns that fit every id: one for 11 bits, one for 29 bits."""
 
 
 def exactly(can_id: int, extended: bool) -> Pattern:
-    """The one id."""
+    """Return the pattern that fits this one id."""
     return (
         Pattern(can_id | EFF_FLAG, EFF_MASK | EFF_FLAG)
         if extended
@@ -159,7 +159,10 @@ def all_but(excluded: Iterable[Pattern]) -> list[Pattern]:
 
 
 def _without(whole: Pattern, hole: Pattern) -> list[Pattern]:
-    """Return what is left of ``whole``: for each bit that only ``hole`` tests, the other value."""
+    """Return patterns for the ids of ``whole`` outside ``hole``.
+
+    Each fixes one more of the bits that only ``hole`` tests, at the other value.
+    """
     if (whole.value ^ hole.value) & whole.mask & hole.mask:
         return [whole]  # they do not meet
     left = []

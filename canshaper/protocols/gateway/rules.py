@@ -12,10 +12,10 @@ from canshaper.protocols.gateway.forwarding import Pattern, all_but, exactly
 
 
 def excluded(deployment: Deployment) -> frozenset[Pattern]:
-    """Frames that no one passes on, in neither direction.
+    """Return the frames that the gateway never passes unchanged, in either direction.
 
-    Those of the joysticks, which only we pass on; all that we send ourselves, so that no one can
-    send it through us; and what the deployment blocks.
+    These are the frames of the joysticks, which only the daemon forwards; all frames that we send,
+    so that no one else can send them through the gateway; and those that the deployment blocks.
     """
     gateway = deployment.config.gateway
     assert gateway is not None  # only such deployments are asked
@@ -42,18 +42,18 @@ def excluded(deployment: Deployment) -> frozenset[Pattern]:
 
 
 def patterns(deployment: Deployment) -> list[Pattern]:
-    """Frames that pass in both directions."""
+    """Return the frames that the gateway passes unchanged, in both directions."""
     return all_but(excluded(deployment))
 
 
 def passing_rules(deployment: Deployment) -> list[Rule]:
-    """Rules of the kernel that pass them."""
+    """Return the kernel's rules that pass the frames of ``patterns``."""
     ends = channels(deployment)
     return [Rule(a, b, p) for a, b in (ends, ends[::-1]) for p in patterns(deployment)]
 
 
 def fallback_rules(deployment: Deployment) -> list[Rule]:
-    """Rules for the frames of the joysticks while the daemon is away."""
+    """Return the kernel's rules for the frames of the joysticks while the daemon is away."""
     gateway = deployment.config.gateway
     assert gateway is not None
     rules = []
@@ -68,7 +68,7 @@ def fallback_rules(deployment: Deployment) -> list[Rule]:
 
 
 def _passed(deployment: Deployment) -> Iterator[tuple[BoundJoystick, RewrittenMessage]]:
-    """Joysticks whose frames leave on the other bus, with what they leave as."""
+    """Yield each joystick whose frames leave on the other bus, with the rewritten message."""
     seen = set()
     for axis in deployment.axes.values():
         joystick, message = deployment.joysticks[axis.config.command.joystick], axis.valve.message
@@ -78,7 +78,7 @@ def _passed(deployment: Deployment) -> Iterator[tuple[BoundJoystick, RewrittenMe
 
 
 def _of(joystick: BoundJoystick) -> Pattern:
-    """Frames of a joystick, of J1939 whatever their priority."""
+    """Return the pattern of a joystick's frames; in J1939 at any priority."""
     _, can_id, extended = joystick.key
     if joystick.by_group:
         return _group(can_id, None if joystick.any_source else can_id & 0xFF)
@@ -86,18 +86,18 @@ def _of(joystick: BoundJoystick) -> Pattern:
 
 
 def _whatever_priority(can_id: int) -> Pattern:
-    """A message of J1939 from one node, to one where it has a destination."""
+    """Return the pattern of one J1939 id (same source and destination) at any priority."""
     return Pattern(can_id & WITHOUT_PRIORITY | EFF_FLAG, WITHOUT_PRIORITY | EFF_FLAG)
 
 
 def _group(can_id: int, source: int | None) -> Pattern:
-    """A group of J1939, from one address or from all."""
+    """Return the pattern of a J1939 group, from one source address or (None) from all."""
     mask, value = group_mask(can_id) | EFF_FLAG, group_of(can_id) | EFF_FLAG
     return Pattern(value, mask) if source is None else Pattern(value | source, mask | 0xFF)
 
 
 def channels(deployment: Deployment) -> tuple[str, str]:
-    """Interfaces of both buses, in the order of the file."""
+    """Return the interfaces of the gateway's two buses, in the order of the file."""
     gateway = deployment.config.gateway
     assert gateway is not None  # only such deployments are asked
     first, second = (deployment.config.buses[bus].channel for bus in gateway.between)
@@ -105,7 +105,7 @@ def channels(deployment: Deployment) -> tuple[str, str]:
 
 
 def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
-    """Changes that make a frame of a joystick one with all its axes in neutral."""
+    """Return the changes that put all axes in a joystick's frame into neutral."""
     length = message.fields.message.length
     checks, clear = kernel_check(message.protection, length)
     return (*changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length), *checks)

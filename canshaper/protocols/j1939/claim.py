@@ -1,7 +1,7 @@
 """Our address on a bus of J1939: claiming it, defending it, being silent when it is lost.
 
-SAE J1939-81, for a node that has one address and cannot take another: it claims, waits, and
-begins; the lower NAME wins. Who has lost says so once, and sends nothing more.
+SAE J1939-81, for a node that cannot take another address: it claims its address, waits, and begins
+to send; the lower NAME wins. A node that has lost says so once, and sends nothing more.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,11 +27,11 @@ from canshaper.shaping.states import Reason
 
 # Time for others to object before anything else is sent.
 WAIT_NS = 250_000_000
-# Who cannot claim waits 0 to 153 ms, so that not all answer at once; here by the serial number.
+# A node that cannot claim waits 0 to 153 ms, so that not all answer at once: here by serial number.
 STEP_NS = 600_000
-# Claims in answer to claims: two nodes that are set up wrong must not fill the bus.
+# Least time between two claims: two nodes with one address must not fill the bus with answers.
 LEAST_BETWEEN_NS = 5_000_000
-# Refusals in one tick; a node that asks for more at once gets no answer, as on a bus that is full.
+# Most refusals in one tick; further requests get no answer, as on a full bus.
 MOST_REFUSED = 8
 
 
@@ -49,14 +49,15 @@ class AddressClaim:
     Args:
         bus: name of the bus.
         config: address and NAME.
-        answered: groups (PGN) that are sent on request by others of us.
-        cyclic: groups that are sent anyhow; a request for one is answered by the next of them.
-        guest: the address may be another's: we ask first, claim it only when no one answers, give
-            it up to any node that claims it, whatever its NAME, and refuse nothing.
+        answered: groups (PGN) that other parts of ours send on request.
+        cyclic: groups (PGN) that we send cyclically; the next cycle answers a request.
+        guest: whether the address may belong to another node: we ask first, claim it only if no
+            one answers, give it up to any node that claims it, whatever its NAME, and refuse
+            nothing.
 
     Attributes:
-        state: of our address; nothing but claims may be sent in any other than CLAIMED.
-        requested: groups among ``answered`` that were asked for since the owner emptied it.
+        state: state of our address; unless it is CLAIMED, we may send claims only.
+        requested: groups among ``answered`` that were requested since the owner emptied the set.
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class AddressClaim:
         self._answered = answered
         self._cyclic = cyclic
         self._guest = guest
-        self._requesting = False  # which node has the address; nothing is claimed meanwhile
+        self._requesting = False  # we ask which node has the address, and do not claim meanwhile
         self._request_first = guest
         self._delay_ns = config.name.identity_number % 256 * STEP_NS
         self._due_ns: int | None = 0  # when to send a claim, or that there is none
@@ -87,11 +88,11 @@ class AddressClaim:
 
     @property
     def sends(self) -> bool:
-        """Whether messages may be sent under our address."""
+        """Return whether messages may be sent under our address."""
         return self.state is ClaimState.CLAIMED
 
     def copy_state(self, before: Self) -> None:
-        """Continue with the same address and NAME; of a lost one a reload is the way back."""
+        """Continue the claim of the same address and NAME; a lost address is claimed afresh."""
         if before.state is ClaimState.LOST:
             return
         self.state, self.requested = before.state, set(before.requested)
@@ -100,7 +101,7 @@ class AddressClaim:
         self._again_ns, self._refused = before._again_ns, list(before._refused)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a claim or a request of another node; never one of ours, seen back."""
+        """Receive a claim or a request of another node; the caller drops echoes of our own."""
         destination, source = frame.can_id >> 8 & 0xFF, frame.can_id & 0xFF
         group, lost = group_of(frame.can_id), self.state is ClaimState.LOST
         if group == CLAIMED << 8 and len(frame.data) == 8:
@@ -109,7 +110,7 @@ class AddressClaim:
         elif (
             group == REQUEST << 8
             and len(frame.data) == 3
-            # One that is lost is the address of the node that has it now.
+            # A lost address belongs to another node, which answers requests to it.
             and (destination == GLOBAL or (destination == self._address and not lost))
         ):
             pgn = int.from_bytes(frame.data, "little")
@@ -119,7 +120,7 @@ class AddressClaim:
         if other > self._number and not self._guest:
             self._claim_at(now_ns)
             return
-        # The same NAME too: two nodes that were set up alike cannot agree which of them it is.
+        # An equal NAME loses too: two nodes set up alike cannot agree which of them keeps it.
         self.state = ClaimState.LOST
         self._refused.clear()
         self._due_ns = now_ns + self._delay_ns
@@ -141,14 +142,14 @@ class AddressClaim:
             self._refused.append((pgn, source))
 
     def _claim_at(self, time_ns: int) -> None:
-        """Schedule a claim; one that is due already is not put off by another request."""
+        """Schedule a claim; a claim that is due earlier stays due."""
         if self._requesting:
             return
         time_ns = max(time_ns, self._again_ns)
         self._due_ns = time_ns if self._due_ns is None else min(time_ns, self._due_ns)
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """Yield the frames due now: claims, and answers to requests for what we do not have."""
+        """Yield the frames due now: claims, and refusals of requests for groups we do not have."""
         if self._due_ns is not None and now_ns >= self._due_ns:
             lost = self.state is ClaimState.LOST
             if self._request_first and not lost:
@@ -175,12 +176,12 @@ class AddressClaim:
         self._refused.clear()
 
     def repeat(self) -> None:
-        """Claim once more, unless the address is lost: something did not go out."""
+        """Claim once more after a frame did not reach the bus, unless the address is lost."""
         if self.state is not ClaimState.LOST:
             self._claim_at(self._again_ns)
 
     def not_sent(self) -> None:
-        """Claim again, because the last claim did not go out; the wait begins with it."""
+        """Claim again, because the last claim did not reach the bus; the wait starts again too."""
         self.restart()
         self._claim_at(self._again_ns)
 
@@ -195,16 +196,16 @@ class AddressClaim:
 
 
 class Node:
-    """Address and active faults on one bus.
+    """Our J1939 node on one bus: its address claim and its active faults (DM1).
 
     Args:
         bus: name of the bus.
         config: address and NAME.
-        cyclic: groups (PGN) that are sent anyhow, so that no one has to ask for them.
-        guest: whether the address may be another's, and no fault is sent.
+        cyclic: groups (PGN) that we send cyclically, so that no one has to request them.
+        guest: whether the address may belong to another node; then no fault is sent.
 
     Attributes:
-        state: of our address.
+        state: state of our address.
         faults: sends our active faults.
     """
 
@@ -218,11 +219,11 @@ class Node:
 
     @property
     def state(self) -> ClaimState:
-        """State of our address; in any other than CLAIMED all but the node itself is silent."""
+        """State of our address; unless it is CLAIMED, only the node itself may send."""
         return self._claim.state
 
     def gate(self, neutral: bool, _now_ns: int) -> Reason | None:
-        """Why nothing may move: silence is no shaped stop, and no axis goes on after it."""
+        """Return why no axis may move: silence is no shaped stop, and no axis goes on after it."""
         if self._claim.state is ClaimState.LOST:
             return Reason.ADDRESS_LOST
         if self._claim.state is ClaimState.WAITING:
@@ -230,14 +231,14 @@ class Node:
         return None
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Take a claim or a request; a claim that wins over ours is a fault."""
+        """Receive a claim or a request; return a fault when another claim wins over ours."""
         before = self._claim.state
         self._claim.receive(frame, arrived_ns)
         lost = self._claim.state is ClaimState.LOST and before is not ClaimState.LOST
         return FrameFault.ADDRESS_LOST if lost else FrameFault.NONE
 
     def frames(self, active: Sequence[tuple[int, int]], now_ns: int) -> Iterator[Frame]:
-        """Yield the frames due now; ``active``: (SPN, FMI) of the present faults."""
+        """Yield the frames due now; ``active`` has (SPN, FMI) of the present faults."""
         yield from self._claim.frames(now_ns)
         if self._guest:
             return
@@ -249,7 +250,7 @@ class Node:
             self.faults.interrupt()
 
     def send_failed(self, *, claim: bool) -> None:
-        """Take note that a frame did not reach the bus; a claim is then repeated."""
+        """Claim again, because a frame did not reach the bus; ``claim``: it was our claim."""
         if claim:
             self._claim.not_sent()
         else:

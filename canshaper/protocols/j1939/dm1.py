@@ -1,6 +1,6 @@
 """Active faults for the other nodes of a J1939 bus: DM1 of SAE J1939-73.
 
-One fault fits into one frame, more of them are sent by the broadcast of SAE J1939-21.
+One fault fits into one frame; several are sent by the broadcast (BAM) of SAE J1939-21.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ from canshaper.inputs.value import Following
 from canshaper.shaping.reasons import REASON_TEXTS
 
 CYCLE_NS = 1_000_000_000
-# A change is sent at once, but not again and again.
+# A change is sent at once, but changes no more often than this.
 LEAST_BETWEEN_NS = 200_000_000
 # SAE J1939-21: 50 to 200 ms between the packets of a broadcast.
 PACKET_NS = 50_000_000
@@ -30,10 +30,10 @@ NO_LAMP_FLASHES = 0xFF
 # Failure mode identifiers of SAE J1939-73.
 NOT_RESPONDING, ABNORMAL_RATE = 7, 9
 FMI_OF = {reason: text.fmi for reason, text in REASON_TEXTS.items() if text.fmi is not None}
-"""Failure mode of an axis by its reason; what the operator does is no fault."""
+"""Failure mode of an axis by its reason; reasons that the operator causes are no faults."""
 
 FMI_OF_FOLLOWING = {Following.NO: NOT_RESPONDING, Following.LOST: ABNORMAL_RATE}
-"""Failure mode of a valve by what its feedback says."""
+"""Failure mode of a valve by the result of its feedback check."""
 
 
 class Fault(NamedTuple):
@@ -41,8 +41,8 @@ class Fault(NamedTuple):
 
     Attributes:
         spn: suspect parameter number.
-        fmi: failure mode.
-        times: how often it came, up to 126.
+        fmi: failure mode identifier.
+        times: how often the fault occurred; sent as 126 at most.
     """
 
     spn: int
@@ -51,7 +51,7 @@ class Fault(NamedTuple):
 
 
 def dm1_data(faults: Sequence[Fault]) -> bytes:
-    """Content of DM1: lamps, and four bytes for each fault."""
+    """Return the content of DM1: two bytes of lamps, and four bytes for each fault."""
     lamps = bytes((AMBER_LAMP if faults else 0, NO_LAMP_FLASHES))
     codes = (
         (f.spn & 0xFFFF).to_bytes(2, "little")
@@ -76,7 +76,7 @@ class ActiveFaults:
         self._packet_ns = 0
 
     def copy_state(self, before: Self) -> None:
-        """Continue with the same faults: how often they came, and a broadcast under way."""
+        """Continue with the faults of ``before``: their counts, and a broadcast under way."""
         self._active, self._sent = set(before._active), set(before._sent)
         self._count, self._packets = dict(before._count), list(before._packets)
         self._next_ns, self._change_ns = before._next_ns, before._change_ns
@@ -88,9 +88,9 @@ class ActiveFaults:
         """Yield the frames due now.
 
         Args:
-            active: (SPN, FMI) of every fault that is there now.
+            active: (SPN, FMI) of every present fault.
             now_ns: monotonic time.
-            requested: another node has asked for it.
+            requested: whether another node has requested DM1.
         """
         now = set(active)
         for code in now - self._active:

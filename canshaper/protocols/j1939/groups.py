@@ -11,7 +11,7 @@ from canshaper.protocols.interface import DrivenAxis
 
 @dataclass(frozen=True, slots=True)
 class SourceEvent:
-    """A message comes from the address that is received now, or from another one."""
+    """A message came from a new address, ``source``, while we use those from ``received``."""
 
     bus: str
     message: str
@@ -30,17 +30,18 @@ class SourceEvent:
 
 
 class AnySource:
-    """An input from the first address that sends; from another one when that falls silent.
+    """An input from the first address that sends; from another once the first falls silent.
 
     Args:
         bus: name of the bus.
         message: name of the message.
         received: the input.
-        timeout_ns: its age limit.
-        runners: axes that it moves. One that takes over is another joystick: neutral comes first.
+        timeout_ns: age limit of the input, nanoseconds.
+        runners: axes that the input moves. Another address is another joystick: when it takes
+            over, the axes need neutral first.
 
     Attributes:
-        events: addresses that are new here, since the owner emptied the list.
+        events: new addresses since the owner emptied the list.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class AnySource:
         self._last_frame_ns = 0
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Receive a frame; two joysticks that send the same group look alike."""
+        """Receive a frame; one from a second address is a fault while the first one sends."""
         source = frame.can_id & 0xFF
         if source != self._source:
             if self._source is not None:
@@ -82,7 +83,7 @@ class AnySource:
         self._input.invalidate()
 
     def copy_state(self, before: Self) -> None:
-        """Keep the address that counted; another one has to wait for its silence."""
+        """Keep the address in use; another address has to wait until it falls silent."""
         self._source, self._last_frame_ns = before._source, before._last_frame_ns
         self._ignored = set(before._ignored)
 
@@ -94,14 +95,14 @@ class AnySource:
 
 
 class ReceivedGroup:
-    """The inputs of one group: of one address each, or of whatever address comes.
+    """The inputs of one group: each from one source address, or one from any address.
 
     Args:
-        own: our address on the bus; no one else may send from it.
+        own: our address on the bus, from which no one else may send; None without one.
 
     Attributes:
-        of: input by the address it is received from.
-        rest: the input from any address.
+        of: input by the source address from which it is received.
+        rest: the input from any other address, or None.
     """
 
     def __init__(self, own: int | None) -> None:
@@ -110,7 +111,7 @@ class ReceivedGroup:
         self.rest: AnySource | None = None
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Receive a frame; from any other address it is other traffic."""
+        """Receive a frame; one from an address without an input is ignored."""
         source = frame.can_id & 0xFF
         if source == self._own:
             return FrameFault.SECOND_SENDER
@@ -120,7 +121,7 @@ class ReceivedGroup:
 
 
 class CommandedByOthers:
-    """Commands of others to our valves: from another address, or with another priority."""
+    """Receives other nodes' commands to our valves, from any address and at any priority."""
 
     def __init__(self, runners: Sequence[DrivenAxis]) -> None:
         self._runners = [
@@ -128,7 +129,7 @@ class CommandedByOthers:
         ]
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Trip our valves that are addressed: two controllers must not drive one crane."""
+        """Trip the axes whose valves are addressed: two controllers must not drive one crane."""
         to, fault = _destination(frame.can_id), FrameFault.NONE
         for runner, destination in self._runners:
             if to in (destination, GLOBAL):
@@ -138,5 +139,5 @@ class CommandedByOthers:
 
 
 def _destination(can_id: int) -> int:
-    """The PDU specific byte: where the group has no destination, a part of it."""
+    """Return the PDU specific byte: the destination, or part of a group without destination."""
     return can_id >> 8 & 0xFF

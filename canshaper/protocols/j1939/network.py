@@ -23,7 +23,7 @@ from canshaper.protocols.j1939.groups import (
 
 @dataclass(frozen=True, slots=True)
 class AddressEvent:
-    """Our address on a bus is claimed, or lost."""
+    """The state of our address on a bus changed, to claimed or lost."""
 
     bus: str
     address: int
@@ -36,15 +36,15 @@ class AddressEvent:
 
 
 class J1939Network(BusProtocol):
-    """Nodes and groups of all buses.
+    """J1939 as a protocol: our nodes, and the groups that we receive, on all buses.
 
     Args:
         deployment: the machine.
-        axes: its axes, whose interlock is the node on the bus of their valve.
-        inputs: its inputs with their messages.
+        axes: axes of the machine; our node on the bus of its valve becomes an interlock of each.
+        inputs: inputs of the machine, each as bound and as received.
 
     Attributes:
-        nodes: our node on each bus of J1939.
+        nodes: our node on each bus of J1939, by bus.
     """
 
     def __init__(
@@ -98,18 +98,18 @@ class J1939Network(BusProtocol):
         self._any[bus, group_of(can_id)] = entry.rest, one
 
     def handler(self, frame: Frame) -> FrameHandler | None:
-        """Return the handler of the group of a frame."""
+        """Return the handler of the J1939 group of a frame; None where we receive no such group."""
         if not frame.extended:
             return None
         return self._groups.get((frame.bus, group_of(frame.can_id)))
 
     def usual(self, frame: Frame) -> bool:
-        """Whether the frame can be of a group that other nodes send and no DBC file has."""
+        """Return whether the frame may be of a J1939 group that no DBC file lists."""
         return frame.extended and frame.bus in self._buses
 
     @property
     def silent(self) -> frozenset[str]:
-        """Buses on which our address is not ours: only the node itself may send there."""
+        """Buses on which our address is not claimed: only the node itself may send there."""
         claimed = ClaimState.CLAIMED
         return frozenset(n for n, node in self.nodes.items() if node.state is not claimed)
 
@@ -119,7 +119,7 @@ class J1939Network(BusProtocol):
             yield from node.frames(self._active_faults(bus), now_ns)
 
     def changes(self) -> Iterator[AddressEvent | SourceEvent]:
-        """Yield changes of our addresses since the last call, and new addresses of others."""
+        """Yield events since the last call: changes of our addresses, new addresses of others."""
         for bus, node in self.nodes.items():
             if node.state is not self._reported[bus]:
                 self._reported[bus] = node.state
@@ -144,13 +144,13 @@ class J1939Network(BusProtocol):
             node.on_bus_off()
 
     def invalidate(self, bus: str | None = None) -> None:
-        """Invalidate inputs from any address, of one bus or of all."""
+        """Invalidate the inputs that are received from any address, on one bus or on all."""
         for (where, _), (one, _) in self._any.items():
             if bus in (None, where):
                 one.invalidate()
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
-        """Yield parts that a reload carries over, see ``parts``; ``places``: keys of buses."""
+        """Yield (key, part) of inputs from any address, nodes and faults, for a reload."""
         for (bus, group), (source, received) in self._any.items():
             yield ("source", *places[bus], group), source
             yield ("input", *places[bus], group), received
@@ -159,11 +159,11 @@ class J1939Network(BusProtocol):
             key = (*places[bus], config.address, name_bytes(config.name))
             yield ("node", *key), node
             axes = [n for n, r in self._axes.items() if r.bound.config.valve.bus == bus]
-            # By their place among the axes; with others a number would be that of another fault.
+            # An SPN counts axes: with other axes in the file the same SPN would be another fault.
             yield ("faults", *key, config.first_spn, *self._axes, *axes), node.faults
 
     def _active_faults(self, bus: str) -> list[tuple[int, int]]:
-        """(SPN, FMI): axes that cannot move as they are asked, valves that do not follow."""
+        """Return (SPN, FMI) of axes that cannot move as demanded and valves that do not follow."""
         first, active = self._configs[bus].first_spn, []
         for i, runner in enumerate(self._axes.values()):
             if runner.bound.config.valve.bus != bus:
@@ -177,5 +177,5 @@ class J1939Network(BusProtocol):
 
 
 def _cyclic(deployment: Deployment, bus: str) -> Iterator[int]:
-    """Groups that we send again and again under our address, by their number."""
+    """Return the PGNs that we send cyclically under our address."""
     return (pgn_of(can_id) for can_id, extended in deployment.routing.buses[bus].sent if extended)

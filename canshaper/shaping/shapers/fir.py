@@ -1,7 +1,7 @@
 """Shapers with a finite impulse response: ZV, ZVD, EI, two-mode, and any list of taps.
 
-Non-negative taps that sum to one keep the output within the range of the commands of their length:
-such a shaper is never clipped. A bare shaper leaves |H(p)| = |sum h_k exp(-p k T)| of the swing
+Non-negative taps that sum to one keep the output within the range of the last commands: limits of
+magnitude never cut such a shaper. A bare shaper leaves |H(p)| = |sum h_k exp(-p k T)| of the swing
 with sway pole p.
 """
 
@@ -46,15 +46,15 @@ class Fir:
         return float(sum(map(mul, weights, self._history)))
 
     def reset_to_steady_state(self, command: float) -> None:
-        """Begin with a command that has long been there."""
+        """Set the memory as if the command had been constant for long."""
         self._history.extend([command] * (self._history.maxlen or 0))
 
     def lengthen(self, count: int) -> None:
-        """Remember so many commands, of a filter that has not run."""
+        """Extend the memory of a filter that has not run to ``count`` commands."""
         self._history = deque([0.0] * count, maxlen=count)
 
     def copy_state(self, old: "Fir") -> None:
-        """Go on with the commands that another one has seen; of older ones its oldest is taken."""
+        """Copy the commands that another filter has seen; its oldest stands for older ones."""
         count = len(self.taps)
         seen = [*old._history, *[old._history[-1]] * count]
         self._history.extend(seen[:count])
@@ -81,9 +81,9 @@ def zv_taps(mode: SwayMode, tick_s: float) -> list[float]:
 
 
 def stretched(taps: Sequence[float], factor: float) -> list[float]:
-    """Taps of the same response in ``factor`` of its time; their sum stays what it is.
+    """Return taps whose step response takes ``factor`` times as long; their sum stays the same.
 
-    A tap stands for its whole tick: the step response is drawn out in time, straight between ticks.
+    A tap stands for its whole tick: the step response is stretched in time, linear between ticks.
     """
     steps = [0.0, *accumulate(taps)]
     ticks = math.ceil((len(steps) - 1) * factor - 1e-9)
@@ -98,7 +98,7 @@ def stretched(taps: Sequence[float], factor: float) -> list[float]:
 
 
 def convolved(first: Sequence[float], second: Sequence[float]) -> list[float]:
-    """Taps of two shapers in series."""
+    """Return the taps of two shapers in series."""
     taps = [0.0] * (len(first) + len(second) - 1)
     for i, a in enumerate(first):
         if a:

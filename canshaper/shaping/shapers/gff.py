@@ -17,10 +17,10 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 class Gff:
-    """Gains of the limit-aware G_FF for one sway mode, tick and pair of real poles.
+    """The limit-aware G_FF for one sway mode, tick and pair of real poles.
 
     Args:
-        sway: the sway model of the axis; its owner steps it with what was really sent.
+        sway: the sway model of the axis; its owner steps it with the velocity really sent.
         poles_rad_s: the two poles of the filter, real and negative.
         third_pole_rad_s: a third real pole, as a first-order lag on the command: without it a step
             on the joystick comes out at once as 1/(a2 w^2) times the command.
@@ -52,13 +52,13 @@ class Gff:
         self.follow(1.0)
 
     def prepare(self, least: float, most: float) -> None:
-        """Nothing has to be ready for ``follow``."""
+        """Do nothing: ``follow`` needs no preparation here."""
 
     def follow(self, factor: float) -> None:
-        """Suit the sway model as it is now: poles in so many times the time of those of the file.
+        """Adapt the gains to the present sway model; the poles become slower by the factor.
 
         Args:
-            factor: period of the swing, of that which the filter was made for.
+            factor: period of the swing over the period that the filter was made for.
         """
         sway, third = self._sway, self._third
         # The lag reaches exp(p T) in the tick of the step; a share of 1 is no lag.
@@ -79,11 +79,11 @@ class Gff:
     def from_denominator(
         cls, sway: SwayModel, a1: float, a2: float, third_pole_rad_s: float | None = None
     ) -> Self:
-        """Gains from the denominator a2 s^2 + a1 s + 1 of Eq. 13 (a1 in s, a2 in s^2)."""
+        """Make the filter from the denominator a2 s^2 + a1 s + 1 of Eq. 13 (a1 in s, a2 in s^2)."""
         return cls(sway, poles_from_denominator(a1, a2), third_pole_rad_s)
 
     def step(self, command: float) -> float:
-        """Output the filter asks for, before limits; ``command`` in [-1, 1]."""
+        """Return the output that the filter asks for, before limits; ``command`` in [-1, 1]."""
         sway = self._sway
         self._command += self._share * (command - self._command)
         command = self._command
@@ -91,11 +91,11 @@ class Gff:
         return command - self.k1 * angle - self.k2 * (rate + command)
 
     def copy_state(self, old: "Gff") -> None:
-        """Go on from where another one stands; the swing is in the model."""
+        """Copy the state of another filter of this class; the swing is in the sway model."""
         self._command = old._command
 
     def reset_to_steady_state(self, command: float) -> None:
-        """Begin with a command that has long been there."""
+        """Set the memory as if the command had been constant for long."""
         self._command = command
 
 
@@ -157,7 +157,7 @@ def _by_poles(parameters: Parameters) -> Parameters:
 
 
 def _followed(parameters: Parameters, factor: float) -> Parameters:
-    """Return the parameters for a swing of so many times the period; see ``Gff.follow``."""
+    """Return the parameters for a swing of ``factor`` times the period; see ``Gff.follow``."""
     power = {"a1": factor, "a2": factor**2, "third_pole_rad_s": 1.0 / factor}
     new = {name: one * power[name] for name, one in parameters.items() if name in power}
     if "poles_rad_s" in parameters:

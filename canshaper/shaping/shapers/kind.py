@@ -1,4 +1,4 @@
-"""A kind of filter as one row: name, parameters, constructor, and what else depends on the kind.
+"""A kind of filter as one row: name, parameters, constructor, and all else that differs by kind.
 
 The schema of the deployment file, ``build_shaper``, the table in docs/deployment.md, the rows of
 ``canshaper compare`` and the lists in the tests are made from these rows.
@@ -15,7 +15,7 @@ Parameters = dict[str, Any]
 """Parameters of a filter, by the names that they have in the deployment file."""
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-# Names that the section of the file, ``build_shaper`` or a constructor has already.
+# Reserved names: the section of the file, ``build_shaper`` or a constructor uses them already.
 _RESERVED = {"kind", "parameters", "sway", "tick_s", "valve_rate_per_s"}
 
 
@@ -40,10 +40,10 @@ class Following(Protocol):
     """A shaper that follows the swing of a rope; its kind has ``ShaperKind.follows``."""
 
     def prepare(self, least: float, most: float) -> None:
-        """Make ready for periods from least to most, in parts of that of the file."""
+        """Prepare for ``follow`` with factors from least to most."""
 
     def follow(self, factor: float) -> None:
-        """Suit the sway model as it is now, whose period is so many times that of the file."""
+        """Adapt to the present sway model, whose period is ``factor`` times the file's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +51,15 @@ class Parameter:
     """A number in the filter's section of the file, or a list of such numbers.
 
     Attributes:
-        name: its key.
+        name: key in the file.
         low: least value.
         high: largest value.
         unit: unit of both, "" without one.
-        description: what it is, in a few words.
-        whole: only whole numbers.
+        description: meaning in a few words.
+        whole: whether only whole numbers are permitted.
         default: value where the key is missing.
-        optional: the key may be missing, and then the constructor does not get it.
-        entries: of a list: least and largest number of entries.
+        optional: whether the key may be missing; the constructor then does not get it.
+        entries: least and largest number of entries of a list; None for one number.
 
     Raises:
         ValueError: the default is outside of the range, or there is no range.
@@ -89,22 +89,22 @@ class ShaperKind:
 
     Attributes:
         name: ``kind`` in the deployment file.
-        summary: what it is, one sentence; for the schema and the documentation.
+        summary: description of the kind in one sentence, for the schema and the documentation.
         build: makes the filter: ``build(tick_s, **parameters)``, or ``build(sway, **parameters)``
-            where it needs the sway; ValueError says why they make none.
-        settings: for the sway mode and tick (s) of an axis the settings that ``canshaper compare``
-            drives, by their names there; the tests build them too.
-        parameters: what stands in the file.
+            where the filter needs the sway; raises ValueError where the parameters make none.
+        settings: returns, for sway mode and tick (s) of an axis, the settings that ``canshaper
+            compare`` drives, by their names there; the tests build them too.
+        parameters: parameters of the filter in the file.
         needs_sway: ``build`` gets the axis' sway model, which the axis steps with what was sent.
         needs_valve_rate: ``build`` also gets ``valve_rate_per_s``, full speeds per second.
-        limit_aware: it damps the swing that the limits of the output make.
-        check: called with the parameters of a file; ValueError says what does not go together.
-        interpolable: gives the same parameters in a form in which each number may run in a straight
-            line from one set to another.
-        stretched: the same filter for a swing of so many times the period; of a kind whose
-            parameters hold for one period only.
-        follows: parameters as the filter has them while it follows a rope to so many times the
-            period, by ``follow(factor)``; None where it cannot.
+        limit_aware: whether the filter damps the swing that the output limits cause.
+        check: called with the parameters of a file; raises ValueError where they contradict.
+        interpolable: converts the parameters to a form in which each number may be interpolated
+            linearly between two sets.
+        stretched: returns the parameters for ``factor`` times the period, for a kind whose
+            parameters hold for one period only; else None.
+        follows: returns the parameters that the filter has while it follows a rope to ``factor``
+            times the period, by ``follow(factor)``; None where it cannot follow.
         designed_by: verb of ``canshaper`` that finds the parameters, "" without one.
 
     Raises:
@@ -148,12 +148,12 @@ class ShaperKind:
 
 
 def carry_over(old: Shaper, new: Shaper, command: float) -> None:
-    """Give a new shaper a memory: that of the one before it, where both are of one kind.
+    """Give a new shaper a memory: that of the old shaper, where both are of one class.
 
     Args:
-        old: the one before.
-        new: the new one.
-        command: the command now; without a better memory it counts as the one for long.
+        old: the old shaper.
+        new: the new shaper.
+        command: the present command; a shaper of another class starts as if it were constant.
     """
     if type(old) is type(new) and hasattr(new, "copy_state"):
         new.copy_state(old)
@@ -162,5 +162,5 @@ def carry_over(old: Shaper, new: Shaper, command: float) -> None:
 
 
 def spreads(shaper: Shaper) -> bool:
-    """Whether a shaper's output is the command spread over time, with the same travel."""
+    """Return whether a shaper only spreads the command over time, with the same travel."""
     return bool(getattr(shaper, "spreads", False))

@@ -14,7 +14,7 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Parameter, Parameters, Shaper, ShaperKind
 from canshaper.shaping.sway import SwayMode, SwayModel
 
-# Both poles of the feedback, in natural frequencies: quicker than the swing, and slow enough for a
+# Both poles of the feedback, in natural frequencies: faster than the swing, and slow enough for a
 # valve that takes a fifth of a second to full speed.
 POLE_PER_OMEGA = -1.4
 
@@ -30,7 +30,7 @@ TABLE_STEPS = 64
 
 
 class LimitAware:
-    """A shaper with feedback of the swing that limits made.
+    """A shaper with feedback of the swing that limits have caused.
 
     Args:
         sway: sway model of the axis; its owner steps it with what was sent.
@@ -75,9 +75,9 @@ class LimitAware:
         return max(POLE_PER_OMEGA * omega, POLE_PER_ROOT * math.sqrt(self._rate * omega))
 
     def prepare(self, least: float, most: float) -> None:
-        """Make the taps for every period that ``follow`` will name, in parts of the file's.
+        """Compute the taps for the factors of ``follow``, from least to most.
 
-        And what the twin does after a command of one tick, for each of them.
+        For each of them compute also the twin's response to a command of one tick.
         """
         taps, period_s = self._shaper.taps, self._sway.mode.period_s
         longest = len(stretched(taps, most))
@@ -98,10 +98,10 @@ class LimitAware:
         self._shaper.lengthen(longest)
 
     def follow(self, factor: float) -> None:
-        """Suit the sway model as it is now: its taps in so many times the time.
+        """Adapt to the present sway model: stretch the taps in time by the factor.
 
-        The twin gets the swing that it would have had all the time with this rope. So it ends with
-        the taps, and the feedback damps what the change of the length has made of the real one.
+        The twin gets the swing that it would have had with this rope from the start. So its swing
+        ends with the taps, and the feedback damps what the change of length did to the real swing.
         """
         assert self._table is not None  # it was prepared
         least, step, rows = self._table
@@ -118,13 +118,13 @@ class LimitAware:
         self._gff.follow(self._pole / self._pole_rad_s(mode.omega_rad_s))
 
     def copy_state(self, old: "LimitAware") -> None:
-        """Go on from where another one stands."""
+        """Copy the state of another filter of this class."""
         self._twin = old._twin.retuned(self._sway.mode, old._unlimited)
         self._unlimited = old._unlimited
         self._shaper.copy_state(old._shaper)
 
     def swing_anew(self) -> None:
-        """Give the twin the swing that it would have had all the time with these taps."""
+        """Give the twin the swing that it would have had with these taps from the start."""
         shaper, twin = self._shaper, SwayModel(self._sway.mode, self._sway.tick_s)
         angles, rates = [], []
         for tap in shaper.taps:
@@ -135,7 +135,7 @@ class LimitAware:
         self._unlimited = shaper.response(shaper.taps)
 
     def reset_to_steady_state(self, command: float) -> None:
-        """Begin with a command that has long been there, and no swing that limits have made."""
+        """Set the memory as if the command had been constant for long, without swing by limits."""
         self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate
         self._unlimited = command
         self._shaper.reset_to_steady_state(command)

@@ -1,4 +1,4 @@
-"""Filters that know nothing of the swing: first order, and S-curve. What many machines have."""
+"""Filters that know nothing of the swing, as many machines have: first order, and S-curve."""
 
 import math
 
