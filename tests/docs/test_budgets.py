@@ -67,7 +67,7 @@ LINES = {
         4_940,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (66_367, "a new ability takes the room of an old one"),
+    "canshaper": (66_370, "a new ability takes the room of an old one"),
     "tests": (100_786, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
