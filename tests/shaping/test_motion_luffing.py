@@ -2,11 +2,14 @@
 
 import pytest
 
+from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.motion import TwoAxisMotion
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.output import OutputStage
+from canshaper.shaping.states import CommandInput, Reason
 from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.transfer import Off
 from tests.shaping.two_axes import NEAR_FAR, TICK_S, slewing
 
 RAD_S, HEIGHT_M = 0.2, 2.0
@@ -92,3 +95,26 @@ def test_luffing_adds_in_the_range_of_its_demands(path: float) -> None:
     for _ in range(20):
         stage.drive(-0.8, -0.8, 0.0, path, 0.0, sensor_damps=False)
     assert stage.output.setpoint == pytest.approx(0.0 if path > 0.0 else -0.5, abs=0.008)
+
+
+def test_an_axis_that_bends_takes_it_while_it_is_shaped_only() -> None:
+    """Not in bypass, not in a stop: there it is what it would be without."""
+    one, plain = (
+        ShapedAxis(TICK_S, OutputLimits(rise_per_s=5.0), sway=None, shaper=Off()) for _ in range(2)
+    )
+    one.bends = True
+    for axis in (one, plain):
+        axis.tick(CommandInput())
+    for command, added, bypass, differs in (
+        (0.8, -0.3, False, True),
+        (0.8, -0.3, True, False),
+        (0.8, -0.3, False, True),
+    ):
+        for _ in range(30):
+            one.tick(CommandInput(command, bypass=bypass), added)
+            plain.tick(CommandInput(command, bypass=bypass))
+        assert (abs(one.output.setpoint - plain.output.setpoint) > 0.1) is differs
+    for _ in range(40):
+        for axis in (one, plain):
+            axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), -0.3)
+    assert one.output.setpoint == plain.output.setpoint == 0.0
