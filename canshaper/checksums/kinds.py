@@ -77,7 +77,7 @@ has. An algorithm runs in every tick: it waits for nothing, keeps nothing and ra
 
 @dataclass(frozen=True, slots=True)
 class ChecksumKind:
-    """How a checksum is computed.
+    """A kind of checksum: its width, and the algorithm that computes it.
 
     Attributes:
         text: description for people.

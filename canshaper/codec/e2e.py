@@ -149,7 +149,7 @@ class Profile5(E2e):
         return data[2]
 
     def verify(self, data: bytes) -> bool:
-        """Whether a frame has the header that it should."""
+        """Return whether the header of a frame is right."""
         return data[:2] == self.crc(data, 0).to_bytes(2, self._order)
 
     def protect(self, data: bytes, count: int) -> bytes:
@@ -206,7 +206,7 @@ class Profile4(E2e):
         return int.from_bytes(data[2:4], "big")
 
     def verify(self, data: bytes) -> bool:
-        """Whether a frame has the header that it should."""
+        """Return whether the header of a frame is right."""
         return self.protect(data, self.count(data)) == data
 
     def protect(self, data: bytes, count: int) -> bytes:

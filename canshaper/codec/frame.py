@@ -1,4 +1,4 @@
-"""A CAN frame as the pure part of canshaper sees it; identifiers as CANopen and J1939 use them."""
+"""A CAN frame without its I/O; identifiers and codes of CANopen and J1939."""
 
 from enum import Enum, IntEnum
 from typing import TYPE_CHECKING, NamedTuple

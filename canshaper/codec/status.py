@@ -103,11 +103,11 @@ class ReportedAim(Protocol):
 
     @property
     def radius_m(self) -> float:
-        """Distance by which the tip still moves out (or in, negative), m."""
+        """Distance by which the tip still moves out, m; negative inwards."""
 
     @property
     def known(self) -> bool:
-        """Whether both are known."""
+        """Whether angle and distance are known."""
 
 
 def _command_pct(one: ReportedAxis) -> float:

@@ -13,7 +13,7 @@ LAST_SPN = 524287
 
 
 class J1939Name(Section):
-    """NAME of our node (SAE J1939-81): what distinguishes two nodes, and which of them wins."""
+    """NAME of our node (SAE J1939-81): it identifies the node and decides who wins an address."""
 
     identity_number: Annotated[int, number(0, 2_097_151, "", "serial number of the PC")]
     manufacturer_code: Annotated[int, number(0, 2047, "", "code that SAE gave to the maker")]
@@ -155,7 +155,7 @@ class Bus(Section):
 
 
 class Gateway(Section):
-    """Two buses with us between them: the joystick's frames leave with our velocity in them."""
+    """Inline gateway between two buses: joystick frames leave with our velocities in them."""
 
     between: Annotated[list[str], Field(min_length=2, max_length=2, description="the two buses")]
     forwarding: Literal["kernel", "daemon"] = "kernel"

@@ -154,7 +154,7 @@ def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Prob
 
 
 class _Place:
-    """Where an error lies: its path in the file and what the schema says of that place."""
+    """Place of an error: its path in the file, and the type that the schema demands there."""
 
     def __init__(self, schema: type[Section]) -> None:
         self.path: Place = ()

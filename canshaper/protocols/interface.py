@@ -125,7 +125,7 @@ class BusProtocol:
         """Take note that the loop stood still: frames were missed on all buses."""
 
     def on_bus_off(self, bus: str) -> None:
-        """Take note that we are not on this bus now: frames are missed there."""
+        """Take note that our controller is off this bus: frames are missed there."""
 
     def send_failed(self, frame: Frame) -> None:
         """Take note that a frame did not reach its bus."""

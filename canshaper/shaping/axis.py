@@ -101,7 +101,7 @@ class ShapedAxis:
 
     @property
     def reason(self) -> Reason:
-        """Why the axis is in that state."""
+        """Reason for which the axis is in its state."""
         return self._states.reason
 
     @property
@@ -247,7 +247,7 @@ class ShapedAxis:
         self._stage.drop_added()
 
     def restore(self, state: State, reason: Reason) -> None:
-        """Continue in a state in which the output is neutral, see ``StateMachine``."""
+        """Continue in a state with neutral output (``StateMachine.restore``)."""
         self._states.restore(state, reason)
 
     def limit(self, limits: OutputLimits) -> None:

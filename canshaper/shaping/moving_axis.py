@@ -137,7 +137,7 @@ UNATTENDED_TICKS = 3
 
 
 class AddedTime:
-    """How long a motion may move an axis that no one commands.
+    """Limits how long a motion may move an axis that no one commands.
 
     Args:
         ticks: longest time in motion, in ticks of the axis.

@@ -105,7 +105,7 @@ class LateModel:
 
     @property
     def angle(self) -> float:
-        """Normalised angle, see ``SwayModel``."""
+        """Normalised angle between tip and grapple, as in ``SwayModel``."""
         return self.sway.angle + self._lead
 
     @property

@@ -96,7 +96,7 @@ class Evidence:
         return ratio if ratio > -BOUND else -BOUND
 
     def proved(self, least: float) -> bool:
-        """Whether the ratios against a wrong sign and another axis' motion exceed ``least``."""
+        """Return whether the ratios of right sign and own motion both exceed ``least``."""
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:

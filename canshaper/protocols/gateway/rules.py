@@ -1,4 +1,4 @@
-"""A gateway in the line: which frames pass, and the rules of the kernel that make it so."""
+"""Frames that an inline gateway passes, and the kernel's rules of can-gw that pass them."""
 
 from collections.abc import Iterator
 

@@ -37,7 +37,7 @@ class Fir:
         self._history: deque[float] = deque([0.0] * len(self.taps), maxlen=len(self.taps))
 
     def step(self, command: float) -> float:
-        """Output for this tick's command."""
+        """Return the output for this tick's command."""
         self._history.appendleft(command)
         return math.fsum(map(mul, self.taps, self._history))
 

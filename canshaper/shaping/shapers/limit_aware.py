@@ -141,7 +141,7 @@ class LimitAware:
         self._shaper.reset_to_steady_state(command)
 
     def step(self, command: float) -> float:
-        """Output for this tick's command, before limits."""
+        """Return the output for this tick's command, before limits."""
         sway, twin = self._sway, self._twin
         twin.step(self._unlimited)
         if sway.angle == 0.0 == sway.rate:  # never moved, or started again after a fault

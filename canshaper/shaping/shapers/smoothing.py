@@ -20,16 +20,16 @@ class FirstOrder:
         self._value = 0.0
 
     def step(self, command: float) -> float:
-        """Output for this tick's command."""
+        """Return the output for this tick's command."""
         self._value += self._share * (command - self._value)
         return self._value
 
     def reset_to_steady_state(self, command: float) -> None:
-        """Begin with a command that has long been there."""
+        """Set the memory as if the command had been constant for long."""
         self._value = command
 
     def copy_state(self, old: "FirstOrder") -> None:
-        """Go on from where another one stands."""
+        """Copy the state of another filter of this class."""
         self._value = old._value
 
 
@@ -52,7 +52,7 @@ class SCurve:
         self._slope = 0.0
 
     def step(self, command: float) -> float:
-        """Output for this tick's command."""
+        """Return the output for this tick's command."""
         left = command - self._value
         change = self._jerk * self._tick_s
         # Fastest slope from which the command can still be met with this jerk in whole ticks:
@@ -68,11 +68,11 @@ class SCurve:
         return self._value
 
     def reset_to_steady_state(self, command: float) -> None:
-        """Begin with a command that has long been there."""
+        """Set the memory as if the command had been constant for long."""
         self._value, self._slope = command, 0.0
 
     def copy_state(self, old: "SCurve") -> None:
-        """Go on from where another one stands."""
+        """Copy the state of another filter of this class."""
         self._value, self._slope = old._value, old._slope
 
 
