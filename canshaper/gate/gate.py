@@ -159,10 +159,7 @@ class Gate:
     # --- what goes out ---------------------------------------------------------------------------
 
     def leaving(self, key: Key, data: bytes, of: bytes | None = None) -> str:
-        """Return why a frame may not leave; empty if it may, and then remember it as sent.
-
-        In a gateway ``of`` is the joystick's frame that it was made from; None for our own.
-        """
+        """Return why a frame, in a gateway made ``of`` a joystick's, may not leave; else empty."""
         valve = self.valves.get(key)
         if valve is None:
             self.others[key] = sent = self.others.get(key, 0) + 1

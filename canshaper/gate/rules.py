@@ -17,9 +17,7 @@ OTHERS = 8
 def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool]:
     """Rule 1: enable, emergency stop, second sender; no limit: a reason seen once is enough.
 
-    Returns:
-        The reason to stop at once, or empty; and whether it latches at rest too. In motion it
-        always latches.
+    Returns the reason, or empty; and whether it latches at rest too. In motion it always does.
     """
     why, latches = axis.hard, axis.latches
     if stop is not None and stop.off(now_ns):
