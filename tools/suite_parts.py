@@ -176,15 +176,8 @@ def rows_of_more() -> list[list[Part]]:
     study = pytest(*SPREAD, "-m", "study")
     proof = pytest(*SPREAD, "tests/proof")
     apart = {"PYTHONPATH": str(FOREIGN)}
-    files = [
-        f"tests/{one}.py"
-        for one in (
-            "recording/test_mcap",
-            "recording/test_mf4",
-            "native/test_fmu",
-            "campaign/test_unit",
-        )
-    ]
+    of = ("recording/test_mcap", "recording/test_mf4", "native/test_fmu", "campaign/test_unit")
+    files = [f"tests/{one}.py" for one in of]
     return [
         [Part("types", "mypy, import contracts", types)],
         [Part("coverage", "every line and branch of what decides whether a valve moves", cover)],
