@@ -76,7 +76,9 @@ def test_shares_make_the_same_drives_as_one_campaign(tmp_path: Path) -> None:
         merge += ["--merge", str(out)]
     done = campaign(PLAIN, *merge, "--out", str(tmp_path / "merged"))
     assert done.exit_code == 0
-    assert rows(tmp_path / "merged") == rows(tmp_path / "whole")
+    merged, drives = rows(tmp_path / "merged"), rows(tmp_path / "whole")
+    # The first drive of each share is driven by both engines.
+    assert [{**row, "engine": ""} for row in merged] == [{**row, "engine": ""} for row in drives]
 
 
 @pytest.mark.slow
