@@ -18,7 +18,7 @@ from rich.text import Text
 
 from canshaper.config.filters import Filter, Profile
 from canshaper.config.schema import AxisSection
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import at_ends
@@ -238,7 +238,7 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
     for _ in range(round(WARM_UP_S / period_s)):
         axis.tick(CommandInput(sign))
     # An event waits for the next tick, and silence for the timeout before; until then it goes on.
-    full = sign * axis.sent
+    full = sign * axis.output.setpoint
 
     def after(joystick: CommandInput, wait_s: float = period_s) -> float:
         return full * wait_s + _way(axis, joystick, sign, period_s)[0]
@@ -275,7 +275,7 @@ def needed_s(
             for _ in range(ticks):
                 axis.tick(CommandInput(sign))
             way = max(way, _way(axis, CommandInput(), sign, period_s)[0])
-        most = max(most, sign * axis.sent * (timeout_s + 2.0 * period_s) + way)
+        most = max(most, sign * axis.output.setpoint * (timeout_s + 2.0 * period_s) + way)
     return most
 
 
@@ -290,7 +290,7 @@ def _way(
         axis.tick(joystick)
         if axis.state not in MOVING:
             break
-        velocity = sign * axis.sent
+        velocity = sign * axis.output.setpoint
         way_s += velocity * period_s
         most_s = max(most_s, way_s)
         last = tick if velocity > 0.0 else last

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 
 from canshaper.config.adjust import Key, adjusted, value
 from canshaper.config.schema import AxisSection
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisControl
 from canshaper.machine.filters import filter_fault
 from canshaper.machine.stopping import stop_fault
 
@@ -26,8 +26,8 @@ class Adjuster:
     def __init__(self, controller: Controller) -> None:
         self._axes, self._motions = controller.axes, controller.motions
         self._deployment = controller.deployment
-        control = self._deployment.config.control
-        self._ranges = control.adjustable if control else {}
+        section = self._deployment.config.control
+        self._ranges = section.adjustable if section else {}
         self._in_file = {text: self._now(text) for text in self._ranges}
 
     def table(self) -> dict[str, dict[str, float]]:
@@ -88,20 +88,20 @@ class Adjuster:
                 raise ValueError(f"{text}: expected {low:g} to {high:g}, got {number:g}")
             yield _key(text), float(number)
 
-    def _config(self, name: str, runner: AxisControl, values: Mapping[Key, float]) -> AxisSection:
+    def _config(self, name: str, control: AxisControl, values: Mapping[Key, float]) -> AxisSection:
         try:
-            config = adjusted(runner.bound.config, values, self._deployment.config.axes[name])
+            config = adjusted(control.bound.config, values, self._deployment.config.axes[name])
         except ValueError as error:
             raise ValueError(f"axes.{name}.{error}") from None
-        before = runner.limits(runner.bound.config)
-        if runner.limits(config) != before and not runner.axis.neutral:
-            state = runner.axis.state.name
+        before = control.limits(control.bound.config)
+        if control.limits(config) != before and not control.axis.neutral:
+            state = control.axis.state.name
             raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
-        if runner.axis.output.commanded and not runner.axis.command:
+        if control.axis.output.commanded and not control.axis.demand:
             # Another filter may ask for a motion that no one asks for any more.
             raise ValueError(f"axes.{name}: it runs on with its joystick released; wait for rest")
         rate = config.limits.slowest_per_s
-        if fault := filter_fault(config.filter, config.sway, runner.period_s, rate):
+        if fault := filter_fault(config.filter, config.sway, control.period_s, rate):
             raise ValueError(f"axes.{name}.filter: {fault}")
         if fault := stop_fault(self._deployment, name, config):
             raise ValueError(f"axes.{name}.limits.stop_distance_m: {fault}")

@@ -6,11 +6,11 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.axis_control import AxisControl
+from canshaper.controller.couplings import Couplings
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.motion import Couplings
-from canshaper.controller.received import MachineInputs, parts, received_by
-from canshaper.controller.runner import AxisControl
-from canshaper.controller.status import SensorReport, StatusMessages
+from canshaper.controller.machine_inputs import MachineInputs, parts, received_by
+from canshaper.controller.status_messages import SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
 from canshaper.inputs.input import Key, Part, carry_over
 from canshaper.inputs.stops import EnableGate
@@ -55,11 +55,11 @@ class Controller:
             for name, bound in deployment.axes.items()
         }
         self.status = StatusMessages(deployment, self.axes, self._senders)
-        for runner in self.axes.values():
-            if switches := inputs.gates.get(runner.bound.config.command.joystick):
-                runner.stops.interlocks.append(EnableGate(switches))
-            if runner.bound.feedback and runner.feedback:
-                inputs.bound.append((runner.bound.feedback, runner.feedback))
+        for control in self.axes.values():
+            if switches := inputs.gates.get(control.bound.config.command.joystick):
+                control.stops.interlocks.append(EnableGate(switches))
+            if control.bound.feedback and control.feedback:
+                inputs.bound.append((control.bound.feedback, control.feedback))
         self._sensors: dict[str, SensorReport] = {}
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
@@ -87,8 +87,8 @@ class Controller:
         """
         self._overrun.copy_state(before._overrun)
         if before._stop is not None:
-            for runner in before.axes.values():
-                runner.stops.see(before._stop)
+            for control in before.axes.values():
+                control.stops.see(before._stop)
         carry_over(before._parts(), self._parts())
         open_before = before.deployment.config.buses.values()
         for name, bus in self.deployment.config.buses.items():
@@ -104,7 +104,7 @@ class Controller:
     @property
     def neutral(self) -> bool:
         """Whether no axis can move without the operator."""
-        return all(runner.axis.neutral for runner in self.axes.values())
+        return all(control.axis.neutral for control in self.axes.values())
 
     @property
     def silent_buses(self) -> frozenset[str]:
@@ -152,8 +152,8 @@ class Controller:
                 if self._stood_still:  # a frame that has waited is not passed on later either
                     return None
                 if (stop := self._stop) is not None:
-                    for runner in self.axes.values():
-                        runner.stops.see(stop)
+                    for control in self.axes.values():
+                        control.stops.see(stop)
                 stopped = stop is not None and stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
                 self.moves = rule.moves
@@ -185,22 +185,22 @@ class Controller:
         if self._couplings.any:
             self._couplings.step(now_ns, last, now, self.events)
         silent = self.silent_buses if self._protocols else NOWHERE
-        for name, runner, message, rule in self._outputs.turns:
-            period = runner.period_ticks
+        for name, control, message, rule in self._outputs.turns:
+            period = control.period_ticks
             if now // period - last // period:
-                transition = runner.tick(now_ns, self._stop, overrun)
-                self.moves |= runner.axis.output.steps != 0
+                transition = control.tick(now_ns, self._stop, overrun)
+                self.moves |= control.axis.output.steps != 0
                 if rule is not None:
                     if (own := rule.own(now_ns)) is not None:
                         yield own
                 elif message is not None and message.key[0] not in silent:
                     yield message.frame()
-                runner.axis.advance()
-                if runner.feedback is not None or runner.axis.sensed is not None:
-                    self._report(name, runner, now_ns)
+                control.axis.propagate()
+                if control.feedback is not None or control.axis.sensed is not None:
+                    self._report(name, control, now_ns)
                 if transition is not None:
-                    self._changed(name, runner, transition)
-                    changed.append(runner)
+                    self._changed(name, control, transition)
+                    changed.append(control)
         self.moves = False
         for frame in self.status.frames(changed, self.counters, last, now):
             if frame.bus not in silent:
@@ -208,12 +208,12 @@ class Controller:
         if self._protocols:
             yield from self._of_protocols(now_ns)
 
-    def _changed(self, name: str, runner: AxisControl, transition: Transition) -> None:
+    def _changed(self, name: str, control: AxisControl, transition: Transition) -> None:
         """Report the change of state of an axis; a trip ends what a two-axis motion adds."""
         self.events.append(StateEvent(name, transition))
         if transition.new is State.TRIPPED:
             for motion in self.motions:
-                motion.on_trip(runner)
+                motion.on_trip(control)
 
     def _of_protocols(self, now_ns: int) -> Iterator[Frame]:
         """Yield the frames of protocols besides commands and status; take faults and events."""
@@ -227,15 +227,15 @@ class Controller:
         """Count missed deadlines; return the axes whose filters failed in them."""
         self.counters.add(FrameFault.MISSED_DEADLINE, now - last - 1)
         changed = []
-        for name, runner in self.axes.items():
-            if (transition := runner.hold(last, now)) is not None:
-                self._changed(name, runner, transition)
-                changed.append(runner)
+        for name, control in self.axes.items():
+            if (transition := control.hold(last, now)) is not None:
+                self._changed(name, control, transition)
+                changed.append(control)
         return changed
 
-    def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
+    def _report(self, name: str, control: AxisControl, now_ns: int) -> None:
         """Report changes of the valve's feedback and of the sway sensor."""
-        sent, feedback = runner.axis.sent, runner.feedback
+        sent, feedback = control.axis.output.setpoint, control.feedback
         if feedback is not None and feedback.check(sent, now_ns):
             event = FeedbackEvent(name, feedback.following, feedback.part, sent)
             self.events.append(event)
@@ -253,9 +253,9 @@ class Controller:
         self._stood_still = True
         for protocol in self._protocols:
             protocol.stalled()
-        for runner in self.axes.values():
-            runner.stops.invalid = True
-            runner.trip_in_motion(Reason.LOOP_STALLED)
+        for control in self.axes.values():
+            control.stops.invalid = True
+            control.trip_in_motion(Reason.LOOP_STALLED)
 
     def _invalidate(self, bus: str | None = None) -> None:
         """Invalidate the inputs of one bus, or all: they have to come again before they count."""

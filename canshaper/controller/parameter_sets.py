@@ -144,7 +144,7 @@ class SetChooser:
             self._driven = []
         elif driven is not None:
             driven.append(axis.output.applied)
-            if axis.command == 0.0 or len(driven) > self._late:
+            if axis.demand == 0.0 or len(driven) > self._late:
                 self._driven = None
 
     def _steady(self, now_ns: int) -> bool:
@@ -152,8 +152,8 @@ class SetChooser:
         axis = self._axis
         if axis.neutral:
             return True
-        speed = min(abs(axis.command), self._maximum)
-        off = abs(axis.output.applied - math.copysign(speed, axis.command))
+        speed = min(abs(axis.demand), self._maximum)
+        off = abs(axis.output.applied - math.copysign(speed, axis.demand))
         if off > STEADY or self._restless_ns is None:
             self._restless_ns = now_ns
         return now_ns - self._restless_ns >= STEADY_NS

@@ -5,7 +5,7 @@ from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.message import Sender
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
@@ -34,32 +34,32 @@ class ValveOutputs:
         self._axes = {key: [axes[name] for name in names] for key, names in valves.items()}
         self._forwarding = forwarding
         self.turns: list[Turn] = []
-        for name, runner in axes.items():
-            key = runner.valve.key
-            if self._axes[key][-1] is runner:
-                self.turns.append((name, runner, runner.valve, forwarding.get(key)))
+        for name, control in axes.items():
+            key = control.valve.key
+            if self._axes[key][-1] is control:
+                self.turns.append((name, control, control.valve, forwarding.get(key)))
             else:
-                self.turns.append((name, runner, None, None))
+                self.turns.append((name, control, None, None))
 
     def foreign_sender(self, key: MessageKey, arrived_ns: int) -> None:
         """Trip the axes of a message that another sender has sent."""
-        for runner in self._axes.get(key, ()):
-            runner.stops.foreign_sender(arrived_ns)
+        for control in self._axes.get(key, ()):
+            control.stops.foreign_sender(arrived_ns)
 
     def send_failed(self, key: MessageKey) -> None:
         """Trip the axes in motion of a message that did not reach its bus."""
-        for runner in self._axes.get(key, ()):
-            runner.trip_in_motion(Reason.SEND_FAILED)
+        for control in self._axes.get(key, ()):
+            control.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
         """Whether a frame that comes too late moves a valve, and so must not leave.
 
         Its receiver will see no gap in the counter.
         """
-        runners = self._axes[frame[:3]]
-        if not any(runner.axis.raw for runner in runners):
+        controls = self._axes[frame[:3]]
+        if not any(control.axis.output.steps for control in controls):
             return False
-        runners[-1].valve.take_back()
+        controls[-1].valve.take_back()
         return True
 
     def refused(self, frame: Frame) -> Frame:
@@ -68,11 +68,11 @@ class ValveOutputs:
         Returns:
             The same frame with neutral commands, to be sent in its place.
         """
-        runners = self._axes[frame[:3]]
-        for runner in runners:
-            runner.stops.trip = Reason.OUTPUT_REFUSED
-            runner.put(0)
-        return runners[0].valve.instead(frame)
+        controls = self._axes[frame[:3]]
+        for control in controls:
+            control.stops.trip = Reason.OUTPUT_REFUSED
+            control.put(0)
+        return controls[0].valve.instead(frame)
 
     def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
         """Return a neutral frame for every valve whose bus is not silent, the last frames sent.
@@ -82,14 +82,14 @@ class ValveOutputs:
             errors: gets the exceptions; the other valves still get their frames.
         """
         frames: list[Frame] = []
-        for key, runners in self._axes.items():
+        for key, controls in self._axes.items():
             try:
-                for runner in runners:
-                    runner.put(0)
+                for control in controls:
+                    control.put(0)
                 if (rule := self._forwarding.get(key)) is not None:
                     frames += rule.last()
                 elif key[0] not in silent:
-                    frames.append(runners[-1].valve.frame())
+                    frames.append(controls[-1].valve.frame())
             except Exception as error:
                 errors.append(error)
         return frames

@@ -9,7 +9,7 @@ from typing import Protocol, TypedDict, Unpack
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import DriveError
 from canshaper.gate.cycle import FrameProcessor, Standstill, io_cycle
 from canshaper.machine.deployment import Deployment
@@ -244,9 +244,9 @@ class Simulation:
             raise DriveError(str(error)) from None
         if disturb := options.get("disturb"):
             hands = [*map(disturb, hands)]
-        guarded = Guarded(self.controller)
+        gated = GatedController(self.controller)
         self._lock_step = LockStep(
-            deployment, guarded, self.plant, hands, on_frame, received=deployment.routing.received
+            deployment, gated, self.plant, hands, on_frame, received=deployment.routing.received
         )
         self._loads = [*options.get("loads", ())]
         self._end_ms = round(script.duration_s * 1000.0)

@@ -1,8 +1,8 @@
 """The inner state of the controller as rows of numbers, in the order of ``c/cs_inspect.c``."""
 
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.motion import MotionRunner
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.couplings import MotionControl
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
@@ -25,8 +25,8 @@ def rows(controller: Controller) -> list[list[float]]:
     return [*map(_axis_row, controller.axes.values()), *map(_motion_row, controller.motions)]
 
 
-def _axis_row(runner: AxisControl) -> list[float]:
-    axis = runner.axis
+def _axis_row(control: AxisControl) -> list[float]:
+    axis = control.axis
     states, transfer, stage = axis._states, axis._transfer, axis._stage
     shaper, sway, output, small = transfer._shaper, axis.sway, axis.output, stage._small
     twin = shaper._twin if isinstance(shaper, LimitAware) else None
@@ -54,7 +54,7 @@ def _axis_row(runner: AxisControl) -> list[float]:
         output.path,
         output.applied,
         output.commanded,
-        axis.command,
+        axis.demand,
         stage.ramp,
         stage._own_ramp,
         stage._carry,
@@ -73,13 +73,13 @@ def _axis_row(runner: AxisControl) -> list[float]:
         stage._recent.high,
         stage._demanded.low,
         stage._demanded.high,
-        runner.added,
+        control.added,
     ]
     return [float(one) for one in row]
 
 
-def _motion_row(runner: MotionRunner) -> list[float]:
-    motion = runner._motion
+def _motion_row(control: MotionControl) -> list[float]:
+    motion = control._motion
     radius = motion._radius_m
     row = [motion._weight, -1.0 if radius is None else radius]
     for one in (motion._slew, motion._near_far):

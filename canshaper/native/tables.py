@@ -18,9 +18,9 @@ from canshaper.codec.message import SequenceChecker
 from canshaper.codec.signals import find_signal, special_codes
 from canshaper.codec.velocity import VelocitySignal
 from canshaper.config.source import Place
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.motion import MotionRunner
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.couplings import MotionControl
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -75,20 +75,20 @@ def tables(deployment: Deployment) -> Numbers:
         raise ConfigError(problems)
     buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
     axes = controller.axes
-    last = {runner.valve.key: runner for runner in axes.values()}
+    last = {control.valve.key: control for control in axes.values()}
     return {
         "tick_ns": deployment.config.tick_ms * 1_000_000,
         "joystick": [_joystick(deployment, name, buses) for name in joysticks],
-        "valve": [_valve(runner, buses) for runner in last.values()],
+        "valve": [_valve(control, buses) for control in last.values()],
         "axis": [
             {
-                **_wiring(runner, deployment, joysticks),
-                "valve": [*last].index(runner.valve.key),
-                "sends": last[runner.valve.key] is runner,
-                **_filter(runner.axis),
-                **_limits(runner.axis),
+                **_wiring(control, deployment, joysticks),
+                "valve": [*last].index(control.valve.key),
+                "sends": last[control.valve.key] is control,
+                **_filter(control.axis),
+                **_limits(control.axis),
             }
-            for runner in axes.values()
+            for control in axes.values()
         ],
         "motion": [
             _motion(deployment, name, one, list(axes), buses)
@@ -204,8 +204,8 @@ def _velocities(deployment: Deployment, joystick: str) -> dict[str, VelocitySign
     return {one.name: one for one in every if isinstance(one, VelocitySignal)}
 
 
-def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
-    sent = runner.bound.valve.message
+def _valve(control: AxisControl, buses: list[str]) -> Numbers:
+    sent = control.bound.valve.message
     data = sent.fields.layout.encode(dict(sent.start))
     return {
         **_key(sent.key, len(data), buses),
@@ -215,13 +215,13 @@ def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
     }
 
 
-def _wiring(runner: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
+def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
     """From which joystick an axis gets its demand, and where its setpoint goes."""
-    bound, command, valve = runner.bound, runner.bound.config.command, runner.bound.valve
+    bound, command, valve = control.bound, control.bound.config.command, control.bound.valve
     return {
         "joystick": joysticks.index(command.joystick),
         "number": [*_velocities(deployment, command.joystick)].index(command.signal),
-        "period_ticks": runner.period_ticks,
+        "period_ticks": control.period_ticks,
         "setpoint": _field(bound.valve_message, bound.config.valve.signal),
         "zero": valve._zero,
         "sign": valve._sign,
@@ -275,10 +275,10 @@ def _limits(axis: ShapedAxis) -> Numbers:
 
 
 def _motion(
-    deployment: Deployment, name: str, runner: MotionRunner, axes: list[str], buses: list[str]
+    deployment: Deployment, name: str, control: MotionControl, axes: list[str], buses: list[str]
 ) -> Numbers:
     """Return the members of ``cs_motion_config``."""
-    bound, motion = deployment.motions[name], runner._motion
+    bound, motion = deployment.motions[name], control._motion
     config, near_far = bound.config, bound.config.near_far
     members = [one for one in (motion._slew, motion._near_far) if one]
     same = ("full_speed", "period_s", "stiffness", "damping", "lag_s", "farthest", "fall_per_s")
@@ -286,8 +286,8 @@ def _motion(
         "slew": axes.index(config.slew),
         "near_far": axes.index(near_far) if near_far else NONE,
         "path_m": motion._path_m,
-        "circle_m": runner._circle_m or 0.0,
-        "tick_s": runner._tick_s,
+        "circle_m": control._circle_m or 0.0,
+        "tick_s": control._tick_s,
         "moving": [
             {**{n: getattr(one, n) for n in same}, "bounded": one.farthest < math.inf}
             for one in members

@@ -150,15 +150,15 @@ def test_a_frame_that_the_gate_refuses_is_a_broken_promise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert measured_drive(ROBUST, 2, RANGES)["broken"] == 0
-    act = ShapedAxis.act
+    command = ShapedAxis.command
 
     def runs_on(self: ShapedAxis, *arguments: object, **named: object) -> object:
-        transition = act(self, *arguments, **named)  # type: ignore[arg-type]
-        if self.raw and abs(self.raw) < 60:  # a little faster than anybody asked
-            self.output.steps += 3 if self.raw > 0 else -3
+        transition = command(self, *arguments, **named)  # type: ignore[arg-type]
+        if self.output.steps and abs(self.output.steps) < 60:  # a little faster than anybody asked
+            self.output.steps += 3 if self.output.steps > 0 else -3
         return transition
 
-    monkeypatch.setattr(ShapedAxis, "act", runs_on)
+    monkeypatch.setattr(ShapedAxis, "command", runs_on)
     row = measured_drive(ROBUST, 2, RANGES)
     assert row["broken"] > 0
     assert "output=refused" in row["why"]
@@ -171,7 +171,9 @@ def test_late_lost_and_garbled_frames_reach_the_controller_as_such() -> None:
         setting = draw_drive(ROBUST, seed, RANGES)
         if setting.fault and setting.fault not in kinds:
             simulation = Simulation(ROBUST, setting.script, **setting.options)
-            states = {runner.axis.state for _ in simulation.ticks() for runner in _axes(simulation)}
+            states = {
+                control.axis.state for _ in simulation.ticks() for control in _axes(simulation)
+            }
             kinds[setting.fault] = len(states)
     assert {*kinds} == {f"joystick {one}" for one in ("lost", "late", "garbled", "silent")}
     assert max(kinds.values()) > 2  # some stop

@@ -196,10 +196,11 @@ def test_near_far_is_moved_no_farther_than_check_says(
         way_m, moves = 0.0, []
         for time_ms in simulation.ticks():
             if time_ms > 5500:  # its own stroke is over
-                way_m += near_far.sent * 0.02  # at 1 m/s full speed
+                way_m += near_far.output.setpoint * 0.02  # at 1 m/s full speed
                 farthest_m = max(farthest_m, abs(way_m))
                 moves.append(
-                    near_far.raw or simulation.controller.axes["slew"].axis.output.commanded
+                    near_far.output.steps
+                    or simulation.controller.axes["slew"].axis.output.commanded
                 )
             if not any(moves[-1:]):
                 way_m = 0.0

@@ -38,7 +38,7 @@ def test_the_c_is_the_controller_for_a_shipped_machine(name: str, seed: str) -> 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_it_is_so_in_a_long_drive_behind_the_gate(name: str) -> None:
     c = NativeController(shipped(name))
-    wrong, _ = difference(read(CONFIG / f"{name}.yaml"), c, "long", 100_000, guarded=True)
+    wrong, _ = difference(read(CONFIG / f"{name}.yaml"), c, "long", 100_000, gated=True)
     assert wrong == ""
 
 
@@ -54,7 +54,7 @@ def test_it_is_so_in_ten_million_ticks(name: str) -> None:
 @pytest.mark.parametrize("name", VARIANTS)
 def test_the_c_is_the_controller_for_every_part(name: str, machine: Machine) -> None:
     deployment = changed(machine, VARIANTS[name]).load()
-    wrong, seen = difference(deployment, native(deployment), name, 10_000, guarded=True)
+    wrong, seen = difference(deployment, native(deployment), name, 10_000, gated=True)
     assert wrong == ""
     check_seen(seen)
 

@@ -14,7 +14,7 @@ from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import EndStopDetector, Ramp, SpeedFeedback
 from canshaper.commissioning.calibration.together import Moment
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
@@ -90,7 +90,7 @@ class CalibrationDrive:
         deployment = replace(deployment, config=config)
         feedback = {name: SpeedFeedback(deployment, name, *one) for name, one in speeds.items()}
         self._controller = Controller(deployment)
-        self._guarded = Guarded(self._controller)
+        self._gated = GatedController(self._controller)
         # Nothing moves but these axes: no other one gets its joystick, nor moves for another one.
         self._joysticks: dict[str, _RampJoystick] = {}
         for name, one in self._controller.axes.items():
@@ -126,11 +126,11 @@ class CalibrationDrive:
         """Condition that the axis still waits for before the ramp begins; empty afterwards."""
         if self._begun_ns is not None:
             return ""
-        for runner, joystick, _ in self._driven.values():
+        for control, joystick, _ in self._driven.values():
             if joystick.moved:
                 return Reason.JOYSTICK_NOT_NEUTRAL.name
-            if runner.axis.state is not State.READY:
-                return runner.axis.reason.name
+            if control.axis.state is not State.READY:
+                return control.axis.reason.name
         return f"the joystick of {moved}" if (moved := self._moved) else "feedback"
 
     @property
@@ -141,13 +141,13 @@ class CalibrationDrive:
     @property
     def moves(self) -> bool:
         """Whether the frame that was handed out last is that of a valve, and any axis moves."""
-        return self._guarded.moves
+        return self._gated.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; return the frame for the other bus of a gateway, or None."""
         for *_, speed in self._driven.values():
             speed.receive(frame, arrived_ns)
-        return self._guarded.receive(frame, arrived_ns)
+        return self._gated.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run one tick, and yield the frames to send."""
@@ -182,26 +182,26 @@ class CalibrationDrive:
                 command = ramp  # where one stops no other moves on
         for name, (_, joystick, _) in self._driven.items():
             joystick.deflection = command if name in turn else 0.0
-            self._guarded.demand(name, joystick.deflection)
-        yield from self._guarded.tick(now_ns, missed)
+            self._gated.demand(name, joystick.deflection)
+        yield from self._gated.tick(now_ns, missed)
         self._controller.events.clear()
 
     def send_failed(self, frame: Frame) -> None:
         """Take note that a frame did not reach its bus; the axes of a valve frame trip."""
-        self._guarded.send_failed(frame)
+        self._gated.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
         """Whether a valve frame that comes too late must not leave."""
-        return self._guarded.withhold(frame)
+        return self._gated.withhold(frame)
 
     def stalled(self) -> None:
         """Take note that the loop stood still; moving axes go to neutral."""
-        self._guarded.stalled()
+        self._gated.stalled()
 
     def _sample(self, time_s: float) -> None:
         moment = [time_s]
         for name, (one, _, speed) in self._driven.items():
-            sample = Sample(one.axis.raw / one.bound.valve.steps, speed.value)
+            sample = Sample(one.axis.output.steps / one.bound.valve.steps, speed.value)
             if name == self.axis:
                 self._samples.setdefault(self.ramp.part(time_s), []).append(sample)
             limits = one.bound.config.limits.output_limits()
@@ -210,7 +210,7 @@ class CalibrationDrive:
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve."""
-        return self._guarded.neutral_frames()
+        return self._gated.neutral_frames()
 
     def check_ended(self) -> None:
         """Raise CalibrationError where the ramp was not driven to its end."""

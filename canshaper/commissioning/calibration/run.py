@@ -11,7 +11,7 @@ from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.design.lockstep import LockStep
 from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.deployment import Deployment
@@ -132,6 +132,6 @@ def _give_room(plant: PlantNode, deployment: Deployment, axis: str, travel_s: fl
     actuator = plant.crane.boom.axes[deployment.coordinates.get(axis, axis)]
     back = Script("back", (Stroke(axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)
-    lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand])
+    lock_step = LockStep(deployment, GatedController(Controller(deployment)), plant, [hand])
     while actuator.room_s < travel_s and lock_step.time_ms < 1000 * LONGEST_BACK_S:
         lock_step.step()

@@ -14,7 +14,7 @@ from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, s
 from canshaper.config.bus import Bus
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.binding import load_deployment
@@ -79,7 +79,7 @@ class Loop:
         self, deployment: Deployment, sockets: dict[str, socket.socket], seconds: float
     ) -> None:
         self._controller = Controller(deployment)
-        self._guarded = Guarded(self._controller)
+        self._gated = GatedController(self._controller)
         faults = self._controller.counters.add
         buses, routes = deployment.config.buses, deployment.routing.buses
         self._ports = {
@@ -112,7 +112,7 @@ class Loop:
             port.close()
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        io_cycle(self._guarded, self._ports, now_ns, missed, self._standstill)
+        io_cycle(self._gated, self._ports, now_ns, missed, self._standstill)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)
@@ -132,7 +132,9 @@ class Loop:
                 t = event.transition
                 self._events.append((event.axis, t.new.name, t.reason.name))
         self._controller.events.clear()
-        self._moved |= {n for n, runner in self._controller.axes.items() if runner.axis.raw}
+        self._moved |= {
+            n for n, control in self._controller.axes.items() if control.axis.output.steps
+        }
         self._collector.pause(now_ns)
 
     def record(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.run import run_simulated
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.design.lockstep import LockStep
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
@@ -85,7 +85,9 @@ def log_simulated(
             time_ns, channel = round(1e9 * time_s), buses[frame.bus].channel
             log.write(ReceivedFrame(time_ns, frame.bus, channel, *frame[1:], "").line())
 
-        lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand], write)
+        lock_step = LockStep(
+            deployment, GatedController(Controller(deployment)), plant, [hand], write
+        )
         while lock_step.time_ms < 1000.0 * script.duration_s:
             lock_step.step()
             if lock_step.time_ms % 1000 == 0:

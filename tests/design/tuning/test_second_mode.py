@@ -143,7 +143,7 @@ def pulse(bound: BoundAxis, hold_s: float) -> list[float]:
     sent = []
     for tick in range(round((hold_s + 2.0) / TICK_S)):
         axis.tick(CommandInput(1.0 if tick * TICK_S < hold_s else 0.0))
-        sent.append(axis.sent)
+        sent.append(axis.output.setpoint)
     return sent
 
 

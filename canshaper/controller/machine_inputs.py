@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from canshaper.codec.message import Sender
 from canshaper.config.crane import Radius
 from canshaper.config.limits import Ends, OtherFlow, RopeSection
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.input import Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.stops import EmergencyStopInput
@@ -159,11 +159,11 @@ def parts(
         for sender in senders:
             bus, *message = sender.key
             yield ("sender", *places[bus], *message), sender
-        for name, runner in axes.items():
-            bus, *message = runner.valve.key
-            signal = runner.bound.config.valve.signal
-            yield ("valve", *places[bus], *message, signal), runner
-            yield ("axis", name), runner
+        for name, control in axes.items():
+            bus, *message = control.valve.key
+            signal = control.bound.config.valve.signal
+            yield ("valve", *places[bus], *message, signal), control
+            yield ("axis", name), control
         for protocol in protocols:
             yield from protocol.parts(places)
 

@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping
 
 from canshaper.config.limits import Hydraulics
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.events import ValueEvent
-from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import Value
-from canshaper.shaping.demands import UNBOUNDED, EndStops, FlowBudget, bounds
+from canshaper.shaping.demand_bounds import UNBOUNDED, EndStops, FlowBudget, bounds
 from canshaper.shaping.limits import within
 from canshaper.shaping.states import Lost, Reason, State
 from canshaper.shaping.sway import SwayMode
@@ -17,21 +17,21 @@ class AxisEnds:
     """Bounds the demands of an axis before it acts.
 
     Args:
-        runner: the axis; it has ends.
+        control: the axis; it has ends.
         position: its measured position.
     """
 
-    __slots__ = ("_known", "_position", "_run_on", "_runner", "_stops")
+    __slots__ = ("_control", "_known", "_position", "_run_on", "_stops")
 
-    def __init__(self, runner: AxisControl, position: Value) -> None:
-        config = runner.bound.config.limits.ends
+    def __init__(self, control: AxisControl, position: Value) -> None:
+        config = control.bound.config.limits.ends
         assert config is not None
         margin, lag_s = config.margin, config.lag_ms / 1000.0
-        self._runner, self._position = runner, position
+        self._control, self._position = control, position
         self._stops = EndStops(
             config.lowest + margin, config.highest - margin, config.full_speed, lag_s
         )
-        self._run_on = runner.follow_run_on()
+        self._run_on = control.follow_run_on()
         self._known = True
 
     def step(self, now_ns: int) -> ValueEvent | None:
@@ -45,18 +45,18 @@ class AxisEnds:
         Returns:
             Whether the position is known, where that has changed.
         """
-        runner, position = self._runner, self._position.fresh(now_ns)
-        axis = runner.axis
+        control, position = self._control, self._position.fresh(now_ns)
+        axis = control.axis
         if position is None:
-            runner.room = axis.bounds = UNBOUNDED
+            control.room = axis.bounds = UNBOUNDED
         else:
-            runner.room = self._stops.room(position, axis.sent, self._run_on.travel())
-            axis.bounds = bounds(runner.room, runner.displaced)
+            control.room = self._stops.room(position, axis.output.setpoint, self._run_on.travel())
+            axis.bounds = bounds(control.room, control.displaced)
         known = position is not None
         if known is self._known:
             return None
         self._known = known
-        return ValueEvent(f"axis={runner.bound.name} ends", "known" if known else "lost")
+        return ValueEvent(f"axis={control.bound.name} ends", "known" if known else "lost")
 
 
 # No hoist is faster. A message may come once in half a second, and round what it says.
@@ -138,22 +138,22 @@ class RopeControl:
 
     Args:
         name: of the axis.
-        runner: the axis, before it has run; what drives its valve for a measurement follows none.
+        control: the axis, before it has run; what drives its valve for a measurement follows none.
         value: the measured length.
     """
 
-    def __init__(self, name: str, runner: AxisControl, value: Value) -> None:
-        sway = runner.bound.config.sway
+    def __init__(self, name: str, control: AxisControl, value: Value) -> None:
+        sway = control.bound.config.sway
         assert sway is not None and sway.length is not None  # checked with the deployment
         config, mode, ends = sway.length, sway.mode(), sway.ends()
-        self._name, self._axis, self._value = name, runner.axis, value
+        self._name, self._axis, self._value = name, control.axis, value
         self._last_ns: int | None = None
         self._offset_m, self._damping_ratio = config.offset_m, mode.damping_ratio
         self._period_s = mode.period_s
         self._rope = RopeLength(config.lowest_m, config.highest_m, config.lost)
         self._followed_m = 0.0
         self._axis.prepare(*(end.period_s / self._period_s for end in ends))
-        runner.stops.interlocks.append(self._objection)
+        control.stops.interlocks.append(self._objection)
         self._follow()
 
     def step(self, now_ns: int) -> ValueEvent | None:
@@ -229,18 +229,18 @@ class SharedFlow:
             if value is not None:
                 flow = config.flow - max(value / measured.full, 0.0)
         demands, outputs = [], []
-        for runner, commands in self._axes:
-            command = runner.bound.config.command
+        for control, commands in self._axes:
+            command = control.bound.config.command
             demand = commands.get(command.signal, 0.0)
-            if isinstance(demand, Reason) or runner.axis.state not in DRIVEN:
+            if isinstance(demand, Reason) or control.axis.state not in DRIVEN:
                 demand = 0.0
-            if runner.axis.state is not State.BYPASS_ON:
-                demand = within(demand, *runner.axis.bounds, 0.0)
+            if control.axis.state is not State.BYPASS_ON:
+                demand = within(demand, *control.axis.bounds, 0.0)
             demands.append(demand if abs(demand) > command.neutral_pct / 100.0 else 0.0)
-            outputs.append(runner.axis.sent)
+            outputs.append(control.axis.output.setpoint)
         scale = self._budget.step(flow, demands, outputs, ticks)
-        for runner, _ in self._axes:
-            runner.axis.scale = scale
+        for control, _ in self._axes:
+            control.axis.scale = scale
         before = self._ticks
         self._ticks = 0 if scale < 1.0 else before + ticks
         if before >= self._enough > self._ticks or before < self._enough <= self._ticks:

@@ -12,7 +12,7 @@ from canshaper.inputs.value import Feedback, ProfileChoice, Value
 from canshaper.machine.stopping import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.demands import RunOn
+from canshaper.shaping.demand_bounds import RunOn
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
@@ -45,7 +45,7 @@ class AxisControl:
         displaced: how far the motion has moved it from where its own commands lead, in the same
             unit.
         stops: why it stops or may not begin, besides what its joystick says.
-        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
+        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.command``.
         radius: measured radius of the tip of an axis that slews, where that is known.
         other: the axis that makes this one swing, where both have sway sensors of one kind.
         alone: a measurement is made with it: it is part of no motion.
@@ -193,7 +193,7 @@ class AxisControl:
     ) -> Transition | None:
         """One step of the axis; a trip cause noted since the last one acts now.
 
-        ``axis.advance`` has to follow.
+        ``axis.propagate`` has to follow.
 
         Args:
             now_ns: monotonic time.
@@ -228,7 +228,7 @@ class AxisControl:
             commanded, damps, other = axis.output.commanded, self.damps, self.other
             shown = other.own_swing(now_ns) if other and damps else None
             axis.sensed.measure(value, scale, commanded=commanded, damps=damps, other=shown)
-        transition = axis.act(command, self.added, damps=self.damps)
+        transition = axis.command(command, self.added, damps=self.damps)
         try:
             self._put(self.valve.raw, axis.output.steps)
         except Exception as error:  # nothing of it is left in the message
@@ -266,9 +266,9 @@ class AxisControl:
         """Why the axis is in its state; in ACTIVE also what holds it back from its demand."""
         axis = self.axis
         if axis.state is State.ACTIVE:
-            if abs(axis.command) < 1.0 and axis.command in axis.bounds:
+            if abs(axis.demand) < 1.0 and axis.demand in axis.bounds:
                 return Reason.END_STOP
-            if axis.command and axis.scale < 1.0:
+            if axis.demand and axis.scale < 1.0:
                 return Reason.FLOW_LIMITED
         return axis.reason
 

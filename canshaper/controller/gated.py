@@ -15,7 +15,7 @@ from canshaper.protocols.interface import MessageKey
 QUIET_NS = 1_000_000_000
 
 
-class Guarded:
+class GatedController:
     """Passes frames to controller and gate, and returns the frames that both allow.
 
     Args:
@@ -27,7 +27,7 @@ class Guarded:
         self._gate = Gate(record_of(controller.deployment))
         self._quiet_until_ns: dict[MessageKey, int] = {}
 
-    def carry_over(self, before: "Guarded") -> None:
+    def carry_over(self, before: "GatedController") -> None:
         """Continue from the state before a reload; see ``Gate.carry_over``."""
         buses = self._controller.deployment.config.buses
         open_before = before._controller.deployment.config.buses.values()

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.message import Sender
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
-from canshaper.controller.runner import AxisControl
 from canshaper.controller.valve_messages import Counters
 from canshaper.machine.deployment import BoundMotion, Deployment
 from canshaper.protocols.interface import MessageKey
-from canshaper.shaping.demands import RunOn
+from canshaper.shaping.demand_bounds import RunOn
 from canshaper.shaping.states import State, Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
@@ -62,14 +62,14 @@ class AimPoint:
         self.known = slew is not None and near_far is not None
 
 
-def _travel(runner: AxisControl, run_on: RunOn) -> float | None:
+def _travel(control: AxisControl, run_on: RunOn) -> float | None:
     """Travel of an axis after a release, full speed times seconds; None where it is not known."""
     back, ahead = 0.0, 0.0
-    if runner.axis.state in SHAPED:
+    if control.axis.state in SHAPED:
         back, ahead = run_on.travel()
-    if (back and ahead) or runner.active_set:
+    if (back and ahead) or control.active_set:
         return None
-    return back + ahead + VALVE_LAG_S * runner.axis.sent - runner.displaced
+    return back + ahead + VALVE_LAG_S * control.axis.output.setpoint - control.displaced
 
 
 class StatusMessages:
@@ -110,9 +110,9 @@ class StatusMessages:
             last: number of the deadline of the tick before.
             now: number of this one.
         """
-        for runner, ticks, status, sender in self._axes:
-            if runner in changed or now // ticks > last // ticks:
-                yield sender.frame(status.values(runner))
+        for control, ticks, status, sender in self._axes:
+            if control in changed or now // ticks > last // ticks:
+                yield sender.frame(status.values(control))
         for aim in self.aims:
             if now // aim.ticks > last // aim.ticks:
                 aim.update()
@@ -139,26 +139,26 @@ class SensorReport:
 
     Args:
         name: name of the axis.
-        runner: the axis.
+        control: the axis.
     """
 
-    def __init__(self, name: str, runner: AxisControl) -> None:
-        self._name, self._runner = name, runner
+    def __init__(self, name: str, control: AxisControl) -> None:
+        self._name, self._control = name, control
         self._trust = Trust.NO_DATA
         self._length: SwingLength | None = None
         self._reported_m = 0.0
 
     def events(self) -> Iterator[SwaySensorEvent | SwingLengthEvent]:
         """Yield changes since the last call: trust state of the sensor, pendulum length."""
-        trust = self._runner.trust
+        trust = self._control.trust
         if trust is not self._trust:
             self._trust = trust
             yield SwaySensorEvent(self._name, trust)
-        sensed = self._runner.axis.sensed
+        sensed = self._control.axis.sensed
         if sensed is not None and (length := sensed.length.result) is not self._length:
             assert length is not None  # one that was measured stays
             self._length = length
-            sway = self._runner.bound.config.sway
+            sway = self._control.bound.config.sway
             assert sway is not None  # checked with the deployment
             if self._is_news(length, sway.mode()):
                 yield SwingLengthEvent(self._name, length, sway)
@@ -168,7 +168,7 @@ class SensorReport:
 
         At the load of a breakpoint nothing is news: the key to report is not the one in force.
         """
-        model = self._runner.axis.sway
+        model = self._control.axis.sway
         assert model is not None  # of an axis with a sensor
         if model.mode != mode:
             return False
