@@ -1,6 +1,6 @@
-"""Numbers of a running machine, changed within the limits of its deployment file.
+"""Numbers that change while the machine runs, within the ranges of its deployment file.
 
-The new numbers are lost when the daemon ends or reads its file again.
+A changed number holds until the daemon ends, or reads its file again.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,15 +12,15 @@ from canshaper.controller.controller import Controller
 from canshaper.machine.filters import filter_fault
 from canshaper.machine.stopping import stop_fault
 
-# In one request: each axis that changes costs the loop some 40 us.
+# Most numbers in one request: each axis that changes takes about 40 us of the loop.
 MOST_NUMBERS = 16
 
 
 class Adjuster:
-    """Changes numbers that the deployment's ``control`` section allows to change.
+    """Changes the numbers that the section ``control`` of the file makes adjustable.
 
     Args:
-        controller: the machine.
+        controller: controller of the machine.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -31,23 +31,24 @@ class Adjuster:
         self._in_file = {text: self._now(text) for text in self._ranges}
 
     def table(self) -> dict[str, dict[str, float]]:
-        """Return value now, value in the file, minimum and maximum of every adjustable number."""
+        """Return each adjustable number: its value now and in the file, its minimum and maximum."""
         return {
             text: {"now": self._now(text), "file": self._in_file[text], "low": low, "high": high}
             for text, (low, high) in self._ranges.items()
         }
 
     def change(self, values: Mapping[str, object]) -> list[str]:
-        """Change numbers, all or none of them, without a jump of any output.
+        """Change all of these numbers or none, without a jump of any output.
 
         Args:
-            values: numbers by their keys, as in the file's ``adjustable``.
+            values: new numbers by their keys, as in the file's ``adjustable``.
 
         Returns:
-            What has changed, a line for the log each.
+            A line for the log for each number that has changed.
 
         Raises:
-            ValueError: what was expected and what came; nothing has changed.
+            ValueError: a number is refused; the text says what was expected and what came. No
+                number has changed.
         """
         numbers = dict(self._checked(values))
         by_axis: dict[str, dict[Key, float]] = {}
@@ -98,7 +99,7 @@ class Adjuster:
             state = control.axis.state.name
             raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
         if control.axis.output.commanded and not control.axis.demand:
-            # Another filter may ask for a motion that no one asks for any more.
+            # A new filter could open the valve again, though no one demands motion any more.
             raise ValueError(f"axes.{name}: it runs on with its joystick released; wait for rest")
         rate = config.limits.slowest_per_s
         if fault := filter_fault(config.filter, config.sway, control.period_s, rate):

@@ -1,4 +1,4 @@
-"""What acts on axes before any of them moves: two-axis motions, load, ends, ropes, shared oil."""
+"""Couplings that act on the axes ahead of each tick: load, ends, ropes, motions, shared oil."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from canshaper.controller.measured_limits import AxisEnds, RopeControl, SharedFlow
     from canshaper.controller.parameter_sets import Load
 
-# An axis at rest in READY may be moved by the other one.
+# States in which the motion may move an axis; one at rest in READY too.
 ABLE = (State.READY, State.ACTIVE)
 RADIUS = "radius"
 
 
 class _Member:
-    """One axis of the motion."""
+    """One axis of a motion: its control, and its state in the computation."""
 
     __slots__ = ("control", "moving")
 
@@ -42,7 +42,7 @@ class _Member:
         moving.fall_per_s = axis.limits.fall_per_s
 
     def update(self, tick_s: float, last: int, now: int) -> None:
-        """Read the state of the axis; see ``MotionControl.step``."""
+        """Copy the state of the axis; for the deadlines see ``MotionControl.step``."""
         moving, control = self.moving, self.control
         axis, period = control.axis, control.period_ticks
         if period == 1 == now - last:
@@ -63,11 +63,11 @@ class _Member:
 
 
 class MotionControl:
-    """Slew and near-far of one crane.
+    """Two-axis motion of one crane: finds the velocities that slew and near-far add.
 
     Args:
-        name: of the motion, in the file.
-        config: the motion.
+        name: name of the motion in the file.
+        config: section of the motion.
         slew: the axis that turns.
         near_far: the axis that moves the tip in and out, or None.
         radius: measured radius of the tip, or None.
@@ -104,7 +104,7 @@ class MotionControl:
             self._members.append(bending)
         self._roped = [one for one in self._members if one.control.bound.rope]
         self._name = name
-        self._apart = slew.bound.name  # what keeps the axes apart: at the start that they wait
+        self._apart = slew.bound.name  # what keeps the axes apart; at the start slew waits
         if self._near_far:
             self._near_far.bound(config)
         self._motion = TwoAxisMotion(
@@ -115,22 +115,22 @@ class MotionControl:
             self._motion.height_m = _full_speed_m_s(bending.control) / bending.moving.full_speed
 
     def adjust(self) -> None:
-        """Take full speed and fall of near-far as they are now."""
+        """Take over a changed full speed or fall of near-far."""
         if self._near_far:
             moving, control = self._near_far.moving, self._near_far.control
             moving.full_speed = _full_speed_m_s(control)
             moving.fall_per_s = control.bound.config.limits.fall_per_s
 
     def step(self, now_ns: int, last: int, now: int) -> MotionEvent | None:
-        """Give both axes what they add in this tick.
+        """Set the velocity that each axis adds in this tick.
 
         Args:
             now_ns: monotonic time.
-            last: number of the deadline before; axes have held their output since then.
+            last: number of the deadline before; the axes have held their output since.
             now: number of this deadline.
 
         Returns:
-            Whether they move as one, where that has changed.
+            The event, if the axes now move as one or no longer do; else None.
         """
         apart = ""
         tick_s, members = self._tick_s, self._members
@@ -141,7 +141,7 @@ class MotionControl:
             member.update(tick_s, last, now)
             if not (apart or member.moving.able):
                 apart = member.control.bound.name
-        for member in self._roped:  # of which the model swings otherwise now
+        for member in self._roped:  # its rope may have another length now
             member.moving.follow(member.moving.sway)
         tip_m = self._radius.fresh(now_ns) if self._radius else None
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
@@ -156,14 +156,14 @@ class MotionControl:
         return None if apart == self._apart else self._changed(apart)
 
     def _changed(self, apart: str) -> MotionEvent:
-        """Take what keeps the axes apart now, or "" where nothing does; return the event."""
+        """Store what keeps the axes apart, "" where nothing does; return the event."""
         self._apart = apart
         states = {one.control.bound.name: one.control.axis.state.name for one in self._members}
         why = f"{apart}={states.get(apart, 'lost')}" if apart else ""
         return MotionEvent(self._name, why)
 
     def on_trip(self, tripped: AxisControl) -> None:
-        """End what is added at once, if the tripped axis is one of these."""
+        """End the added velocities at once, if the tripped axis belongs to this motion."""
         if any(member.control is tripped for member in self._members):
             self._end()
 
@@ -181,17 +181,17 @@ def _full_speed_m_s(near_far: AxisControl) -> float:
 
 
 class Couplings:
-    """All that acts on the axes of a machine before any of them moves in a tick.
+    """Everything that acts on the axes of a machine before any of them runs in a tick.
 
     Args:
         deployment: the machine.
         axes: its axes by name.
-        inputs: what it receives.
+        inputs: its inputs.
         tick_s: time between two ticks of the controller.
 
     Attributes:
         motions: the two-axis motions.
-        any: whether there is anything to do.
+        any: whether the machine has any coupling.
     """
 
     def __init__(
@@ -238,15 +238,15 @@ class Couplings:
         self.any = bool(self._load or self._ends or self._flow or self.motions)
 
     def step(self, now_ns: int, last: int, now: int, events: list[Event]) -> None:
-        """Look at load, ends and ropes, add motions, share the oil.
+        """Apply load, ends and ropes, then motions, then shared oil.
 
         Args:
             now_ns: monotonic time.
             last: number of the deadline of the tick before.
             now: number of this one.
-            events: gets what is reported.
+            events: list that gets the events for the log.
         """
-        for control, run_on in self._followed:  # it held its last demand until now
+        for control, run_on in self._followed:  # the axis held its last demand until now
             if ticks := now // control.period_ticks - last // control.period_ticks:
                 run_on.add(control.axis.demand, ticks)
         if self._load and (load := self._load.step(now_ns)):

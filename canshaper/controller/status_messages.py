@@ -1,4 +1,4 @@
-"""Status messages: of every axis, of the service, and where the tip of a crane still goes."""
+"""Status messages of axes, aim points and service; events of the sway sensors."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping
@@ -26,21 +26,21 @@ SHAPED = (State.ACTIVE, State.STOPPING)
 
 
 class AimPoint:
-    """Way that the tip of a crane still goes if its joysticks are let go now.
+    """Travel of a crane's tip that is still to come if its joysticks are released now.
 
-    That is what the filters still ask for, what the valves lag behind, and the way back from where
-    the motion of both axes has moved the tip. It is not known while a filter still holds demands of
-    both directions, after a reversal for as long as its response, nor while another set is in force
-    than the axis' own.
+    It is the sum of the run-on of the filters, the lag of the valves, and the way back of what the
+    two-axis motion has added. It is not known while a filter still holds demands of both
+    directions, for as long as its response after a reversal, nor while an axis has another
+    parameter set than its own.
 
     Args:
-        bound: the motion of both axes; it has a message for this.
+        bound: the two-axis motion; it has a message for the aim point.
         axes: axes of the machine by name.
 
     Attributes:
-        codec: of its message, which is sent every so many ``ticks``.
-        slew_deg: angle that the crane still turns; 0 where it is not known.
-        radius_m: way of the tip out or in; 0 where it is not known.
+        codec, ticks: codec of the message, and the ticks from one to the next.
+        slew_deg: angle that the crane still turns, degrees; 0 while it is not known.
+        radius_m: way of the tip out (positive) or in; 0 while it is not known.
         known: whether both are known.
     """
 
@@ -53,7 +53,7 @@ class AimPoint:
         self.known = True
 
     def update(self) -> None:
-        """Find it by the state of both axes now."""
+        """Compute the aim point from the present state of both axes."""
         slew, near_far = map(_travel, (self._slew, self._near_far), self._run_on)
         slewing, sway = self._slew.bound.config.slewing, self._near_far.bound.config.sway
         assert slewing and sway  # checked with the deployment
@@ -63,7 +63,7 @@ class AimPoint:
 
 
 def _travel(control: AxisControl, run_on: RunOn) -> float | None:
-    """Travel of an axis after a release, full speed times seconds; None where it is not known."""
+    """Return the travel after a release, full speed times seconds; None if it is not known."""
     back, ahead = 0.0, 0.0
     if control.axis.state in SHAPED:
         back, ahead = run_on.travel()
@@ -78,10 +78,10 @@ class StatusMessages:
     Args:
         deployment: the machine.
         axes: its axes by name.
-        senders: what sends each of its messages.
+        senders: senders of its messages.
 
     Attributes:
-        aims: aim points of its cranes that are sent.
+        aims: the aim points that are sent.
     """
 
     def __init__(
@@ -102,11 +102,11 @@ class StatusMessages:
     def frames(
         self, changed: Collection[AxisControl], counters: Counters, last: int, now: int
     ) -> Iterator[Frame]:
-        """Yield the status of the axes that have changed or are due, of cranes and service.
+        """Yield the status of axes that have changed or are due, of aim points, of the service.
 
         Args:
             changed: axes whose state has just changed.
-            counters: those of the service.
+            counters: counts for the status of the service.
             last: number of the deadline of the tick before.
             now: number of this one.
         """
@@ -164,9 +164,10 @@ class SensorReport:
                 yield SwingLengthEvent(self._name, length, sway)
 
     def _is_news(self, length: "SwingLength", mode: SwayMode) -> bool:
-        """Whether the grapple swings by another length than was reported last, or is in the file.
+        """Return whether the length differs from the last reported one, or else from the file.
 
-        At the load of a breakpoint nothing is news: the key to report is not the one in force.
+        With the parameter set of a load nothing is news: the report would name a key of the file
+        that is not in force.
         """
         model = self._control.axis.sway
         assert model is not None  # of an axis with a sensor

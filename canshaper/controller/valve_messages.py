@@ -1,4 +1,4 @@
-"""Valve messages: their axes, counters of faults, and frames that come too late."""
+"""Valve messages and their axes; counters of faults; detection of an overrun."""
 
 from collections.abc import Mapping, Sequence
 from typing import Self
@@ -10,16 +10,17 @@ from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
 Turn = tuple[str, AxisControl, Sender | None, ForwardingRule | None]
-"""An axis with its name; the last axis of a message with that message, or a forwarding rule."""
+"""Name and control of an axis; for the last axis of a message its sender and forwarding rule."""
 
 
 class ValveOutputs:
-    """All valve messages.
+    """All valve messages of a machine, each with the axes in it.
 
     Args:
         axes: the axes by name, in their order.
         valves: names of the axes that command each message, by its identifier.
-        forwarding: rules by which frames leave in place of a message, by its identifier.
+        forwarding: rules by which joystick frames leave in place of a valve message, by its
+            identifier.
 
     Attributes:
         turns: the axes in their order; a message goes out with the last one of its axes.
@@ -47,14 +48,14 @@ class ValveOutputs:
             control.stops.foreign_sender(arrived_ns)
 
     def send_failed(self, key: MessageKey) -> None:
-        """Trip the axes in motion of a message that did not reach its bus."""
+        """Trip the moving axes of a message that did not reach its bus."""
         for control in self._axes.get(key, ()):
             control.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a frame that comes too late moves a valve, and so must not leave.
+        """Return whether a late frame moves a valve, and so must not leave.
 
-        Its receiver will see no gap in the counter.
+        If so, its alive counter is taken back: the valve sees no gap.
         """
         controls = self._axes[frame[:3]]
         if not any(control.axis.output.steps for control in controls):
@@ -75,11 +76,11 @@ class ValveOutputs:
         return controls[0].valve.instead(frame)
 
     def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
-        """Return a neutral frame for every valve whose bus is not silent, the last frames sent.
+        """Return a neutral frame, to be sent last, for every valve whose bus is not silent.
 
         Args:
-            silent: names of those buses.
-            errors: gets the exceptions; the other valves still get their frames.
+            silent: names of the silent buses.
+            errors: list that gets the exceptions; the other valves still get their frames.
         """
         frames: list[Frame] = []
         for key, controls in self._axes.items():
@@ -96,7 +97,7 @@ class ValveOutputs:
 
 
 class Counters:
-    """Counters of faults, by the signal names of the status message."""
+    """Counts of faults, by the signal names of the status message."""
 
     __slots__ = ("last_fault", "values")
 
@@ -120,7 +121,7 @@ class Counters:
         self.last_fault = FrameFault.NONE
 
     def add(self, fault: FrameFault, count: int = 1) -> None:
-        """Count a fault and remember it as the last one."""
+        """Count a fault, and store it as the last one."""
         self.last_fault = fault
         signal = self.SIGNAL_OF.get(fault)
         if signal is not None:
@@ -131,8 +132,8 @@ class Counters:
         return {**self.values, "LastFault": int(self.last_fault)}
 
 
-# A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
-# than one in six for long, are an overrun; it ends with the count at 0, after 50 punctual ticks.
+# A late tick adds five to the count, a punctual one takes one away. Ten late ticks in a row, or
+# more than one in six for long, are an overrun. It ends at the count 0, after 50 punctual ticks.
 LATE_WEIGHT = 5
 LATE_LIMIT = 50
 
@@ -151,11 +152,11 @@ class OverrunDetector:
         self._overrun = False
 
     def copy_state(self, before: Self) -> None:
-        """Continue where another one has ended."""
+        """Copy the state of the detector before a reload."""
         self.late, self._overrun = before.late, before._overrun
 
     def tick(self, *, late: bool) -> bool:
-        """Count a tick; return whether there is an overrun. Called while ``late`` is not 0."""
+        """Count a tick; return whether there is an overrun. Punctual ticks at 0 need no call."""
         if late:
             self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self.late == LATE_LIMIT
