@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from canshaper.config.desk import Objective
 from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.limits import Limits, Sway
-from canshaper.config.objective import Objective
 from canshaper.config.section import RUN, Origin, Section, expanded, number
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Parameter, ShaperKind

@@ -1,4 +1,4 @@
-"""``canshaper operator``: the hand, simulated on CAN."""
+"""``canshaper sim`` and ``operator``: the machine, and the operator's hand, simulated on CAN."""
 
 import typer
 
@@ -9,12 +9,61 @@ from canshaper.cli.common import (
     FILE,
     INTERFACE,
     NETWORK,
+    SET,
     buses_line,
     echo,
     loader,
 )
 
 GROUP = "look"
+
+
+def sim(
+    file: str = FILE,
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
+    changes: list[str] | None = SET,
+    machine: str | None = typer.Option(
+        None,
+        "--machine",
+        help="tip: a valve for each coordinate of the tip; tip-controller: a tip controller drives"
+        " the joints; joints: a valve for each joint. By default tip, or joints where the"
+        " deployment has joint axes.",
+    ),
+    crane: str | None = CRANE,
+    show: bool = typer.Option(False, "--show", help="Print all parameters and exit."),
+) -> None:
+    """Simulate valves, crane and swinging grapple behind the valve messages of a deployment.
+
+    Reads valve frames, publishes sway, position and velocity of the tip, and of its joints where
+    the machine has them. Says on which buses, and ends on SIGTERM or Ctrl-C.
+
+    Examples:
+
+      canshaper sim config/forwarder-robust.yaml
+
+      canshaper sim config/forwarder-robust.yaml --set grapple.l2_m=1.5 --set near_far.lag_s=0.15
+
+      canshaper sim forwarder-robust.yaml --machine tip-controller --set joints.main_boom_m=4.2
+
+      canshaper sim config/forwarder-joints.yaml
+
+      canshaper sim config/forwarder-robust.yaml --show
+    """
+    from canshaper_sim.cranes import one_crane
+    from canshaper_sim.parameters import changed_parameters, parameter_names
+    from canshaper_sim.realtime import run_plant
+
+    deployment = loader(file, interface, channel, network=network)()
+    parameters = changed_parameters(changes or [], deployment)
+    if show:
+        for name, value in parameter_names(parameters).items():
+            echo(f"{name}={value:g}")
+        return
+    driven = one_crane(deployment, crane) if crane else deployment
+    echo(f"the crane of {', '.join(driven.axes)} is on {buses_line(deployment)}; Ctrl-C ends it")
+    run_plant(driven, parameters, machine)
 
 
 def operator(
