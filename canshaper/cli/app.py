@@ -19,8 +19,8 @@ from canshaper.cli import verbs
 from canshaper.cli.common import EXIT_INTERRUPTED, EXIT_WRONG, EXTRAS, echo, fail, install_line
 from canshaper.errors import CanshaperError, UsageError
 
-EXAMPLE_WIDTH = 70  # of an example, which is indented, in 80 columns
-SENTENCE = 200  # longer than any
+EXAMPLE_WIDTH = 70  # columns of an example; its indent fits in 80 too
+SENTENCE = 200  # letters; no first sentence of a verb is longer
 # Each verb's module names its GROUP.
 GROUPS = {
     "setup": "Set up a machine",
@@ -29,12 +29,12 @@ GROUPS = {
     "design": "Design its filters",
     "look": "Look, without a machine",
 }
-# They need a scheduler, sockets and signals that only Linux has.
+# These verbs need a scheduler, sockets and signals that only Linux has.
 LINUX_ONLY = {"commission", "doctor", "gateway", "metrics", "run", "set"}
 
 
 class Verbs(TyperGroup):
-    """Verbs, one for each module; an exception that canshaper raises for a person ends them."""
+    """Group of all verbs; a CanshaperError or an OSError ends a verb with one line."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -69,7 +69,7 @@ class Verbs(TyperGroup):
         return import_module(f"{verbs.__name__}.{self._modules[_word(name)]}")
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List them by group, each with its whole first sentence; click would cut it off."""
+        """List the verbs by group, each with its whole first sentence; click would shorten it."""
         rows: dict[str, list[tuple[str, str]]] = {group: [] for group in GROUPS}
         for name in self.commands:
             text = self.get_command(ctx, name).get_short_help_str(SENTENCE)
@@ -99,12 +99,12 @@ def _word(name: str) -> str:
 
 
 def pasteable(text: str) -> str:
-    """Help whose examples are not broken anywhere: what needs another line says so to the shell."""
+    """Return the help with examples that can be pasted: a long one is continued by a backslash."""
     paragraphs = []
     for paragraph in cleandoc(text).split("\n\n"):
         words = " ".join(paragraph.split())
         if words.startswith(("canshaper ", "sudo canshaper ")):
-            # Behind a line with \b click leaves a paragraph as it is.
+            # After a line with \b click does not wrap the paragraph.
             first, *others = wrap(words, EXAMPLE_WIDTH, break_on_hyphens=False)
             paragraphs.append("\b\n  " + " \\\n      ".join((first, *others)))
         else:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 GROUP = "look"
 
 EXIT_NO_ADDRESS = 1
-# A browser shows what it would else save.
+# A browser shows files of these suffixes instead of saving them.
 TEXTS = dict.fromkeys((".md", ".py", ".toml", ".yaml", "", ".link", ".network"), "text/plain")
 
 
@@ -34,7 +34,7 @@ def docs(
 ) -> None:
     """Serve the pages of this version to a browser on this machine, without a network.
 
-    Search, commands and the Python API are in them. The same files open without a server.
+    They include search, all commands and the Python API. The files also open without a server.
 
     Examples:
 
@@ -60,10 +60,10 @@ def docs(
 
 def config_schema(
     filters: bool = typer.Option(
-        False, "--filters", help="Instead the table of filters, as in docs/deployment.md."
+        False, "--filters", help="Print the table of filters instead, as in docs/deployment.md."
     ),
     checksums: bool = typer.Option(
-        False, "--checksums", help="Instead the table of checksums, as in docs/checksums.md."
+        False, "--checksums", help="Print the table of checksums instead, as in docs/checksums.md."
     ),
 ) -> None:
     """Print the JSON schema of the deployment file.
@@ -72,7 +72,7 @@ def config_schema(
 
       # yaml-language-server: $schema=deployment.schema.json
 
-    Filters and checksums of other packages that are installed are in the schema, and in the tables.
+    Schema and tables include the filters and checksums of other installed packages.
 
     Examples:
 
@@ -90,7 +90,7 @@ def config_schema(
     try:
         check_packages()
         table = [*checksum_table()] if checksums else []
-    except ValueError as error:  # of a package
+    except ValueError as error:  # an installed package is wrong
         raise UsageError(str(error)) from None
     if filters:
         table += filter_table(KINDS.values())
@@ -105,10 +105,10 @@ def config_schema(
 
 
 def checksum_table() -> Iterator[str]:
-    """The table of all kinds in Markdown, line by line.
+    """Yield the lines of the table of all checksum kinds, in Markdown.
 
     Raises:
-        ValueError: as ``known_checksum``.
+        ValueError: a package is wrong, see ``known_checksum``.
     """
     from canshaper.checksums.kinds import CHECKSUMS, checksum_names, known_checksum
 
@@ -120,7 +120,7 @@ def checksum_table() -> Iterator[str]:
 
 
 def filter_table(kinds: "Iterable[ShaperKind]") -> Iterator[str]:
-    """Lines of a Markdown table of filters."""
+    """Yield the lines of the table of filters, in Markdown."""
     yield "| `kind` | parameters | what it is | needs `sway` |"
     yield "|---|---|---|---|"
     for kind in kinds:

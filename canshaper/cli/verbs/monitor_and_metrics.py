@@ -26,19 +26,19 @@ def monitor(
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
     refresh_hz: float = typer.Option(
-        5.0, "--refresh", metavar="HZ", min=0.2, max=10.0, help="How often the picture is drawn."
+        5.0, "--refresh", metavar="HZ", min=0.2, max=10.0, help="How often the screen is drawn."
     ),
     plain: bool = typer.Option(
-        False, "--plain", help="Lines instead of a picture: every event, and one a second."
+        False, "--plain", help="Print lines: every event, and one line a second."
     ),
 ) -> None:
     """Show a running daemon: states, reasons, joystick and valve, predicted sway, rates, counters.
 
-    Everything is taken from the frames on the buses of the deployment, which are only listened
-    to: the daemon does not notice. It can run on the machine's PC, over ssh, or on another computer
-    on the same bus. What is stale or missing says so. Ctrl-C ends it.
+    It only listens to the frames on the buses of the deployment: the daemon does not notice. It can
+    run on the machine's PC, over ssh, or on another computer on the same bus. Values that are stale
+    or missing are marked. Ctrl-C ends it.
 
-    Where the output is no terminal it is --plain.
+    Without a terminal, as in a pipe, the output is that of --plain.
 
     Exit code 0, 2 when the deployment is wrong, 3 when a bus cannot be opened.
 
@@ -61,24 +61,26 @@ def monitor(
             run_plain(deployment, echo, lambda: not stop.requested)
         else:
             run_live(deployment, console, refresh_hz, lambda: not stop.requested)
-    except BrokenPipeError:  # who read it has enough
+    except BrokenPipeError:  # the reader of the pipe has ended
         raise typer.Exit(0) from None
 
 
 def metrics(
     file: str = FILE,
-    port: int = typer.Option(9797, "--port", min=1, max=65535, help="On the loopback, TCP."),
+    port: int = typer.Option(
+        9797, "--port", min=1, max=65535, help="TCP port, on the loopback only."
+    ),
     control: Path | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
     dashboard: bool = typer.Option(
-        False, "--dashboard", help="Print the dashboard for Grafana (JSON), and end."
+        False, "--dashboard", help="Print the Grafana dashboard (JSON) and exit."
     ),
 ) -> None:
     """Serve the state of a running daemon to Prometheus, on this computer only.
 
-    Axes, buses, counters and lateness, at http://127.0.0.1:9797/metrics. Every scrape asks the
-    daemon on its control socket; while it does not answer there is canshaper_up 0 and nothing else.
+    It serves axes, buses, counters and lateness at http://127.0.0.1:9797/metrics. Every scrape asks
+    the daemon on its control socket; without an answer it returns canshaper_up 0 and nothing else.
     Ctrl-C ends it.
 
     Exit code 0, 2 when the file is wrong or the port is taken.

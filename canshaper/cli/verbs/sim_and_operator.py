@@ -28,16 +28,16 @@ def sim(
         None,
         "--machine",
         help="tip: a valve for each coordinate of the tip; tip-controller: a tip controller drives"
-        " the joints; joints: a valve for each joint. By default tip, or joints where the"
-        " deployment has joint axes.",
+        " the joints; joints: a valve for each joint. Default: joints if the deployment has joint"
+        " axes, else tip.",
     ),
     crane: str | None = CRANE,
     show: bool = typer.Option(False, "--show", help="Print all parameters and exit."),
 ) -> None:
     """Simulate valves, crane and swinging grapple behind the valve messages of a deployment.
 
-    Reads valve frames, publishes sway, position and velocity of the tip, and of its joints where
-    the machine has them. Says on which buses, and ends on SIGTERM or Ctrl-C.
+    It reads valve frames and publishes sway, position and velocity of the tip, and of the joints if
+    the machine has them. It prints the buses that it uses, and ends on SIGTERM or Ctrl-C.
 
     Examples:
 
@@ -68,8 +68,8 @@ def sim(
 
 def operator(
     file: str = FILE,
-    script: str = typer.Option("demo", "--script", help="What the operator does; see --list."),
-    bypass: bool = typer.Option(False, "--bypass", help="Drive with anti-sway switched off."),
+    script: str = typer.Option("demo", "--script", help="Script of the operator; see --list."),
+    bypass: bool = typer.Option(False, "--bypass", help="Drive with anti-sway off."),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
@@ -78,7 +78,7 @@ def operator(
 ) -> None:
     """Play a scripted operator: joystick frames with the enable switch held.
 
-    Says what is played on which buses; ends with the script, or on SIGTERM or Ctrl-C.
+    It prints the script and the buses, and ends with the script, or on SIGTERM or Ctrl-C.
 
     Examples:
 
