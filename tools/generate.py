@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import canshaper.config.schema  # noqa: F401  (its classes are the sections)
-from canshaper.cli.verbs.config_schema import checksum_table, filter_table
+from canshaper.cli.verbs.docs_and_config_schema import checksum_table, filter_table
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.commissioning.procedure.procedure import STEPS
 from canshaper.commissioning.procedure.state import FILE
+from canshaper.config.desk import MEASURES
 from canshaper.config.inputs import PROFILES
 from canshaper.config.section import Section
-from canshaper.config.uncertainty import MEASURES
 from canshaper.controller.valve_messages import Counters
 from canshaper.report.shift import FIGURES
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText

@@ -26,7 +26,6 @@ from pydantic import BaseModel
 from canshaper.codec.layout import Layout
 from canshaper.codec.message import FieldSet
 from canshaper.codec.velocity import FlaggedVelocity
-from canshaper.config.filters import restored_filter
 from canshaper.config.source import Source
 from canshaper.controller.controller import Controller
 from canshaper.controller.gated import GatedController
@@ -141,7 +140,7 @@ class States:
         if name == _fixed.__name__ and module == __name__:
             return self._fixed.__getitem__
         value = getattr(sys.modules.get(module), name, None)
-        if value in (_method, restored_filter) or value in self._classes:
+        if value is _method or value in self._classes:
             return value
         # A filter or an event of another kind than at the start.
         package = module.rpartition(".")[0]

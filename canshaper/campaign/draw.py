@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from canshaper.campaign.operators import OPERATORS, Draw, Fault, bus_fault, sensor_fault
-from canshaper.config.uncertainty import MOST_FLOW, Uncertainty
+from canshaper.config.desk import MOST_FLOW, Uncertainty
 from canshaper.design.lockstep import DriveOptions, driven_part
 from canshaper.errors import CampaignError
 from canshaper.machine.deployment import Deployment

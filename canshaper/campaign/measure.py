@@ -7,7 +7,7 @@ from typing import Any
 
 from canshaper.campaign.draw import Setting, draw_drive, driven_axes, on_unit
 from canshaper.campaign.native import NativeCrane
-from canshaper.config.uncertainty import Uncertainty
+from canshaper.config.desk import Uncertainty
 from canshaper.controller.events import RefusalEvent
 from canshaper.design.lockstep import DriveOptions, Simulation, driven_part
 from canshaper.errors import CampaignError

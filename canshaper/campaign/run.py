@@ -13,7 +13,7 @@ from canshaper.campaign.engine import Engine
 from canshaper.campaign.measure import Row, measured_drive
 from canshaper.campaign.native import NativeCrane
 from canshaper.campaign.store import Store
-from canshaper.config.uncertainty import Uncertainty
+from canshaper.config.desk import Uncertainty
 from canshaper.errors import CampaignError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -15,7 +15,7 @@ from canshaper.campaign.statistics import (
     most_of,
     quantile,
 )
-from canshaper.config.uncertainty import MEASURES, QUANTILES
+from canshaper.config.desk import MEASURES, QUANTILES
 from canshaper.report.console import new_table
 
 Columns = Mapping[str, Sequence[Any]]

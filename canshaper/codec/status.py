@@ -42,10 +42,6 @@ class StatusField(Generic[Source]):
     required: bool = False
     largest: int | None = None
 
-    def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
-        """Pickle only the name: a reload binds the deployment in a process of its own."""
-        return _field, (self.name,)
-
     def shown(self, value: object) -> str:
         """Return a decoded value as text: the name of a code, "unknown" for codes without one."""
         if isinstance(value, IntEnum):
@@ -155,12 +151,6 @@ AIM: list[StatusField[ReportedAim]] = [
     StatusField("AimKnown", attrgetter("known"), bool, True, 1),
 ]
 """How far the tip still travels if the joysticks are released now."""
-
-
-def _field(name: str) -> StatusField[Any]:
-    """Return the field of that name from the tables of this process."""
-    fields: list[StatusField[Any]] = [*AXIS_STATUS, *SERVICE_STATUS, *IDENTITY, *AIM]
-    return next(field for field in fields if field.name == name)
 
 
 class StatusCodec(Generic[Source]):

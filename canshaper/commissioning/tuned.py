@@ -9,8 +9,8 @@ from rich.console import Console
 
 from canshaper.commissioning.filter_file import write_filters
 from canshaper.commissioning.stopping import consequences
+from canshaper.config.desk import Objective
 from canshaper.config.filters import designed
-from canshaper.config.objective import Objective
 from canshaper.design.profiles import swinging_axis
 from canshaper.design.tuning import deploy, preference
 from canshaper.design.tuning.evaluate import Machine, gff

@@ -9,7 +9,7 @@ import pytest
 from canshaper.campaign.draw import Setting, draw_drive
 from canshaper.campaign.measure import measured_drive
 from canshaper.campaign.operators import OPERATORS, REST_S
-from canshaper.config.uncertainty import MEASURES, Uncertainty
+from canshaper.config.desk import MEASURES, Uncertainty
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import Simulation, drive
 from canshaper.machine.binding import load_deployment

@@ -14,7 +14,7 @@ from canshaper.campaign.native import SOURCES, NativeCrane
 from canshaper.campaign.run import Source, drive_all, run_campaign
 from canshaper.campaign.store import Store
 from canshaper.cli.app import app
-from canshaper.config.uncertainty import Uncertainty
+from canshaper.config.desk import Uncertainty
 from canshaper.design.parallel import Processes
 from canshaper.errors import CampaignError, ConfigError, NativeError
 from canshaper.machine.binding import load_deployment
