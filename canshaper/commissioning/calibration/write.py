@@ -10,21 +10,10 @@ from canshaper.commissioning.calibration.together import KEPT, Drives, measured
 from canshaper.edit.edit import Change, change, note, written_by
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
+from canshaper_sim.axes import SPEED_SIGNALS
 
 # Axes whose speeds are so near to each other slow down alike.
 ALIKE = 0.1
-# Speed of each coordinate as `canshaper sim` sends it.
-SIMULATED = {
-    "slew": "TipVelocity.SlewRate",
-    "near_far": "TipVelocity.RadialSpeed",
-    "lift": "TipVelocity.VerticalSpeed",
-    "lift_cylinder": "JointVelocity.LiftRate",
-    "knuckle": "JointVelocity.KnuckleRate",
-    "extension": "JointVelocity.ExtensionSpeed",
-    "bridge": "CraneVelocity.BridgeSpeed",
-    "trolley": "CraneVelocity.TrolleySpeed",
-    "hoist": "CraneVelocity.HoistSpeed",
-}
 
 
 def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[str, str]:
@@ -40,7 +29,7 @@ def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[
     if speed is None and bound.config.feedback:
         return bound.config.feedback.message, bound.config.feedback.signal
     moved = deployment.coordinates.get(axis, axis)
-    message, dot, signal = (speed or SIMULATED.get(moved, "")).partition(".")
+    message, dot, signal = (speed or SPEED_SIGNALS.get(moved, "")).partition(".")
     if not (message and dot and signal):
         raise UsageError(f"--speed: expected MESSAGE.SIGNAL, got {speed or 'none'}")
     return message, signal

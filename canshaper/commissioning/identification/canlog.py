@@ -30,6 +30,7 @@ from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogFile
 from canshaper.shipped import data_directory
+from canshaper_sim.axes import SWAY_SIGNALS
 
 
 @dataclass
@@ -225,8 +226,8 @@ def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> li
     return notes
 
 
-# Of the simulated crane alone: no sensor of a machine reports the swing in both directions.
-_OWN = "GrappleSway"
+# Only the simulated crane sends these: no sensor of a machine reports the swing in both directions.
+_OWN = sorted({name.partition(".")[0] for name in SWAY_SIGNALS.values()})
 # So many frames hold every message of a bus; the simulated crane sends its own every 20 ms.
 _FRAMES = 5000
 
@@ -241,11 +242,11 @@ def is_simulated(log: Path, messages: Messages) -> bool:
     """
     if is_table(log):
         return False
-    message = messages.find(_OWN)
-    own = None if isinstance(message, str) else (message[1].frame_id, message[1].is_extended_frame)
+    found = [entry[1] for name in _OWN if not isinstance(entry := messages.find(name), str)]
+    own = {(message.frame_id, message.is_extended_frame) for message in found}
     try:
         return any(
-            (frame.can_id, frame.extended) == own or _is_virtual(frame.channel)
+            (frame.can_id, frame.extended) in own or _is_virtual(frame.channel)
             for frame in islice(LogFile(log), _FRAMES)
         )
     except CutOffError:

@@ -21,6 +21,7 @@ from canshaper.errors import IdentificationError, UsageError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import OnProgress
+from canshaper_sim.axes import SWAY_SIGNALS
 
 # Width of the ellipse that is swung, part of its length, from which on it is reported.
 ROUND = 0.3
@@ -111,14 +112,6 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
     return longest[2], max(widths)
 
 
-# Swing of each axis as `canshaper sim` sends it.
-_PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
-_SIMULATED = {
-    "slew": "GrappleSway.SwayPerpendicular",
-    **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
-    "bridge": "LoadSway.SwayBridge",
-    "trolley": "LoadSway.SwayTrolley",
-}
 # Name of the axis where neither a deployment nor an option names one.
 UNNAMED = "swing"
 # What a hand adds at either end, and an eye to an angle, as standard deviations.
@@ -286,11 +279,13 @@ def simulated_signals(
     deployment: Deployment | None, messages: Messages, axis: str | None = None
 ) -> dict[str, str]:
     """Signals of the simulated crane by axis, of those that the DBC files have."""
-    moves = deployment.coordinates if deployment else {one: one for one in _SIMULATED}
+    moves = (
+        deployment.coordinates if deployment else {one: one for one in SWAY_SIGNALS}
+    )
     return {
         a: signal
         for a, m in moves.items()
         if axis in (None, a)
-        and (signal := _SIMULATED.get(m))
+        and (signal := SWAY_SIGNALS.get(m))
         and not isinstance(messages.find(signal.partition(".")[0]), str)
     }

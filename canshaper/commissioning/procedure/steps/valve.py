@@ -6,7 +6,6 @@ from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, usual_top
 from canshaper.commissioning.calibration.write import (
-    SIMULATED,
     curve_lines,
     speed_signal,
     write_curve,
@@ -17,6 +16,7 @@ from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging
 from canshaper.errors import CalibrationError
 from canshaper.machine.deployment import Deployment
+from canshaper_sim.axes import SPEED_SIGNALS
 
 NONE = "-"
 
@@ -72,7 +72,7 @@ def run(context: Context) -> Outcome:
 
 def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
     """MESSAGE.SIGNAL of the speed of an axis; a dash where there is none."""
-    default = SIMULATED.get(deployment.coordinates.get(name, name), NONE)
+    default = SPEED_SIGNALS.get(deployment.coordinates.get(name, name), NONE)
     if isinstance(deployment.messages.find(default.partition(".")[0]), str):
         default = NONE
     if feedback := deployment.axes[name].config.feedback:
