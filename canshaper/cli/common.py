@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
 
 MOST_WARNINGS = 10  # of DBC files; the others are counted
+EXIT_NOT_ENOUGH_DATA = 1  # for a measurement of an axis
 EXIT_USELESS = 1  # of a filter that leaves more than half of the swing
 EXIT_WRONG = 2  # of a file, an option, or what is not installed
 EXIT_INTERRUPTED = 130  # by SIGINT, as a shell has it

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from canshaper.codec.sense import turned
 from canshaper.codec.signals import find_signal
-from canshaper.commissioning.assumed import assumptions
+from canshaper.commissioning.origins import assumptions
 from canshaper.config.source import Place, Source
 from canshaper.design.tuning.verdict import verdicts
 from canshaper.errors import Problem

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from canshaper.commissioning.filter_file import filter_changes
+from canshaper.commissioning.origins import filter_changes
 from canshaper.commissioning.robust import RobustDesign
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.source import Place
 from canshaper.design.tuning.evaluate import shaper_of, swing_left
 from canshaper.design.tuning.modes import second_residual
-from canshaper.edit.edit import change
+from canshaper.edit.edit import change, flow
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 
@@ -90,6 +90,14 @@ def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
     own = {"sway": task.sway, "rope": task.rope}
     changes, notes = filter_changes(deployment, name, parts, longest.needed_s, "robust", **own)
     return [*change(deployment.path, changes), *notes]
+
+
+def lines_for_file(designs: Sequence[RobustDesign]) -> list[str]:
+    """Return the sections of the file that the designs need, a line each."""
+    tasks = [one.task for one in designs]
+    sways = [one.sway | ({"length": one.rope} if one.rope else {}) for one in tasks]
+    lines = [f"sway: {flow(sway)}" for sway in sways if sway]
+    return lines + [f"filter: {flow(one.section)}" for one in designs]
 
 
 def figure(one: RobustDesign) -> "Figure":

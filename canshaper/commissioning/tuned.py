@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from canshaper.commissioning.filter_file import write_filters
+from canshaper.commissioning.origins import write_filters
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.filters import designed
 from canshaper.config.objective import Objective

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.assumed import confirmed, origins, write_numbers
 from canshaper.commissioning.likely_mistakes import warnings_of
+from canshaper.commissioning.origins import confirmed, origins, write_numbers
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.state import Context, Record, State, Status
 from canshaper.commissioning.procedure.steps import check, report

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.identification.canlog import is_simulated
+from canshaper.commissioning.origins import is_simulated
 from canshaper.config.bus import Bus
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment

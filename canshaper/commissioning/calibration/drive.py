@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
+from canshaper.commissioning.calibration.pump import Moment
 from canshaper.commissioning.calibration.ramp import EndStopDetector, Ramp, SpeedFeedback
-from canshaper.commissioning.calibration.together import Moment
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.errors import CalibrationError, ConfigError

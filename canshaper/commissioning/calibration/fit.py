@@ -8,9 +8,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from canshaper.commissioning.origins import confirmed
+from canshaper.edit.edit import Change, change, note
 from canshaper.errors import CalibrationError
+from canshaper.machine.deployment import Deployment
 
 
 class Sample(NamedTuple):
@@ -186,3 +189,48 @@ def _speed_at(samples: Sequence[Sample], command: float, top: float) -> float:
     if not near:
         raise CalibrationError("too few samples of the feedback; is its message cyclic?")
     return sum(near) / len(near)
+
+
+def curve_lines(
+    deployment: Deployment, axis: str, result: Calibration, top_pct: float
+) -> list[str]:
+    """The result for people, after what the file has."""
+    limits = deployment.axes[axis].config.limits
+    now = f"deadband_pct {limits.deadband_pct:g}"
+    if limits.curve_command_pct and limits.curve_speed_pct:
+        pairs = zip(limits.curve_command_pct, limits.curve_speed_pct, strict=True)
+        ends = [f"{command:g}" for command, speed in pairs if speed == 0.0]
+        now = f"a curve with the dead band at {' to '.join(ends)} %"
+    lines = [f"axis {axis}: the file has {now}"]
+    full = max(result.positive.full, result.negative.full)
+    for name, one in (("positive", result.positive), ("negative", result.negative)):
+        lines.append(
+            f"  {name}: opens at {100 * one.opens:.1f} % of the command, full speed"
+            f" {one.full:.4g} ({100 * one.full / full:.0f} %), delay of the valve worth"
+            f" {100 * one.delay:.1f} %"
+        )
+    commands, speeds = result.curve()
+    lines += [f"  curve_command_pct: {commands}", f"  curve_speed_pct: {speeds}"]
+    if top_pct < 100:
+        lines.append(f"  above {top_pct:g} % of the command this is a straight line, not measured")
+    return lines
+
+
+def write_curve(
+    deployment: Deployment, axis: str, result: Calibration, origin: dict[str, Any]
+) -> None:
+    """Write the curve of a valve, and where it was measured (see ``origin_of``).
+
+    Raises:
+        ConfigError: the file cannot be changed.
+    """
+    commands, speeds = result.curve()
+    values = {
+        "deadband_pct": None,
+        "curve_command_pct": commands,
+        "curve_speed_pct": speeds,
+        "curve_origin": origin,
+    }
+    written: Change = (("axes", axis, "limits"), values, note("calibrate"))
+    measured = (f"axes.{axis}.limits.{key}" for key in values)
+    change(deployment.path, [written, *confirmed(deployment.path, measured)])

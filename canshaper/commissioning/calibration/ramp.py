@@ -12,10 +12,11 @@ from canshaper.codec.message import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Limits
-from canshaper.errors import ConfigError, Problem
+from canshaper.errors import ConfigError, Problem, UsageError
 from canshaper.inputs.value import ValueInput, measurable
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper_sim.axes import SPEED_SIGNALS
 
 # Slow enough for a lag of 0.3 s, quick enough for a joint that has room for 2 s of full speed.
 RATE_PER_S, TOP = 0.1, 0.4
@@ -129,6 +130,25 @@ class EndStopDetector:
         if before <= LEAST * 0.5 * (self._high - self._low) or away >= PART * before:
             self._moved_s = time_s
         return time_s - self._moved_s >= LASTING_S
+
+
+def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[str, str]:
+    """Message and signal with the speed of the axis.
+
+    Raises:
+        ValueError: no such axis; or none was named, and none is known.
+    """
+    bound = deployment.axes.get(axis)
+    if bound is None:
+        names = ", ".join(deployment.axes)
+        raise UsageError(f"--axis: expected an axis, got {axis!r}; there are {names}")
+    if speed is None and bound.config.feedback:
+        return bound.config.feedback.message, bound.config.feedback.signal
+    moved = deployment.coordinates.get(axis, axis)
+    message, dot, signal = (speed or SPEED_SIGNALS.get(moved, "")).partition(".")
+    if not (message and dot and signal):
+        raise UsageError(f"--speed: expected MESSAGE.SIGNAL, got {speed or 'none'}")
+    return message, signal
 
 
 # Feedback older than that says nothing of the axis, which must not go on unseen.

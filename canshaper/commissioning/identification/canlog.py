@@ -4,8 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from ipaddress import ip_address
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -23,14 +21,12 @@ from canshaper.commissioning.identification.series import (
     ordered,
     unit_of,
 )
-from canshaper.commissioning.identification.table import is_table
 from canshaper.errors import ConfigError, CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogFile
 from canshaper.shipped import data_directory
-from canshaper_sim.axes import SWAY_SIGNALS
 
 
 @dataclass
@@ -224,44 +220,6 @@ def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> li
     if not reader.samples.value:
         raise IdentificationError(f"{notes[0]}; no value is left")
     return notes
-
-
-# Only the simulated crane sends these: no sensor of a machine reports the swing in both directions.
-_OWN = sorted({name.partition(".")[0] for name in SWAY_SIGNALS.values()})
-# So many frames hold every message of a bus; the simulated crane sends its own every 20 ms.
-_FRAMES = 5000
-
-
-def is_simulated(log: Path, messages: Messages) -> bool:
-    """Whether a log was recorded on a virtual bus, or has what only the simulated crane sends.
-
-    A table is of a machine.
-
-    Raises:
-        LogError: the log cannot be read.
-    """
-    if is_table(log):
-        return False
-    found = [entry[1] for name in _OWN if not isinstance(entry := messages.find(name), str)]
-    own = {(message.frame_id, message.is_extended_frame) for message in found}
-    try:
-        return any(
-            (frame.can_id, frame.extended) in own or _is_virtual(frame.channel)
-            for frame in islice(LogFile(log), _FRAMES)
-        )
-    except CutOffError:
-        return False
-
-
-def _is_virtual(channel: str) -> bool:
-    """Whether a channel of a log is one of vcan, or the address of a bus over UDP."""
-    if channel.startswith(("vcan", "vxcan")):
-        return True
-    try:
-        ip_address(channel)
-    except ValueError:
-        return False
-    return True
 
 
 def messages_of(files: Sequence[Path], deployment: Deployment | None) -> Messages:

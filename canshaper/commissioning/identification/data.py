@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
-from canshaper.commissioning.identification.canlog import is_simulated, read_can
+from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.decay import free_columns
 from canshaper.commissioning.identification.segments import find_free
 from canshaper.commissioning.identification.series import Array, Series, Value, ordered
-from canshaper.commissioning.identification.table import Table, is_table, read_table
-from canshaper.commissioning.identification.verdict import Finding, identify
+from canshaper.commissioning.identification.table import Table, read_table
+from canshaper.commissioning.identification.verdict import SwingFinding, identify
+from canshaper.commissioning.origins import origin_of
 from canshaper.edit.edit import written_by
 from canshaper.errors import IdentificationError, UsageError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.tables import is_table
 from canshaper.report.console import OnProgress
 from canshaper_sim.axes import SWAY_SIGNALS
 
@@ -153,14 +154,14 @@ def stopwatch(
     return Value(period, period_half), Value(ratio, ratio_half)
 
 
-def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> Finding:
+def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> SwingFinding:
     """Return the finding of a stopwatch."""
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
         got = f"none of {', '.join(missing)}" if missing else f"the log {logs[0]}"
         raise UsageError(f"expected {', '.join(timed)} together, and no log, got {got}")
     period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
-    return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
+    return SwingFinding(axis, "", None, [], period_s=period, damping_ratio=ratio)
 
 
 def axis_named(axis: str | None, deployment: Deployment | None) -> str:
@@ -197,7 +198,7 @@ def logged(
     axis: str | None = None,
     channel: str | None = None,
     about_s: float | None = None,
-) -> list[Finding]:
+) -> list[SwingFinding]:
     """Return the findings of logs, by axis and label."""
     if not logs:
         raise UsageError(
@@ -238,33 +239,16 @@ def _slower_s(deployment: Deployment | None, axis: str) -> float | None:
     return sway.mode().period_s if sway else None
 
 
-def pump_in(
-    deployment: Deployment, logs: Sequence[str], signals: Sequence[str], *, write: bool, **of: Any
-) -> str:
-    """Measure what the pump delivers by logs with the speeds of two axes; see ``pump_lines``."""
-    speeds, drives = signals_named(signals, deployment), []
-    axes = pair_of(deployment, [*speeds])
-    names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
-    for _, path in map(_labelled, logs):
-        shown = read_can(path, names, deployment.messages, deployment=deployment, **of)
-        columns = [time_s := shown[axes[0]].time_s]
-        for name, one in shown.items():
-            if one.command is None or not len(one.time_s):
-                raise IdentificationError(f"{path}: expected commands and speeds of {name}")
-            columns.append(np.interp(time_s, one.command.time_s, one.command.speed))
-            columns.append(np.interp(time_s, one.time_s, one.value))
-        drives.append(np.stack(columns, axis=1).tolist())
-    origin = measured_in(logs, deployment.messages) if write else None
-    return "\n".join(pump_lines(deployment, axes, drives, origin))
-
-
 def measured_in(logs: Sequence[str], messages: Messages) -> dict[str, Any]:
     """Origin of values from logs or a stopwatch; whether those are simulated may be unknown."""
     if not logs:
         return written_by("identify", simulated=None, log="stopwatch")
-    paths = [path for _, path in map(_labelled, logs)]
-    simulated = any(is_simulated(path, messages) for path in paths)
-    return written_by("identify", simulated=simulated, log=", ".join(path.name for path in paths))
+    return origin_of("identify", paths_of(logs), messages)
+
+
+def paths_of(logs: Sequence[str]) -> list[Path]:
+    """Return the paths of "LABEL=LOG"."""
+    return [_labelled(log)[1] for log in logs]
 
 
 def _labelled(text: str) -> tuple[str, Path]:
@@ -279,9 +263,7 @@ def simulated_signals(
     deployment: Deployment | None, messages: Messages, axis: str | None = None
 ) -> dict[str, str]:
     """Signals of the simulated crane by axis, of those that the DBC files have."""
-    moves = (
-        deployment.coordinates if deployment else {one: one for one in SWAY_SIGNALS}
-    )
+    moves = deployment.coordinates if deployment else {one: one for one in SWAY_SIGNALS}
     return {
         a: signal
         for a, m in moves.items()

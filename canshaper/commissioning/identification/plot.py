@@ -17,7 +17,7 @@ from canshaper.commissioning.identification.decay import DecayFit, SegmentFit
 from canshaper.commissioning.identification.driven import DrivenFit
 from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
-from canshaper.commissioning.identification.verdict import Finding
+from canshaper.commissioning.identification.verdict import SwingFinding
 from canshaper.report import style
 
 ROW_PX, TITLE_PX, FOOT_PX = 640, 38, 150
@@ -33,7 +33,7 @@ _UNITS = {
 }
 
 
-def figure(findings: Sequence[Finding], titles: Sequence[str]) -> Figure:
+def figure(findings: Sequence[SwingFinding], titles: Sequence[str]) -> Figure:
     """The picture.
 
     Args:
@@ -66,7 +66,7 @@ def figure(findings: Sequence[Finding], titles: Sequence[str]) -> Figure:
     return fig
 
 
-def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
+def _draw_free(panel: Axes, finding: SwingFinding, fit: DecayFit) -> None:
     """The segment with the largest swing, of the signal with the longest, with what is around."""
     source = max(fit.segments, key=lambda s: float(s.segment.time_s[-1])).segment.source
     same = [s for s in fit.segments if s.segment.source == source]

@@ -17,7 +17,6 @@ import numpy as np
 
 from canshaper.commissioning.identification.series import Array, Unit, unit_of
 from canshaper.errors import IdentificationError
-from canshaper.recording.tables import is_log
 
 _HEADER = re.compile(r"^(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
 _TIME = re.compile(r"time|zeit|seconds|timestamp|^t$|uptime", re.IGNORECASE)
@@ -81,18 +80,6 @@ class Table:
         if not names and _GYRO.search(self.path.stem):
             names = [n for n in self.columns if re.fullmatch(r"[xyz]", n, re.IGNORECASE)]
         return [n for n in names if not re.search(r"abs|magnitude|norm", n, re.IGNORECASE)]
-
-
-def is_table(path: Path) -> bool:
-    """Whether a file is a table of numbers rather than a log of CAN frames.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
-        return False
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return not is_log(file.readline(10_000))
 
 
 def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -> Table:

@@ -38,10 +38,38 @@ SWING_FREELY = (
 
 
 @dataclass
-class Finding:
-    """One axis in one state of the grapple, or timed by hand without any signal."""
+class AxisFinding:
+    """Finding of a measurement of one axis.
+
+    Attributes:
+        axis: name of the axis.
+        problems: why nothing of it may be used, each with what to do; empty where it may be used.
+        notes: what else a person should know.
+    """
 
     axis: str
+    problems: list[str] = field(default_factory=list, kw_only=True)
+    notes: list[str] = field(default_factory=list, kw_only=True)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the data is enough."""
+        return not self.problems
+
+    def marked(self, heading: str) -> str:
+        """Return a heading that says so where the data is not enough."""
+        return heading if self.usable else f"{heading} (not enough data)"
+
+    def remarks(self) -> list[str]:
+        """Return the notes and the problems as lines."""
+        notes = [f"  note: {text}" for text in self.notes]
+        return notes + [f"  not enough data: {text}" for text in self.problems]
+
+
+@dataclass
+class SwingFinding(AxisFinding):
+    """Swing of one axis in one state of the grapple, or timed by hand without any signal."""
+
     label: str  # state of the grapple, may be ""
     at: float | None  # value of the grapple's signal, where it is known
     series: list[Series]
@@ -50,24 +78,22 @@ class Finding:
     period_s: Value | None = None  # of small damped swings; None where nothing was found
     damping_ratio: Value | None = None
     full_speed_m_s: Value | None = None  # of the tip; None where that was not seen
-    problems: list[str] = field(default_factory=list)  # why it cannot be used, with what to do
-    notes: list[str] = field(default_factory=list)  # what else a person should know
 
     @property
     def usable(self) -> bool:
         """Whether period and damping are known well enough."""
-        return not self.problems and self.period_s is not None
+        return super().usable and self.period_s is not None
 
 
 def identify(
     axis: str, label: str, series: Sequence[Series], about_s: float | None = None
-) -> Finding:
+) -> SwingFinding:
     """Period, damping and full speed of an axis from its signals in one state of the grapple.
 
     ``about_s``: the period as far as it is known, s.
     """
     values = [s.at for s in series if s.at is not None]
-    finding = Finding(axis, label, float(np.median(values)) if values else None, list(series))
+    finding = SwingFinding(axis, label, float(np.median(values)) if values else None, list(series))
     finding.notes += dict.fromkeys(note for one in series for note in one.notes)
     good, useless = [], []
     for one in series:
@@ -114,7 +140,7 @@ def _no_swing(series: Sequence[Series]) -> str:
     return f"{names}: no decaying swing found: {SWING_FREELY}. Is it the right signal?"
 
 
-def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
+def _free(finding: SwingFinding, series: Sequence[Series], about_s: float | None) -> None:
     """Free swings of all signals together."""
     swinging = [(s, f) for s in series if (f := find_free(s, about_s))]
     if not swinging:
@@ -129,7 +155,7 @@ def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> 
     finding.free, finding.period_s, finding.damping_ratio = fit, fit.period_s, fit.damping_ratio
 
 
-def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
+def _driven(finding: SwingFinding, series: Sequence[Series], about_s: float | None) -> None:
     """Driven swings: full speed, and what free swings did not show."""
     if not any(s.driven_s for s in series):
         return
@@ -209,7 +235,7 @@ def _doubts(fit: DecayFit, *, usable: bool) -> list[str]:
     return notes
 
 
-def _faults(finding: Finding) -> list[str]:
+def _faults(finding: SwingFinding) -> list[str]:
     """Why period and damping cannot be used."""
     period, ratio, fit = finding.period_s, finding.damping_ratio, finding.free
     assert period is not None and ratio is not None

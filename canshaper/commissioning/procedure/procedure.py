@@ -20,17 +20,13 @@ from canshaper.commissioning.procedure.state import (
     stamped,
     write_state,
 )
-from canshaper.commissioning.procedure.steps.buses import BUSES
-from canshaper.commissioning.procedure.steps.check import CHECK
+from canshaper.commissioning.procedure.steps.check import CHECK, REPORT
 from canshaper.commissioning.procedure.steps.drive import DRIVE
-from canshaper.commissioning.procedure.steps.dry import DRY
 from canshaper.commissioning.procedure.steps.filter import FILTER
-from canshaper.commissioning.procedure.steps.joysticks import JOYSTICKS
-from canshaper.commissioning.procedure.steps.motion import FIRST_MOTION
-from canshaper.commissioning.procedure.steps.report import REPORT
-from canshaper.commissioning.procedure.steps.sensor import SENSOR
+from canshaper.commissioning.procedure.steps.joysticks import BUSES, JOYSTICKS
+from canshaper.commissioning.procedure.steps.motion import DRY, FIRST_MOTION
 from canshaper.commissioning.procedure.steps.swing import SWING
-from canshaper.commissioning.procedure.steps.valve import VALVE
+from canshaper.commissioning.procedure.steps.valve import SENSOR, VALVE
 from canshaper.edit.edit import replace_text
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment

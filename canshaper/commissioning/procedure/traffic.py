@@ -12,7 +12,7 @@ from cantools.database.can import Message
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
 from canshaper.commissioning import suggest
-from canshaper.commissioning.doctor.listen import inputs_of
+from canshaper.commissioning.doctor.joysticks import inputs_of
 from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.series import (
     Array,

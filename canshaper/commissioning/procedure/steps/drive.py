@@ -9,8 +9,8 @@ from canshaper.commissioning.identification.canlog import bind
 from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
-from canshaper.commissioning.procedure.steps.dry import figure as joysticks_figure
 from canshaper.commissioning.procedure.steps.motion import LEAST_MOVED
+from canshaper.commissioning.procedure.steps.motion import figure as joysticks_figure
 from canshaper.commissioning.procedure.steps.swing import swinging
 from canshaper.commissioning.procedure.traffic import (
     AxisTraffic,

@@ -20,12 +20,12 @@ from canshaper.commissioning.identification.report import (
     lines,
     write_sway,
 )
-from canshaper.commissioning.identification.table import is_table
-from canshaper.commissioning.identification.verdict import Finding
+from canshaper.commissioning.identification.verdict import SwingFinding
 from canshaper.commissioning.procedure.bench import Bench, Mode, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.tables import is_table
 from canshaper_sim.strokes import Script, Stroke
 
 # A push as in the scripts pulse-AXIS, and rest of ten swings of most grapples.
@@ -67,7 +67,7 @@ def run(context: Context) -> Outcome:
     if missing:
         text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
         outcome.problems.append(f"{text} table, or a stopwatch")
-    findings: list[Finding] = []
+    findings: list[SwingFinding] = []
     logs: list[Path] = []
     if sources.signals:
         log = context.folder / "swing.log"
@@ -140,13 +140,13 @@ def _task(axes: Sequence[str], mode: Mode) -> Task:
 
 def _identified(
     log: Path, signals: dict[str, str], context: Context, axis: str | None = None
-) -> list[Finding]:
+) -> list[SwingFinding]:
     machine = context.deployment
     with context.bench.person.progress("identifying") as shown:
         return logged([str(log)], signals, machine, machine.messages, axis=axis, on_progress=shown)
 
 
-def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
+def _show(outcome: Outcome, findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> None:
     for finding in findings:
         outcome.sheet.print("\n".join(lines(finding)))
         outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
@@ -165,7 +165,7 @@ def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice
 
 def _write(
     deployment: Deployment,
-    findings: Sequence[Finding],
+    findings: Sequence[SwingFinding],
     advice: Sequence[Advice],
     origin: dict[str, Any],
 ) -> list[str]:

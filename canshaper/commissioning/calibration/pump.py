@@ -9,9 +9,17 @@ import statistics
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from canshaper.errors import CalibrationError
+import numpy as np
+
+from canshaper.commissioning.calibration.ramp import speed_signal
+from canshaper.commissioning.identification.canlog import read_can
+from canshaper.commissioning.origins import confirmed, written_line
+from canshaper.edit.edit import change
+from canshaper.errors import CalibrationError, IdentificationError, UsageError
+from canshaper.machine.deployment import Deployment
 
 # Parts: of full speed, below which an axis stands; of its largest demand, from which it is held; of
 # its speed alone, which it keeps where it is not slowed down.
@@ -22,6 +30,8 @@ SETTLING_S, BIN_S, LEAST_BINS, ERRORS, LEAST_HALF = 0.5, 0.1, 5, 3.0, 0.01
 # Between these parts of its largest demand, which changes by no more than SLOW in SLOW_S, an axis
 # alone shows whether it still gets faster up to the largest.
 LOWER, SLOW, SLOW_S, SATURATED = (0.7, 0.85), 0.2, 0.3, 0.9
+# Axes whose speeds are so near to each other slow down alike.
+ALIKE = 0.1
 # States of an axis; the last three times its direction.
 STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
 
@@ -144,3 +154,85 @@ def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
     if LOWER[0] <= abs(demand) / most[way] <= LOWER[1] and abs(change) <= SLOW:
         return (DOWN if change < 0.0 else UP) * way
     return BETWEEN
+
+
+def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
+    """The two axes that are named, or the first two with a filter; UsageError for others."""
+    filtered = [n for n, one in deployment.config.axes.items() if one.filter.kind != "off"]
+    names = tuple(dict.fromkeys(axes)) or tuple(filtered[:2])
+    if len(names) != 2 or not {*names} <= deployment.axes.keys():
+        got, there = ", ".join(names) or "none", ", ".join(deployment.axes)
+        raise UsageError(f"--together: expected two axes, got {got}; there are {there}")
+    return names
+
+
+def pump_lines(
+    deployment: Deployment, axes: Sequence[str], drives: Drives, origin: dict[str, Any] | None
+) -> list[str]:
+    """Lines on the pump, whose flow is written where an origin is given; errors of ``measured``."""
+    oil = deployment.config.hydraulics
+    shares = {name: oil.shares.get(name, 1.0) if oil else 1.0 for name in deployment.axes}
+    directions, lines = measured(drives, axes, shares), []
+    for ways, kept, asked, (flow, half) in reversed(directions):
+        each = zip(axes, ways, kept, strict=True)
+        parts = (f"{name} {'-+'[way > 0]} {v:.0%} ± {h:.0%}" for name, way, (v, h) in each)
+        of = f"flow {flow:.2f} ± {half:.2f} of {asked:.2f} full axis flows"
+        lines.append(f"at once, of the speed alone: {', '.join(parts)}: {of}")
+    # A budget that is too small costs speed, one that is too large leaves swing.
+    least = math.floor(100.0 * (flow - half)) / 100.0
+    if all(part >= KEPT for direction in directions for part, _ in direction.kept):
+        if asked < KEPT * sum(shares[name] for name in axes):
+            cure = "measure again with a larger --top, or limits.max_pct"
+            return [*lines, f"flow at least {least:g}: that little does not load the pump; {cure}"]
+        every = f"hydraulics: {{ flow: {sum(shares.values()):g} }}"
+        lines.append(f"enough oil for both: flow at least {least:g}; no hydraulics section needed")
+        return [*lines, f"  where all axes have enough, {every} tells canshaper check so"]
+    (low, slower), (high, faster) = sorted(zip((part for part, _ in kept), axes, strict=True))
+    how = "neither alike nor one alone: does something else take oil, or move the load?"
+    if high - low <= ALIKE:
+        how = "the valve shares the flow: both slow down alike"
+    elif high >= KEPT:
+        how = f"plain load sensing: {slower} starves, {faster} keeps its speed"
+    by = ", ".join(f"{name} {shares[name]:g}" for name in axes)
+    lines += [how, f"hydraulics: {{ flow: {least:g} }} # lower end; shares: {by}"]
+    if origin:
+        values: dict[str, Any] = {"flow": least, "origin": origin}
+        written = (("hydraulics",), values, "") if oil else ((), {"hydraulics": values}, "")
+        change(deployment.path, [written, *confirmed(deployment.path, ["hydraulics.flow"])])
+        lines.append(written_line(deployment.path))
+    return lines
+
+
+def drives_in(
+    deployment: Deployment,
+    logs: Sequence[Path],
+    axes: Sequence[str],
+    speeds: Mapping[str, str],
+    channel: str | None,
+) -> Drives:
+    """Return demands and speeds of two axes out of logs.
+
+    Args:
+        deployment: the machine.
+        logs: of drives of each axis alone, and of both at once.
+        axes: names of the two.
+        speeds: MESSAGE.SIGNAL of their speeds, of those whose speed the file does not name.
+        channel: bus of the logs that is read; None for all.
+
+    Raises:
+        IdentificationError: commands or speeds of an axis are not in a log.
+        LogError: a log cannot be read.
+        UsageError: no signal of a speed is named, and none is known.
+    """
+    names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
+    drives = []
+    for path in logs:
+        shown = read_can(path, names, deployment.messages, deployment=deployment, channel=channel)
+        columns = [time_s := shown[axes[0]].time_s]
+        for name, one in shown.items():
+            if one.command is None or not len(one.time_s):
+                raise IdentificationError(f"{path}: expected commands and speeds of {name}")
+            columns.append(np.interp(time_s, one.command.time_s, one.command.speed))
+            columns.append(np.interp(time_s, one.time_s, one.value))
+        drives.append(np.stack(columns, axis=1).tolist())
+    return drives

@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
-from canshaper.commissioning.identification.canlog import is_simulated
 from canshaper.commissioning.identification.driven import Driven, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
 from canshaper.commissioning.identification.swing import clipped
+from canshaper.commissioning.identification.verdict import AxisFinding
+from canshaper.commissioning.origins import origin_of
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
-from canshaper.edit.edit import Change, FileValue, change, note, written_by
+from canshaper.edit.edit import Change, FileValue, change, note
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, MOST_DELAY
 from canshaper.machine.valves import BoundAxis
@@ -43,26 +44,20 @@ DRIVE_IT = (
 
 
 @dataclass
-class Finding:
-    """The sway sensor of one axis.
+class SensorFinding(AxisFinding):
+    """Sway sensor of one axis.
 
     Attributes:
-        axis: its name.
         series: what it measured, rad or rad/s, with the sign of its signal.
         data: the stretches in which the axis was driven.
         fit: the model that explains it best; None where there was nothing to explain.
         noise: standard deviation of its noise, degrees or degrees per second.
-        problems: why nothing may be used, each with what to do.
-        notes: what else a person should know.
     """
 
-    axis: str
     series: Series
     data: Sequence[Driven] = ()
     fit: SensorFit | None = None
     noise: float = 0.0
-    problems: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
 
     @property
     def unit(self) -> str:
@@ -104,10 +99,10 @@ class Finding:
         return Value(size, SIGMAS * size * self.fit.deviations[3])
 
 
-def examine(axis: BoundAxis, series: Series) -> Finding:
+def examine(axis: BoundAxis, series: Series) -> SensorFinding:
     """Examine the log of an axis that has a sensor."""
     assert axis.config.sway and axis.sway_sensor
-    finding = Finding(axis.name, series, notes=list(series.notes))
+    finding = SensorFinding(axis.name, series, notes=list(series.notes))
     mode = axis.config.sway.mode()
     if fault := _useless(axis.name, series, mode.period_s):
         finding.problems.append(fault)
@@ -175,7 +170,7 @@ def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
     return math.sqrt(squares / count)
 
 
-def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
+def _faults(axis: BoundAxis, finding: SensorFinding) -> list[str]:
     """Why what was found cannot be used."""
     fit, source = finding.fit, finding.series.source
     assert fit and axis.config.sway
@@ -211,7 +206,7 @@ def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
     return faults
 
 
-def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
+def _notes(axis: BoundAxis, finding: SensorFinding) -> list[str]:
     """Return further notes for the person."""
     assert finding.fit and axis.config.sway
     notes, period_s = [], axis.config.sway.mode().period_s
@@ -225,7 +220,7 @@ def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
     return notes
 
 
-def changes(axis: BoundAxis, finding: Finding) -> dict[str, FileValue]:
+def changes(axis: BoundAxis, finding: SensorFinding) -> dict[str, FileValue]:
     """Return the values for the section of the sensor, by key."""
     assert axis.sway_sensor
     config = axis.sway_sensor.config
@@ -242,7 +237,7 @@ def changes(axis: BoundAxis, finding: Finding) -> dict[str, FileValue]:
     return values
 
 
-def heading(finding: Finding) -> str:
+def heading(finding: SensorFinding) -> str:
     """Return a heading: what was examined, and whether the data is enough."""
     text = f"{axis_title(finding.axis)}, {finding.series.source}"
     if finding.fit is None:
@@ -250,10 +245,10 @@ def heading(finding: Finding) -> str:
     driven = len(finding.data)
     explained = 100.0 * max(0.0, finding.fit.explained(math.radians(finding.noise)))
     text += f": {driven} driven stretch{'es' * (driven != 1)}, {explained:.0f} % explained"
-    return f"{text} (not enough data)" if finding.problems else text
+    return finding.marked(text)
 
 
-def table(axis: BoundAxis, finding: Finding) -> Table:
+def table(axis: BoundAxis, finding: SensorFinding) -> Table:
     """Return a table of the finding next to the values of the file."""
     assert axis.sway_sensor and axis.config.sway
     config, sway = axis.sway_sensor.config, axis.config.sway
@@ -274,7 +269,7 @@ def _shown(value: Value, factor: float = 1.0, digits: int = 2) -> str:
 
 
 def write_sensors(
-    deployment: Deployment, findings: Sequence[Finding], log: Path | None, *, live: bool
+    deployment: Deployment, findings: Sequence[SensorFinding], log: Path | None, *, live: bool
 ) -> list[str]:
     """Write the results for each sensor, and where from; the lines that have changed.
 
@@ -287,10 +282,8 @@ def write_sensors(
     Raises:
         ConfigError: the file cannot be changed.
     """
-    simulated = not live or any(bus.is_virtual for bus in deployment.config.buses.values())
-    if log:
-        simulated = is_simulated(log, deployment.messages)
-    origin = written_by("sensor", simulated=simulated, log=log.name if log else None)
+    buses = deployment.config.buses.values() if live else ()
+    origin = origin_of("sensor", [log] if log else [], deployment.messages, live=buses)
     written: list[Change] = []
     for finding in findings:
         if not finding.problems:
