@@ -54,7 +54,7 @@ def assumptions(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
 
 
 def confirmed(path: Path, keys: Iterable[str]) -> list[Change]:
-    """Change of the file, where one is due: someone has measured or typed these numbers.
+    """Return the change of ``assumed`` in the file: these numbers are measured or typed now.
 
     Raises:
         ConfigError: the file cannot be read.
@@ -145,22 +145,22 @@ def filter_changes(
     sway: Mapping[str, FileValue] | None = None,
     rope: Mapping[str, FileValue] | None = None,
 ) -> tuple[list[Change], list[str]]:
-    """Filters of an axis, and a longer tail where the stopping distance of the file allows it.
+    """Return changes that write filters of an axis, and a longer tail where stop_distance_m allows.
 
-    What they were designed for carries where it comes from: measured as the swing was.
+    ``designed_for`` carries the origin of the swing: of a machine, or simulated.
 
     Args:
         deployment: the machine, as its file says.
         axis: the axis.
-        filters: place below the axis, () for its own or that of a breakpoint; kind and the other
-            keys of its section filter, see ``change``.
-        tail_s: tail that they need; None or less than that of the file changes nothing.
-        verb: that designed them.
+        filters: place below the axis, () for its own filter or that of a breakpoint; and the keys
+            of the section filter, see ``change``.
+        tail_s: tail that they need; None, or one below that of the file, changes nothing.
+        verb: the verb that designed them.
         sway: keys of the axis' own swing to write with them.
         rope: keys of the length that it follows.
 
     Returns:
-        Changes of the file; notes on the kind that its own replaces, and why the tail stays.
+        Changes of the file; notes: which kind of filter is replaced, and why the tail stays.
     """
     config = deployment.axes[axis].config
     changes: list[Change] = [
@@ -219,7 +219,7 @@ def _with_origin(
 
 
 def written_line(path: Path) -> str:
-    """Return the next thing to do, after the file was written."""
+    """Return the line that names the written file, and how a running daemon takes it."""
     return f"Written to {path}; a running daemon takes it with SIGHUP."
 
 
@@ -230,7 +230,7 @@ _FRAMES = 5000
 
 
 def is_simulated(log: Path, messages: Messages) -> bool:
-    """Whether a log was recorded on a virtual bus, or has what only the simulated crane sends.
+    """Return whether a log is of a virtual bus, or has messages of the simulated crane.
 
     A table is of a machine.
 
@@ -251,7 +251,7 @@ def is_simulated(log: Path, messages: Messages) -> bool:
 
 
 def _is_virtual(channel: str) -> bool:
-    """Whether a channel of a log is one of vcan, or the address of a bus over UDP."""
+    """Return whether a channel of a log is one of vcan, or the address of a bus over UDP."""
     if channel.startswith(("vcan", "vxcan")):
         return True
     try:

@@ -28,8 +28,8 @@ from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
-# Least taps of a shaper for a range: with a smaller one less of the swing is left, and a tap of the
-# joystick may be several movements. Through the limits the smallest is not always the best.
+# Least taps of a shaper for lengths. A smaller one leaves less of the swing, but a tap of the
+# joystick may become several movements; through the limits the smallest is not always the best.
 _LEAST_TAPS = (LEAST_TAP, LEAST_TAP / 3.0, 0.0)
 # Length of the response in swings: with a range that of ZVD, which is zero twice in its middle.
 _SWINGS, _SWINGS_OF_RANGE = 0.77, 1.0
@@ -37,14 +37,14 @@ _LONGER = (1.15, 1.3, 1.5, 2.0)  # times the duration of a shaper that leaves to
 _MOST_TAPS = max(one.entries[1] for one in KINDS["robust"].parameters if one.entries)
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
-# So long the responses for several loads are alike: a load that is known so late in a movement
-# changes no output. It costs the longer ones next to nothing.
+# The responses for several loads begin alike for so long: a load that becomes known so late in a
+# movement then changes no output. It costs the longer ones next to nothing.
 _ALIKE_S = 0.5
 
 
 @dataclass(frozen=True)
 class RobustTask:
-    """Requirements of a shaper.
+    """Requirements of a robust shaper.
 
     Attributes:
         bound: its axis.
@@ -53,10 +53,10 @@ class RobustTask:
         tick_ms: tick of the axis.
         range_pct: lengths of the pendulum that it covers, +- %.
         lengths_m: shortest and longest pendulum that it covers, in place of a range.
-        sway: what the file has to have as the swing then, by key.
+        sway: keys of the section sway that the file needs with the shaper.
         second: a second mode that it covers too.
-        rope: what the file has to have as the length that it follows, by key.
-        lasts: how much longer it takes on the longest rope that it follows.
+        rope: keys of the section sway.length that the file needs with the shaper.
+        lasts: factor of its duration on the longest rope that it follows.
     """
 
     bound: BoundAxis
@@ -81,21 +81,21 @@ class RobustTask:
         return self.bound.config.limits.slowest_per_s
 
     def requirements(self) -> dict[str, Any]:
-        """Arguments of ``least_residual`` and ``shortest``."""
+        """Return the arguments of ``least_residual`` and ``shortest``."""
         names = "tick_s", "range_pct", "rate_per_s", "second"
         return {name: getattr(self, name) for name in names}
 
     def machine(self, tail_s: float = 0.0) -> Machine:
-        """Valve and limits of the axis, with such a tail where that of the file is shorter."""
+        """Return valve and limits of the axis, with this tail where that of the file is shorter."""
         own = Machine.of(self.bound)
         return replace(own, limits=replace(own.limits, tail_s=max(own.limits.tail_s, tail_s)))
 
     def machine_of(self, shaper: RobustShaper) -> Machine:
-        """With the tail that is written with a shaper for lengths."""
+        """Return valve and limits with the tail that is written with a shaper for lengths."""
         return self.machine(shaper.duration_s if self.lengths_m else 0.0)
 
     def section(self, shaper: RobustShaper) -> dict[str, Any]:
-        """The filter section of the file."""
+        """Return the filter section of the file."""
         designed_for: dict[str, Any] = {
             **designed(self.mode),
             "length_range_pct": self.range_pct,
@@ -113,21 +113,21 @@ class RobustTask:
         }
 
     def in_file(self, shaper: RobustShaper) -> ShaperFor:
-        """The shaper as the file describes it, its taps rounded."""
+        """Return the shaper as the file describes it, with rounded taps."""
         return shaper_of(filter_of(**self.section(shaper)), self.tick_s, self.rate_per_s)
 
 
 @dataclass(frozen=True)
 class RobustDesign:
-    """A shaper that was designed for an axis.
+    """A robust shaper that was designed for an axis.
 
     Attributes:
-        task: what it was designed for.
-        shaper: it.
-        measured: what it does through the limits of the machine.
-        without: what the task gives without its second mode.
-        first: taps with which it has to begin.
-        shortest: it lasts as long as a residual asks for.
+        task: its requirements.
+        shaper: the shaper.
+        measured: what it leaves through the limits of the machine.
+        without: shaper of the same task without its second mode.
+        first: taps with which it had to begin.
+        shortest: whether a residual set its duration.
     """
 
     task: RobustTask
@@ -246,7 +246,7 @@ def design_robust(
 def _with_longer(
     task: RobustTask, shaper: RobustShaper, verdict: Verdict, first: Sequence[float]
 ) -> Verdict:
-    """The verdict; the shortest of some longer responses that is good is named in it."""
+    """Return the verdict, which names the shortest longer response that is good."""
     for times in _LONGER:
         seconds = round(times * shaper.duration_s / task.tick_s) * task.tick_s
         if round(seconds / task.tick_s) + 1 > _MOST_TAPS:
@@ -261,7 +261,7 @@ def _with_longer(
 
 
 def _between(task: RobustTask, sway: Sway, lengths_m: tuple[float, float]) -> RobustTask:
-    """The task for the swing in the middle of two lengths, with its range and its keys."""
+    """Return the task for the swing in the middle of two lengths, with its range and keys."""
     low_m, high_m = lengths_m
     length_m = round(0.5 * (low_m + high_m), 4)
     range_pct = round(50.0 * (high_m - low_m) / length_m, 1)
@@ -269,7 +269,7 @@ def _between(task: RobustTask, sway: Sway, lengths_m: tuple[float, float]) -> Ro
 
 
 def _following(task: RobustTask, sway: Sway, lengths_m: tuple[float, float] | None) -> RobustTask:
-    """The task for the shortest rope; with lengths of these, and with their keys."""
+    """Return the task for the shortest rope: of the file, or of given lengths with their keys."""
     if lengths_m is None:
         return replace(task, lasts=sway.ends()[1].period_s / task.mode.period_s)
     rope = {"lowest_m": lengths_m[0], "highest_m": lengths_m[1]}
@@ -278,13 +278,13 @@ def _following(task: RobustTask, sway: Sway, lengths_m: tuple[float, float] | No
 
 
 def _at(task: RobustTask, sway: Sway, length_m: float) -> RobustTask:
-    """The task for the swing of a pendulum of this length, with its keys."""
+    """Return the task for the swing of a pendulum of this length, with its keys."""
     changes = keys_of_length(sway, length_m)
     return replace(task, mode=sway.model_copy(update=changes).mode(), sway=changes)
 
 
 def keys_of_length(sway: Sway, length_m: float) -> dict[str, float]:
-    """Keys of the section sway that a pendulum of another length changes."""
+    """Return the keys of the section sway that a pendulum of this length changes."""
     if sway.length_m is not None:
         return {"length_m": length_m}
     swing = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), sway.mode().damping_ratio)

@@ -1,4 +1,4 @@
-"""Robust shapers of an axis printed, drawn, and written into the file."""
+"""Robust shapers of an axis: printed, drawn, written into the file."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def summary_line(one: RobustDesign) -> str:
-    """How long it takes, and what it leaves."""
+    """Return a line: how long a shaper takes, and what it leaves."""
     shaper, lengths = one.shaper, f"lengths within ±{one.task.range_pct:g} %"
     if one.task.lengths_m:
         lengths = "pendulums of {:g} to {:g} m".format(*one.task.lengths_m)
@@ -43,7 +43,7 @@ def print_design(deployment: Deployment, one: RobustDesign, console: Console) ->
 
 
 def _print_consequences(deployment: Deployment, one: RobustDesign, console: Console) -> None:
-    """Print the tail that it needs, and the stopping distance with it."""
+    """Print the tail that a shaper needs, and the stopping distance with it."""
     axis = one.bound.name
     if one.needed_s is not None:
         tail_s = one.bound.config.limits.tail_s
@@ -60,7 +60,7 @@ def _print_consequences(deployment: Deployment, one: RobustDesign, console: Cons
 
 
 def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console: Console) -> None:
-    """Print what each design leaves with each load, and the stopping distance with the longest."""
+    """Print what each design leaves with each load; the stopping distance with the longest."""
     bound = designs[0].bound
     loads = {f"{one.breakpoint:g}": one.sway.mode() for one in bound.config.gain_schedule}
     names = [*(f"for {name}" for name in loads), "own"]
@@ -101,7 +101,7 @@ def lines_for_file(designs: Sequence[RobustDesign]) -> list[str]:
 
 
 def figure(one: RobustDesign) -> "Figure":
-    """The new filter next to that of the file."""
+    """Draw the new filter next to that of the file."""
     from canshaper.design.tuning import robust_plot  # noqa: PLC0415  # pictures alone need it
 
     task, present = one.task, one.bound.config.filter

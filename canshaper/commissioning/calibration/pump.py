@@ -1,7 +1,8 @@
-"""The oil of one pump: two axes are driven alone, then at once.
+"""Flow of the pump, from two axes that are driven alone, then at once; shown and written.
 
-What each keeps of its own speed says what the pump delivers, and how the valve shares that. Speeds
-stand for flows: the file's valve curve says which part of full speed a command asks for.
+The part of its speed alone that each axis keeps shows how much the pump delivers, and how the valve
+shares it. Speeds stand for flows: the valve curve of the file says which part of full speed a
+command asks for.
 """
 
 import math
@@ -21,22 +22,23 @@ from canshaper.edit.edit import change
 from canshaper.errors import CalibrationError, IdentificationError, UsageError
 from canshaper.machine.deployment import Deployment
 
-# Parts: of full speed, below which an axis stands; of its largest demand, from which it is held; of
-# its speed alone, which it keeps where it is not slowed down.
+# An axis stands below this part of full speed, is held from this part of its largest demand on, and
+# is not slowed down where it keeps this part of its speed alone.
 STANDS, HELD, KEPT = 0.01, 0.95, 0.95
-# A held speed has settled after so long; then its means over BIN_S count as independent. Of five
-# of them 2.8 standard errors are an interval of 95 %, but commands and speeds have steps.
+# A held speed has settled after SETTLING_S; from then on its means over BIN_S count as independent.
+# For five of them 2.8 standard errors make an interval of 95 %; ERRORS is more, as commands and
+# speeds have steps.
 SETTLING_S, BIN_S, LEAST_BINS, ERRORS, LEAST_HALF = 0.5, 0.1, 5, 3.0, 0.01
-# Between these parts of its largest demand, which changes by no more than SLOW in SLOW_S, an axis
-# alone shows whether it still gets faster up to the largest.
+# An axis alone shows whether it gets faster up to its largest demand: by its speed at demands
+# between these parts of the largest one, which change by no more than SLOW within SLOW_S.
 LOWER, SLOW, SLOW_S, SATURATED = (0.7, 0.85), 0.2, 0.3, 0.9
-# Axes whose speeds are so near to each other slow down alike.
+# Axes slow down alike where the parts of their speeds that they keep differ by no more.
 ALIKE = 0.1
-# States of an axis; the last three times its direction.
+# States of an axis; the last three are multiplied by its direction, 1 or -1.
 STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
 
 Moment = Sequence[float]
-"""Time in s, rising; of each of two axes demand on its valve, part of full speed, and speed."""
+"""Time in s, rising; then of each of two axes its demand, part of full speed, and its speed."""
 
 Drives = Sequence[Sequence[Moment]]
 Mean = tuple[float, float]
@@ -44,7 +46,14 @@ Mean = tuple[float, float]
 
 
 class Direction(NamedTuple):
-    """Both at once: ways, 1 or -1; parts kept of the speeds alone; flows in full axis flows."""
+    """Both axes at once, each in one direction.
+
+    Attributes:
+        ways: their directions, 1 or -1.
+        kept: part of its speed alone that each of them keeps.
+        asked: flow that they ask for, full axis flows.
+        flow: flow that they get, full axis flows.
+    """
 
     ways: tuple[int, int]
     kept: list[Mean]
@@ -145,7 +154,7 @@ def _seen(drives: Drives) -> Seen:
 
 
 def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
-    """State of an axis by its demand, and by that of SLOW_S before."""
+    """Return the state of an axis by its demand, and by its demand SLOW_S ago."""
     way, change = 1 if demand > 0.0 else -1, abs(demand) - abs(before)
     if abs(demand) < STANDS:
         return STANDING
@@ -157,7 +166,11 @@ def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
 
 
 def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
-    """The two axes that are named, or the first two with a filter; UsageError for others."""
+    """Return the two axes that are named, or the first two with a filter.
+
+    Raises:
+        UsageError: they are not two, or not of this machine.
+    """
     filtered = [n for n, one in deployment.config.axes.items() if one.filter.kind != "off"]
     names = tuple(dict.fromkeys(axes)) or tuple(filtered[:2])
     if len(names) != 2 or not {*names} <= deployment.axes.keys():
@@ -169,7 +182,12 @@ def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
 def pump_lines(
     deployment: Deployment, axes: Sequence[str], drives: Drives, origin: dict[str, Any] | None
 ) -> list[str]:
-    """Lines on the pump, whose flow is written where an origin is given; errors of ``measured``."""
+    """Return lines on the pump; write its flow into the file where an origin is given.
+
+    Raises:
+        CalibrationError: see ``measured``.
+        ConfigError: the file cannot be changed.
+    """
     oil = deployment.config.hydraulics
     shares = {name: oil.shares.get(name, 1.0) if oil else 1.0 for name in deployment.axes}
     directions, lines = measured(drives, axes, shares), []

@@ -36,7 +36,7 @@ LOOK_S = 0.2
 
 
 def inputs_of(deployment: Deployment) -> dict[str, BoundInput]:
-    """Messages that the deployment needs all the time, by a name for people."""
+    """Return the messages that the deployment always needs, by a name for people."""
     inputs: dict[str, BoundInput] = {f"joystick {n}": lv for n, lv in deployment.joysticks.items()}
     if deployment.emergency_stop:
         inputs["emergency stop"] = deployment.emergency_stop
@@ -46,7 +46,7 @@ def inputs_of(deployment: Deployment) -> dict[str, BoundInput]:
 def listen(
     deployment: Deployment, seconds: float, on_progress: Callable[[float], None]
 ) -> dict[str, list[int]]:
-    """Times of reception, ns, of the messages on SocketCAN buses, by the names of ``inputs_of``.
+    """Listen; return when each message on SocketCAN came, ns, by the names of ``inputs_of``.
 
     Raises:
         OSError: an interface cannot be opened.
@@ -81,7 +81,7 @@ def listen(
 
 
 def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
-    """The next data frame of a socket and when the kernel received it, ns; None for another one."""
+    """Return the next frame and when the kernel received it, ns; None for no data frame."""
     packet, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
     frame, time_ns = frame_of(bus, packet), stamp_ns(ancillary)
     return None if frame is None or time_ns is None else (frame, time_ns)
@@ -121,19 +121,19 @@ def _regular(name: str, times_ns: list[int], cycle_ms: int, timeout_ms: int) -> 
     return Finding(name, Level.OK, text)
 
 
-# Clock of the joysticks, slower than ours by so much: their frames pass through every phase of the
-# tick, as those of a real joystick do over the hours.
+# The clock of the joysticks is slower than ours by this factor, so that their frames meet every
+# phase of the tick, as those of a real joystick do within hours.
 SLOWER = 1.01
-# The hand: neutral for a moment, out and back in a triangle, then the other way.
+# The hand rests in neutral, deflects in a triangle, then does the same in the other direction.
 NEUTRAL_S = 0.2
 STROKE_S = 1.0
 LARGEST = 0.8
-# Frames of so many steps are sent late and not left out; sending all would make it later still.
+# After a delay the frames of so many steps are sent late; sending more would delay the next.
 MOST_CAUGHT_UP = 5
 
 
 class Waving(Script):
-    """A hand that moves every joystick of any machine, always."""
+    """A script that moves every joystick of any machine without end."""
 
     def command(self, axis: str, time_s: float) -> float:
         """Joystick value; the same for all axes."""
@@ -149,8 +149,8 @@ class Joysticks:
     """All joysticks of a deployment on sockets that stand for its buses.
 
     Attributes:
-        sent: for each bus and frame, in order: number of its joystick in the deployment (-1 for
-            other messages), ns by ``boottime_ns``.
+        sent: by bus, of each frame in order: number of its joystick in the deployment (-1 of
+            another message), and when it was sent, ns of ``boottime_ns``.
     """
 
     def __init__(self, deployment: Deployment, sockets: dict[str, socket.socket]) -> None:
@@ -195,7 +195,7 @@ class Joysticks:
 
 
 def main(options: dict[str, Any]) -> None:
-    """Play from the first frame that comes until the loop ends; print what was sent when."""
+    """Send from the first frame that comes until the loop ends; print what was sent when."""
     sockets = {name: socket.socket(fileno=fd) for name, fd in options["sockets"].items()}
     for one in sockets.values():
         one.setblocking(False)

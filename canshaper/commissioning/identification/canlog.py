@@ -31,7 +31,7 @@ from canshaper.shipped import data_directory
 
 @dataclass
 class _Reader:
-    """A signal that is looked for in a log; ``merit`` is the signal of its figure of merit."""
+    """Reader of one signal of a log; ``merit`` names the signal of its figure of merit."""
 
     name: str
     message: Message
@@ -52,7 +52,7 @@ class _Reader:
         self._low, self._high = (low, high) if bounded else (-math.inf, math.inf)
 
     def wants(self, can_id: int, extended: bool) -> bool:
-        """Whether an identifier is that of its message, of J1939 whatever its priority."""
+        """Return whether an identifier is that of the message; of J1939 with any priority."""
         own = self.message.frame_id
         if extended != self.message.is_extended_frame:
             return False
@@ -78,7 +78,7 @@ class _Reader:
 
 
 def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
-    """Message, signal and unit of "Message.Signal".
+    """Return message, signal and unit of the name "Message.Signal".
 
     Raises:
         IdentificationError: it is not in the DBC files, or cannot be used.
@@ -113,7 +113,7 @@ def read_can(
     sources: Mapping[str, int | None] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> dict[str, Series]:
-    """Signals of a log by axis.
+    """Read the signal of each axis from a log.
 
     Args:
         path: the log.
@@ -163,7 +163,7 @@ Seen = Counter[tuple[int, bool]]  # frames of each identifier
 def _read(
     log: LogFile, path: Path, channel: str | None, readers: Sequence[_Reader], commands: Commands
 ) -> tuple[Seen, list[str]]:
-    """Hand every frame to who reads it: which there were, and what to note."""
+    """Hand every frame to its readers; return how often each identifier came, and notes."""
     readers_of: dict[tuple[int, bool], list[_Reader]] = {}
     seen: Seen = Counter()
     notes: list[str] = []
@@ -193,7 +193,7 @@ def _read(
 
 
 def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> list[str]:
-    """Notes on what was left out of a signal.
+    """Return notes on the values of a signal that were left out.
 
     Raises:
         IdentificationError: nothing is left, or it is from two senders.
@@ -223,7 +223,7 @@ def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> li
 
 
 def messages_of(files: Sequence[Path], deployment: Deployment | None) -> Messages:
-    """Messages that name the signals."""
+    """Return the messages of DBC files, else of the deployment, else of the forwarder."""
     if not files and deployment:
         return deployment.messages
     paths = files or [data_directory() / "dbc" / "forwarder.dbc"]

@@ -1,4 +1,4 @@
-"""Report of an identification, its lines in the file, and the sway data that it recommends."""
+"""Report of an identification: lines, JSON, advice on the sway data, writing it."""
 
 import math
 import statistics
@@ -16,10 +16,10 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
 from canshaper.report.console import axis_title
 
-# Difference of pendulum lengths, +- %, up to which one value in the middle is what we recommend
-# without a signal of the grapple; the robust shaper covers it.
+# Without a signal of the grapple one value in the middle is recommended up to this difference of
+# pendulum lengths, +- %: the robust shaper covers it.
 ONE_VALUE_PCT = 30.0
-# Up to here the difference needs no sets either.
+# Up to this difference, +- %, one value is enough with any filter.
 SAME_PCT = 8.0
 
 SwayNumbers = dict[str, float]  # values for the section ``sway``
@@ -107,7 +107,7 @@ def _middle(values: Sequence[SwayNumbers]) -> tuple[SwayNumbers, float]:
 
 
 def headlines(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> list[str]:
-    """Recommendations for a picture that has the numbers of each finding: those that say more."""
+    """Return the recommendations that say more than the numbers of one finding, for the picture."""
     texts = []
     for one in advice:
         mine = [finding for finding in findings if finding.axis == one.axis]
@@ -117,7 +117,7 @@ def headlines(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> lis
 
 
 def lines(finding: SwingFinding) -> list[str]:
-    """A finding for people, one line a fact: its numbers, and what they rest on."""
+    """Return the lines of a finding: its numbers, and the data that they rest on."""
     texts = [heading(finding)]
     if (fit := finding.free) is not None:
         first = max(float(s.envelope[0]) for s in fit.segments)
@@ -141,7 +141,7 @@ def lines(finding: SwingFinding) -> list[str]:
 
 
 def heading(finding: SwingFinding) -> str:
-    """Name and numbers of a finding: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
+    """Return name and numbers of a finding: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
     name = axis_title(finding.axis) + (f", {finding.label}" if finding.label else "")
     if finding.period_s is None or finding.damping_ratio is None:
         return f"{name}: nothing found"
@@ -156,7 +156,7 @@ def heading(finding: SwingFinding) -> str:
 
 
 def set_lines(advice: Advice) -> list[str]:
-    """The lines of ``gain_schedule`` for the deployment file; each still needs its filter."""
+    """Return the lines of ``gain_schedule`` for the file; each breakpoint still needs a filter."""
     texts = ["    gain_schedule:"]
     for at, label, sway in sorted(advice.gain_schedule, key=lambda s: (s[0] is None, s[0])):
         shown = "?" if at is None else f"{at:g}"
@@ -167,7 +167,7 @@ def set_lines(advice: Advice) -> list[str]:
 
 
 def as_dict(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> dict[str, Any]:
-    """Everything as JSON takes it."""
+    """Return findings and advice as JSON data."""
     return {
         "findings": [
             {
@@ -200,7 +200,7 @@ def as_dict(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> dict[
 
 
 def _interval(value: Value | None) -> dict[str, float] | None:
-    """Value and its interval of 95 %."""
+    """Return a value with its interval of 95 %; None for none."""
     if value is None:
         return None
     return {"value": value.value, "low": value.value - value.half, "high": value.value + value.half}
@@ -212,7 +212,7 @@ def write_sway(
     advice: Sequence[Advice],
     origin: dict[str, Any],
 ) -> list[str]:
-    """Write what is known of each axis, and where from; the axes that were written.
+    """Write the sway data of each axis with their origin; return the axes that were written.
 
     Raises:
         UsageError: an axis has no section for it, follows its rope, or would travel on for too

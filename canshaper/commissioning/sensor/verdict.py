@@ -1,4 +1,4 @@
-"""Finding on a sway sensor: what a log shows, whether it may be used; shown, and written."""
+"""Finding on a sway sensor: computed from a log, judged, shown, written into the file."""
 
 import math
 from collections.abc import Sequence
@@ -26,15 +26,16 @@ LEAST_DRIVEN_S = 2.0
 LEAST_EXPLAINED = 0.8
 # Widest interval of a delay that may be used, s.
 WIDEST_DELAY_S = 0.015
-# Beyond so many times what the full speed of the file makes, or so little, the unit is another one.
+# Where the swing is larger or smaller than the full speed of the file makes by more than this
+# factor, the unit in the DBC is wrong.
 MOST_GAIN = 3.0
-# What the model leaves wrong of the delay, s: large swings, and spools that need their time.
+# Error of the model in the delay, s: large swings, and the lag of spools.
 MODEL_DELAY_S = 0.01
-# What two measurements differ by within so much time is noise, s: a swing hardly moves meanwhile.
+# Measurements so close to each other differ by noise, s: the swing hardly moves meanwhile.
 NOISE_S = 0.1
-# Lengths that are off by more are reported, as a part.
+# A pendulum whose length differs by more than this part is reported.
 SAME_LENGTH = 0.15
-# Part of the largest offset from which that one is raised, and what it is raised to.
+# An offset above this part of offset_max_deg raises that to so many times the offset.
 NEAR_OFFSET, MORE_OFFSET = 0.8, 1.5
 SIGMAS = 2.0  # of 95 %
 DRIVE_IT = (
@@ -93,7 +94,7 @@ class SensorFinding(AxisFinding):
 
     @property
     def size_m_s(self) -> Value:
-        """Full speed of the tip that makes so much swing."""
+        """Full speed of the tip that makes as much swing as was measured."""
         assert self.fit
         size = abs(self.fit.gain)
         return Value(size, SIGMAS * size * self.fit.deviations[3])
@@ -123,7 +124,7 @@ def examine(axis: BoundAxis, series: Series) -> SensorFinding:
 
 
 def _useless(axis: str, series: Series, period_s: float) -> str | None:
-    """Why nothing can be made of a signal."""
+    """Return why a signal cannot be used; None where it can."""
     time, value, source = series.time_s, series.value, series.source
     if series.command is None:
         return f"expected commands of {axis} in the log, got none: log its valve or its joystick"
@@ -143,7 +144,7 @@ def _useless(axis: str, series: Series, period_s: float) -> str | None:
 
 
 def _alone(series: Series, period_s: float) -> list[Series]:
-    """Parts of a signal in which no other axis moves, nor did for a swing: it swings along."""
+    """Return the parts of a signal in which no other axis moves, nor did one swing before."""
     command = series.command
     assert command
     parts, begin = [], -math.inf
@@ -159,7 +160,7 @@ def _alone(series: Series, period_s: float) -> list[Series]:
 
 
 def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
-    """Standard deviation by what neighbours differ by beyond the model, in their unit."""
+    """Return the standard deviation of neighbours' differences from the model, in their unit."""
     squares, count = 0.0, 0
     for one, model in zip(data, fitted, strict=True):
         apart = max(1, round(NOISE_S / float(np.median(np.diff(one.time_s)))))
@@ -171,7 +172,7 @@ def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
 
 
 def _faults(axis: BoundAxis, finding: SensorFinding) -> list[str]:
-    """Why what was found cannot be used."""
+    """Return why the fit cannot be used."""
     fit, source = finding.fit, finding.series.source
     assert fit and axis.config.sway
     explained = fit.explained(math.radians(finding.noise))
@@ -271,12 +272,12 @@ def _shown(value: Value, factor: float = 1.0, digits: int = 2) -> str:
 def write_sensors(
     deployment: Deployment, findings: Sequence[SensorFinding], log: Path | None, *, live: bool
 ) -> list[str]:
-    """Write the results for each sensor, and where from; the lines that have changed.
+    """Write the results of each sensor with their origin; return the lines that have changed.
 
     Args:
         deployment: the machine.
         findings: of its sensors; those with problems are left out.
-        log: the log that they are from, where a person recorded it.
+        log: the log of a person, None for a drive of this program.
         live: whether the buses were listened to.
 
     Raises:

@@ -81,7 +81,7 @@ def _write(deployment: Deployment, fast: list[str], allowed: list[str]) -> None:
 
 
 def stopping_figure(axes: list[Stopping]) -> Figure:
-    """How far each axis travels on after each event, and how far its limits allow."""
+    """Draw how far each axis travels after each event, and how far its limits allow."""
     height = 170 + 330 * len(axes)
     fig = style.print_figure(height)
     for number, axis in enumerate(axes):
@@ -112,7 +112,7 @@ CHECK = Step(
 
 
 NAME = "report"
-# What no program sees: tried by a person at the machine, and what should happen.
+# Tests by a person at the machine, which no program sees, and what should happen.
 HAND_TESTS = (
     ("emergency stop pressed in motion", "every valve neutral at once"),
     ("enable let go in motion", "neutral at once, TRIPPED"),
@@ -124,7 +124,7 @@ HAND_TESTS = (
 
 
 def write_report(context: Context) -> Outcome:
-    """Write everything that was done into one file."""
+    """Write what all steps have shown into one file."""
     path = context.folder / "report.html"
     steps = {name: one for name, one in context.state.steps.items() if name != NAME}
     path.write_text(document(context.deployment, context.state, steps, context.folder), "utf-8")
@@ -146,12 +146,12 @@ def write_report(context: Context) -> Outcome:
 
 
 def document(deployment: Deployment, state: State, steps: dict[str, Record], folder: Path) -> str:
-    """The whole report.
+    """Return the whole report.
 
     Args:
         deployment: as it is now.
         state: of the procedure.
-        steps: those that it is about, in order.
+        steps: the steps that it reports, in order.
         folder: of their pictures.
     """
     title = f"Commissioning of {deployment.path.name}"
@@ -186,7 +186,7 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
 
 
 def _verdict(deployment: Deployment, steps: dict[str, Record], faults: list[Row]) -> str:
-    """The result of the day in one sentence: the swing that is left, and what is missing."""
+    """Return the result of the day in a sentence: the swing that is left, what is missing."""
     drive = steps.get(DRIVE.name)
     done = drive if drive and drive.status is Status.DONE else None
     if done and (crane := done.numbers.get("crane")):
@@ -208,12 +208,12 @@ def _verdict(deployment: Deployment, steps: dict[str, Record], faults: list[Row]
 
 
 def _standing(one: Record) -> str:
-    """Status of a step, and what is said of it."""
+    """Return the status of a step, and why."""
     return f"{one.status.value}, {one.why}" if one.why else one.status.value
 
 
 def _step(name: str, one: Record, folder: Path) -> list[str]:
-    """A step: what it has shown, its pictures, and what it has changed."""
+    """Return the part of a step: what it has shown, its pictures, and its change of the file."""
     parts = [html.heading(f"{name}: {_standing(one)}")]
     for part in one.parts:
         again = shown(part)
@@ -227,7 +227,7 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
 
 
 def _pictures(one: Record, folder: Path) -> list[str]:
-    """Pictures of a step: drawings, and dots of what has no drawing."""
+    """Return the pictures of a step: drawings, and bitmaps of what has no drawing."""
     paths = [folder / picture for picture in one.pictures]
     drawings = {path.stem for path in paths if path.suffix == ".svg"}
     return [embedded(one) for one in paths if one.suffix == ".svg" or one.stem not in drawings]

@@ -55,7 +55,7 @@ def listen(context: Context) -> Outcome:
 
 
 def _rows(traffic: Traffic, deployment: Deployment) -> list[tuple[str, list[float]]]:
-    """Messages by bus and name, or by identifier where the DBC files have none."""
+    """Return times of messages by bus and name; by identifier where the DBC files lack them."""
     rows = []
     for (bus, can_id, extended), times in traffic.frames.items():
         names = deployment.messages.named([(can_id, extended)])
@@ -65,7 +65,7 @@ def _rows(traffic: Traffic, deployment: Deployment) -> list[tuple[str, list[floa
 
 
 def frames_figure(traffic: Traffic, deployment: Deployment) -> Figure:
-    """Every frame of the first second, a row a message."""
+    """Draw every frame of the first second, a row for each message."""
     rows = _rows(traffic, deployment)[:MOST_ROWS]
     height = 330 + 45 * len(rows)
     fig = style.print_figure(height)
@@ -92,12 +92,12 @@ BUSES = Step(
 
 
 MOVE_S = 10.0
-LEAST = 0.9  # of full that both ends have to reach
-MOVED = 0.5  # from which on a signal was moved
+LEAST = 0.9  # part of full that both ends have to reach
+MOVED = 0.5  # part of full from which on a signal counts as moved
 
 
 def move_joysticks(context: Context) -> Outcome:
-    """Let every joystick be moved to both ends, and see which signal moves."""
+    """Let every joystick be moved to both ends, and find the signal that moves."""
     deployment = context.deployment
     outcome = Outcome()
     table = new_table("axis", "moved", "least, %", "most, %", "enable held, %")
@@ -144,13 +144,13 @@ def move_joysticks(context: Context) -> Outcome:
 
 
 def _moved(traffic: Traffic) -> list[str]:
-    """Signals that were moved, the farthest first."""
+    """Return the signals that moved, the farthest first."""
     far = {name: most - least for name, (least, most) in traffic.moved.items()}
     return sorted((name for name in far if far[name] > MOVED), key=lambda name: -far[name])
 
 
 def _held(axis: AxisTraffic) -> float | None:
-    """Part of the deflected time in which the enable switch was held; None where not known."""
+    """Return the part of the deflected time with the enable switch held; None: not known."""
     if len(axis.enabled.value) != len(axis.joystick.value):
         return None
     deflected = [
@@ -162,7 +162,7 @@ def _held(axis: AxisTraffic) -> float | None:
 
 
 def _other_signal(deployment: Deployment, name: str, moved: list[str]) -> tuple[str, str] | None:
-    """(joystick, signal) of the one that moved, where the file names another; None where not."""
+    """Return joystick and signal that moved where the file names others; else None."""
     command = deployment.axes[name].config.command
     own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
     if len(moved) != 1 or moved[0] == own:
@@ -173,7 +173,7 @@ def _other_signal(deployment: Deployment, name: str, moved: list[str]) -> tuple[
 
 
 def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str]) -> str | None:
-    """Return the fault of a joystick, and what to do; None where it is as it should be."""
+    """Return the fault of a joystick with what to do; None for none."""
     command = deployment.axes[name].config.command
     own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
     least, most = axis.reach
@@ -201,7 +201,7 @@ def _write(deployment: Deployment, wrong: dict[str, tuple[str, str]]) -> None:
 
 
 def joysticks_figure(axes: dict[str, AxisTraffic]) -> Figure:
-    """The command of each axis over time, as the file reads it."""
+    """Draw the demand of each axis over time, decoded as the file says."""
     height = 150 + 260 * len(axes)
     fig = style.print_figure(height)
     for number, (name, axis) in enumerate(axes.items()):

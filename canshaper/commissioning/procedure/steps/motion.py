@@ -28,7 +28,7 @@ DRIVEN = {State.ACTIVE.name, State.BYPASS_ON.name}
 
 
 def ends(axes: Sequence[str], level: float) -> tuple[Stroke, ...]:
-    """Every joystick forth and back, one after the other."""
+    """Return strokes of every joystick forth and back, one after the other."""
     strokes, begin_s = [], FIRST_S
     for name in axes:
         for sign in (1.0, -1.0):
@@ -77,7 +77,7 @@ def drive_dry(context: Context) -> Outcome:
 
 
 def show_states(outcome: Outcome, traffic: Traffic) -> None:
-    """States that each axis went through, where its status message is in the log."""
+    """Show the states that each axis went through, where the log has its status message."""
     table = new_table("axis", "least, %", "most, %", "states")
     for name, axis in traffic.axes.items():
         states = list(dict.fromkeys(state for _, state, _ in axis.states))
@@ -91,7 +91,7 @@ def show_states(outcome: Outcome, traffic: Traffic) -> None:
 
 
 def figure(traffic: Traffic, title: str) -> Figure:
-    """Joystick and valve of each axis over time, and when its joystick was enabled."""
+    """Draw joystick and valve of each axis over time, and when the enable was held."""
     height = 190 + 300 * len(traffic.axes)
     fig = style.print_figure(height)
     for number, (name, axis) in enumerate(traffic.axes.items()):
@@ -142,8 +142,8 @@ DRY = Step(
 MOTION = "motion"  # name of the step
 LEVEL = 0.4  # of full deflection
 LEAST_MOVED = 0.02  # of full command
-# How long after the enable was let go a valve may still be away from neutral: its joystick's and
-# its own frame, each of which may have just been missed.
+# Valves may be away from neutral for two periods of the joystick's and the valve's frame after the
+# enable was let go: each of both frames may just have been sent.
 FRAMES = 2
 GUIDE = (
     "no one near, the crane free of everything, engine at low speed, a hand on the emergency stop."
@@ -209,9 +209,9 @@ def _begin(deployment: Deployment, names: list[str]) -> None:
 
 
 def _follows(axis: AxisTraffic) -> bool:
-    """Whether the valve goes to the side of the joystick while that is held, to both sides.
+    """Return whether the valve follows a held joystick to both sides.
 
-    Slew moves near-far a little too, so what it does besides says nothing.
+    Slew moves near-far a little too, so motion without the joystick says nothing.
     """
     time_s, joystick = axis.joystick.arrays()
     valve = Command(*axis.valve.arrays()).at(time_s)
@@ -221,7 +221,7 @@ def _follows(axis: AxisTraffic) -> bool:
 
 
 def _releases(axis: AxisTraffic) -> list[float]:
-    """How long the valve took to neutral each time the enable was let go while it moved."""
+    """Return how long the valve took to neutral each time the enable was let go in motion."""
     (time_s, valve), (at_s, enabled) = axis.valve.arrays(), axis.enabled.arrays()
     times_s = []
     for released_s in at_s[1:][(enabled[:-1] > 0.0) & (enabled[1:] == 0.0)]:
@@ -232,7 +232,7 @@ def _releases(axis: AxisTraffic) -> list[float]:
     return times_s
 
 
-# Not the file: it gets faster afterwards.
+# It does not need FILE: its own change of the file makes the crane faster.
 FIRST_MOTION = Step(
     MOTION,
     "First motion, at reduced speed",

@@ -28,7 +28,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.tables import is_table
 from canshaper_sim.strokes import Script, Stroke
 
-# A push as in the scripts pulse-AXIS, and rest of ten swings of most grapples.
+# A push as of the scripts pulse-AXIS, and a rest of ten swings of most grapples, s.
 PUSH_S, RAMP_S, QUIET_S = 3.0, 0.1, 30.0
 NONE = "-"
 
@@ -49,7 +49,7 @@ class _Sources:
 
 
 def swinging(deployment: Deployment) -> list[str]:
-    """Axes that make the grapple swing."""
+    """Return the axes that make the grapple swing."""
     return [name for name, axis in deployment.axes.items() if axis.config.sway]
 
 
@@ -100,7 +100,7 @@ _TIMED = ("swings", "seconds", "first", "last")
 
 
 def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
-    """Ask what shows the swing of each axis; of the simulated crane it is its own message."""
+    """Ask what shows the swing of each axis; the simulated crane has a message of its own."""
     sources, own = _Sources(), simulated_signals(deployment, deployment.messages)
     for name in axes:
         sensor = deployment.axes[name].sway_sensor

@@ -69,7 +69,7 @@ def calibrate_valves(context: Context) -> Outcome:
 
 
 def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
-    """MESSAGE.SIGNAL of the speed of an axis; a dash where there is none."""
+    """Return MESSAGE.SIGNAL of the speed of an axis; ``NONE`` where there is none."""
     default = SPEED_SIGNALS.get(deployment.coordinates.get(name, name), NONE)
     if isinstance(deployment.messages.find(default.partition(".")[0]), str):
         default = NONE
