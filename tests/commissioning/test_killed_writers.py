@@ -50,7 +50,7 @@ def measured(deployment: Deployment) -> None:
 
 def calibrated(deployment: Deployment) -> None:
     one: Any = Measured()
-    write_curve(deployment, "slew", one, simulated=True)
+    write_curve(deployment, "slew", one, written_by("calibrate", simulated=True))
 
 
 def adjusted(deployment: Deployment) -> None:
