@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from canshaper.commissioning.robust import design_robust, keys_of_length
+from canshaper.commissioning.robust import design_robust
+from canshaper.commissioning.robust_task import keys_of_length
 from canshaper.commissioning.tuned import design_tuned
 from canshaper.config.filters import filter_of
 from canshaper.config.limits import Sway

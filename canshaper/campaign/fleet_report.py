@@ -9,7 +9,7 @@ from canshaper.campaign.fleet import BOX, FILE, FLEET, JUDGING, OTHER, Driven, R
 from canshaper.campaign.fleet_filters import FleetFilter
 from canshaper.campaign.statistics import quantile
 from canshaper.campaign.summary import bounded
-from canshaper.commissioning.filter_file import filter_changes
+from canshaper.commissioning.origins import filter_changes
 from canshaper.edit.edit import Change, change
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table

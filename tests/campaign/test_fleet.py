@@ -11,7 +11,7 @@ from canshaper.campaign.fleet_filters import GFF, ROBUST, Candidate, FleetFilter
 from canshaper.campaign.measure import measured_drive
 from canshaper.campaign.run import Source
 from canshaper.cli.verbs import compare
-from canshaper.commissioning.filter_file import filter_changes
+from canshaper.commissioning.origins import filter_changes
 from canshaper.commissioning.robust import design_robust
 from canshaper.design.comparison.manoeuvres import with_candidate
 from canshaper.design.parallel import Processes

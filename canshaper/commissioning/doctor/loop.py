@@ -22,7 +22,7 @@ from canshaper.machine.deployment import Deployment
 
 
 class WatchedPort(RawPort):
-    """A bus on one end of a pair of sockets, whose frames are counted and noted.
+    """A bus on one end of a socket pair; it counts received frames and reports sent ones.
 
     Args:
         name: of the bus.
@@ -30,7 +30,7 @@ class WatchedPort(RawPort):
         one: the end.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
-        fd: what is sent in frames of CAN FD.
+        fd: identifier, and whether it is extended, of what is sent in frames of CAN FD.
 
     Attributes:
         received: frames so far.
@@ -53,13 +53,13 @@ class WatchedPort(RawPort):
         )
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits."""
+        """Yield every waiting frame, and count it."""
         for frame in super().frames():
             self.received += 1
             yield frame
 
     def send(self, frame: Frame) -> bool:
-        """Send a frame, or not at all; whether it was sent."""
+        """Send a frame at once or not at all; return whether it was sent."""
         sent = super().send(frame)
         if sent:
             self._on_sent(frame)
@@ -67,7 +67,7 @@ class WatchedPort(RawPort):
 
 
 class Loop:
-    """The ticks of the daemon, and what happened when.
+    """The loop of the daemon, and the record of its ticks.
 
     Args:
         deployment: what is run.
@@ -102,7 +102,7 @@ class Loop:
         self._moved: set[str] = set()
 
     def run(self) -> None:
-        """Run, as the daemon does, once the first frame of a joystick is there."""
+        """Run as the daemon does, from the first frame of a joystick on."""
         self._collector.freeze()
         say_ready()
         select.select(list(self._ports.values()), [], [])
@@ -153,7 +153,7 @@ class Loop:
 
 
 def main(options: dict[str, Any]) -> None:
-    """Run it as the service's unit would, as far as that is permitted; print the record."""
+    """Run with the priority and memory of the service, where permitted; print the record."""
     deployment = load_deployment(Path(options["file"]))
     sockets = {name: socket.socket(fileno=fd) for name, fd in options["sockets"].items()}
     for one in sockets.values():
