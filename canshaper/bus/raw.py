@@ -13,13 +13,13 @@ from canshaper.bus.packet import (
     ANCILLARY_BYTES,
     BRS,
     CAN_FRAME,
-    FD_FRAME,
     FD_SIZE,
     FDF,
     SIZE,
     WORD,
     frame_of,
     kernel_ids,
+    pack,
 )
 from canshaper.bus.socketcan import ERROR_CLASSES, dropped_frames, set_filters
 from canshaper.codec.frame import EFF_FLAG, BusState, Frame, FrameFault
@@ -157,10 +157,7 @@ class RawPort(Interface):
                 return False
             # The last frame may be confirmed after this tick; a frame before it has waited.
             self.waited += under_way > 1 and word in self._valves
-        if word in self._fd:
-            packed = FD_FRAME.pack(word, len(data), self._fd_flags, data)
-        else:
-            packed = CAN_FRAME.pack(word, len(data), data)
+        packed = pack(word, data, self._fd_flags if word in self._fd else None)
         try:
             self._send(packed)
         except OSError as error:

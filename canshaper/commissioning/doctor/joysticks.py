@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from canshaper.bus.packet import FD_SIZE, FDF, Packet
+from canshaper.bus.packet import FD_SIZE, FDF, pack
 from canshaper.codec.frame import EFF_FLAG
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, real_time, say_ready
 from canshaper.gate.cycle import boottime_ns, run_at_deadlines
@@ -80,7 +80,7 @@ class Joysticks:
         for frame in self._node.frames(self._time_ms) if now else ():
             word = frame.can_id | EFF_FLAG if frame.extended else frame.can_id
             flags = FDF if frame[:3] in self._fd else None
-            data = Packet(word, frame.data, flags).pack()
+            data = pack(word, frame.data, flags)
             at_ns = boottime_ns()
             try:
                 self._sockets[frame.bus].send(data)

@@ -117,7 +117,7 @@ def children() -> list[int]:
 def test_no_process_outlives_its_block() -> None:
     before = children()
     with pytest.raises(ZeroDivisionError), Children() as processes:
-        busy = processes.start("load", kind="busy")
+        busy = processes.start("processes", kind="busy")
         ready(busy)
         assert children() == [*before, busy.pid]
         raise ZeroDivisionError
