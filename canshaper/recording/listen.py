@@ -17,8 +17,8 @@ from canshaper.bus.packet import (
     FD_SIZE,
     FDF,
     SO_TIMESTAMPNS,
-    Packet,
     stamp_ns,
+    unpack,
 )
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import MOST_FAILURES, open_python_can, waiting
@@ -162,20 +162,18 @@ def _raw(one: socket.socket, bus: str, channel: str) -> Iterator[ReceivedFrame]:
     """Yield the waiting frames of a SocketCAN socket."""
     with suppress(BlockingIOError):
         while True:
-            yield _of_socket(*one.recvmsg(FD_SIZE, ANCILLARY_BYTES)[:2], bus, channel)
-
-
-def _of_socket(data: bytes, ancillary: Any, bus: str, channel: str) -> ReceivedFrame:
-    """Return the frame in a packet of SocketCAN."""
-    stamp = stamp_ns(ancillary)
-    time_ns = time.time_ns() if stamp is None else stamp
-    word, payload, flags = Packet.unpack(data)
-    if word & ERR_FLAG:
-        can_id = ERR_FLAG | word & EFF_MASK
-        return ReceivedFrame(time_ns, bus, channel, can_id, True, payload, "error")
-    can_id, extended = id_of(word)
-    remote = "remote" if word & RTR_FLAG else ""
-    return ReceivedFrame(time_ns, bus, channel, can_id, extended, payload, remote, flags)
+            packet, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
+            if (parts := unpack(packet)) is None:
+                continue
+            stamp = stamp_ns(ancillary)
+            time_ns = time.time_ns() if stamp is None else stamp
+            word, data, flags = parts
+            if word & ERR_FLAG:
+                can_id = ERR_FLAG | word & EFF_MASK
+                yield ReceivedFrame(time_ns, bus, channel, can_id, True, data, "error")
+                continue
+            kind = "remote" if word & RTR_FLAG else ""
+            yield ReceivedFrame(time_ns, bus, channel, *id_of(word), data, kind, flags)
 
 
 def _python_can(message: can.Message, bus: str, channel: str) -> ReceivedFrame:

@@ -16,8 +16,8 @@ from canshaper.bus.packet import (
     FD_SIZE,
     FDF,
     SO_TIMESTAMPNS,
-    Packet,
     frame_of,
+    pack,
     stamp_ns,
 )
 from canshaper.bus.socketcan import open_sockets
@@ -184,7 +184,7 @@ class Joysticks:
         for frame in self._node.frames(self._time_ms) if now else ():
             word = frame.can_id | EFF_FLAG if frame.extended else frame.can_id
             flags = FDF if frame[:3] in self._fd else None
-            data = Packet(word, frame.data, flags).pack()
+            data = pack(word, frame.data, flags)
             at_ns = boottime_ns()
             try:
                 self._sockets[frame.bus].send(data)

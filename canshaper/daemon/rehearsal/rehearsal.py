@@ -1,7 +1,7 @@
-"""Faults rehearsed at the running machine: made on the input side, in front of controller and gate.
+"""Rehearses faults at the running machine, on the input side, in front of controller and gate.
 
-Loaded by a daemon whose file has ``control.rehearse_faults`` only. Why nothing can move by it that
-the joystick did not ask for: see ``fault.Demands``.
+Only a daemon whose file has ``control.rehearse_faults`` loads this module. ``fault.Demands`` says
+why no axis can move by a rehearsed fault unless its joystick demands that.
 """
 
 import logging
@@ -21,13 +21,14 @@ from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")
 
-# How long a fault waits for its axis to move, and the axis has moved when it is made.
+# Longest time that a fault waits for its axis to move; time that the axis has moved by at least
+# LEAST_DEMAND before the fault is made.
 ARMED_NS, HELD_NS = 60 * S, S // 2
 LEAST_DEMAND = 0.2
-# A client that has not asked for so long is gone.
+# A client that has sent no request for so long is gone.
 GONE_NS = 3 * S
-# How long is looked at after it is over, beyond the timeout of a joystick; and where the reaction
-# is not over by then.
+# Time after the end of a fault in which events are noted, in addition to the timeout of a joystick;
+# longest such time while a stop is not over.
 AFTER_NS, LONGEST_AFTER_NS = 300 * MS, 5 * S
 MOST_EVENTS = 50
 STOPS = (State.STOPPING.name, State.TRIPPED.name)
@@ -36,7 +37,7 @@ NOTHING = Fault("", "", (), 0)
 
 
 class Rehearsal(Recorder):
-    """A recorder whose frames pass at most one rehearsed fault first; arguments as ``Recorder``."""
+    """A recorder that alters received frames by at most one fault; arguments as ``Recorder``."""
 
     def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
         super().__init__(gated, controller, ring)
@@ -49,26 +50,30 @@ class Rehearsal(Recorder):
 
     def _begin(self, fault: Fault, phase: str = ARMED) -> None:
         self._fault, self._phase, self._why = fault, phase, ""
-        # When the phase began, its client has asked last, its axis did not move last.
+        # Time when the phase began, of the client's last request, when no axis of it last moved.
         self._since_ns = self._asked_ns = self._still_ns = self._now_ns
-        self._made_ns: int | None = None  # when the first input was another one
-        self._neutral_ms: float | None = None  # after that
+        self._made_ns: int | None = None  # when the first input was altered
+        self._neutral_ms: float | None = None  # time from then until neutral
         self._tick = self._missed = 0
-        self._applied: dict[str, float] = {}  # what frames that passed have asked for
+        self._applied: dict[str, float] = {}  # demands of frames that passed
         self._events: list[list[object]] = []
-        self._spoken = False  # the sender of what ends it has sent the same message itself
+        self._spoken = False  # the real sender has sent the message of ``end``
 
-    # -- what a client asks ----------------------------------------------------------------------
+    # -- requests of a client ---------------------------------------------------------------------
 
     def rehearse(self, what: object, who: str) -> Mapping[str, Any]:
-        """Begin a fault by its name, or say what has become of it.
+        """Arm a fault by its name, or report on the armed one.
 
         Args:
-            what: name of a fault, ``report`` or ``end``; who asks nothing for some seconds is gone.
-            who: who asks, for the log.
+            what: name of a fault, ``report`` or ``end``. A client that asks nothing for some
+                seconds counts as gone, which ends the fault.
+            who: text that names the client in the log.
+
+        Returns:
+            Phase of the fault, whether it was made, time until neutral, events, why it ended.
 
         Raises:
-            ValueError: why it cannot be; nothing has changed.
+            ValueError: the fault cannot be armed; no state has changed.
         """
         if what == "end":
             self._end("ended by its client", stops=True)
@@ -100,11 +105,11 @@ class Rehearsal(Recorder):
         self._begin(faults[name])
 
     def reloads(self) -> None:
-        """End what is rehearsed: another controller follows."""
+        """End the fault, because a reload replaces the controller."""
         self._end("the file was read again")
 
     def _end(self, why: str, *, stops: bool = False) -> None:
-        """From now on every frame passes as it is; ``stops``: what moves trips."""
+        """End the fault: every frame now passes unchanged; ``stops``: axes that move trip."""
         if self._phase not in (ARMED, MADE):
             return
         if self._phase == MADE and self._fault.end and not self._spoken:
@@ -117,7 +122,7 @@ class Rehearsal(Recorder):
     # -- frames and ticks ------------------------------------------------------------------------
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Take a frame from a bus, see ``GatedController``."""
+        """Receive a frame as the fault alters it; return the frame for the other bus, or None."""
         fault = self._fault
         if self._phase == DONE:
             return super().receive(frame, now_ns)
@@ -141,15 +146,15 @@ class Rehearsal(Recorder):
             log.warning("fault=over name=%s the joystick is not followed: it trips", fault.name)
             self.stalled()
         if passed is not None and self._phase == MADE and fault.unsent:
-            self.send_failed(passed)  # of a gateway
+            self.send_failed(passed)  # a gateway forwards it
         return passed
 
     def _holds_more(self, asked: Asked, now_ns: int) -> bool:
-        """Whether the controller goes by more than a frame asks for."""
+        """Return whether the controller holds a larger demand than that of a frame."""
         return bool(asked) and takes_back(asked, self._demands.held(self._controller, now_ns))
 
     def _runs(self, asked: Asked) -> bool:
-        """Whether an axis runs out against what a frame asks for, in a stop."""
+        """Return whether an axis, in a stop, runs out against the demand of a frame."""
         keys, axes = self._demands.keys, self._controller.axes
         stopping = {n: one.axis for n, one in axes.items() if one.axis.state is State.STOPPING}
         return any(
@@ -157,7 +162,7 @@ class Rehearsal(Recorder):
         )
 
     def _altered(self, frame: Frame, asked: Asked) -> tuple[Frame, ...]:
-        """Return the frames to receive in place of a frame: none asks for more than it does."""
+        """Return the frames to receive instead of a frame; none demands more than it."""
         if self._fault.once and self._made_ns is not None:
             return (frame,)
         altered = self._fault.alter(frame)
@@ -165,7 +170,7 @@ class Rehearsal(Recorder):
         return altered if less else (frame,)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """Run one tick, and yield the frames to send now; see ``Controller``."""
+        """Run one tick unless the fault makes it late, and yield the frames to send now."""
         self._now_ns = now_ns
         if self._phase == DONE:
             yield from super().tick(now_ns, missed)
@@ -188,12 +193,12 @@ class Rehearsal(Recorder):
         self._look(now_ns)
 
     def _made(self, now_ns: int) -> None:
-        """Note when something was first other than on the bus."""
+        """Note the time of the first altered input."""
         if self._made_ns is None:
             self._made_ns = now_ns
 
     def _step(self, now_ns: int) -> None:
-        """Go on to the next phase, where it is time."""
+        """Enter the next phase if it is time."""
         lasted_ns = now_ns - self._since_ns
         if self._phase == OVER:
             stops = any(event[2] in STOPS for event in self._events)
@@ -210,7 +215,7 @@ class Rehearsal(Recorder):
             self._end("its time is over")
 
     def _held(self, now_ns: int) -> bool:
-        """Whether it is to be made now: its axis moves as announced, or all are at rest."""
+        """Return whether to make the fault now: an axis of it has moved, or all are at rest."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
         if not any(one.state is State.ACTIVE and abs(one.demand) >= LEAST_DEMAND for one in axes):
             self._still_ns = now_ns
@@ -225,7 +230,7 @@ class Rehearsal(Recorder):
             self._made(now_ns)
 
     def _look(self, now_ns: int) -> None:
-        """Note what has changed since the fault was made, and when its valves are neutral."""
+        """Note the events since the fault was made, and when its valves are neutral."""
         if self._made_ns is None:
             return
         since_ms = (now_ns - self._made_ns) / MS
@@ -240,6 +245,6 @@ class Rehearsal(Recorder):
 
     @property
     def _neutral(self) -> bool:
-        """Whether the valves of its axes are neutral, and stay so."""
+        """Whether the valves of its axes are neutral and stay neutral."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
         return all(one.neutral and not one.output.steps for one in axes)
