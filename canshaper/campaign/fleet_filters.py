@@ -1,4 +1,4 @@
-"""Candidates of a design for a fleet: a filter of each swinging axis, of one kind."""
+"""Candidates of a design for a fleet: filters of one kind, one for each swinging axis."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ class Candidate(NamedTuple):
     """Filters of all swinging axes.
 
     Attributes:
-        kind: of them, robust or gff.
-        low, high: pendulums that they cover, as parts of the lengths in the file.
-        duration_s: of their impulse responses; of G_FF until a step has settled to 5 %.
+        kind: robust or gff.
+        low, high: shortest and longest pendulum they cover, as parts of the length in the file.
+        duration_s: length of the impulse response; of G_FF the time until a step settles to 5 %.
     """
 
     kind: str
@@ -33,13 +33,13 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True)
 class FleetFilter:
-    """Filter of an axis.
+    """Designed filter of an axis.
 
     Attributes:
-        axis: its name.
-        section: its section of the file.
-        sway: keys of the swing that it is for.
-        tail_s: longer tail than that of the file.
+        axis: name of the axis.
+        section: its section ``filter``.
+        sway: keys of its section ``sway`` that the filter was designed for.
+        tail_s: tail that the filter needs; None where that of the file is long enough.
     """
 
     axis: str
@@ -49,10 +49,10 @@ class FleetFilter:
 
 
 def swinging(deployment: Deployment) -> dict[str, Sway]:
-    """Axes that are designed, with their sway data.
+    """Return the axes with sway data, and the data.
 
     Raises:
-        DesignError: there is none, or one has more than one filter.
+        DesignError: no axis has any, or one has several filters.
     """
     axes = {}
     for name, axis in deployment.axes.items():
@@ -70,7 +70,7 @@ def designed(deployment: Deployment, name: str, candidate: Candidate) -> FleetFi
     """Design the filter of an axis.
 
     Raises:
-        InfeasibleError: no poles keep its run-on.
+        InfeasibleError: no filter keeps the run-on of the candidate.
     """
     config = deployment.axes[name].config
     assert config.sway
@@ -94,7 +94,7 @@ def designed(deployment: Deployment, name: str, candidate: Candidate) -> FleetFi
 
 
 def fitted(deployment: Deployment, filters: Sequence[FleetFilter]) -> Deployment:
-    """The machine with these filters, and with the swing that they are for."""
+    """Return the machine with these filters and with the sway data that they were designed for."""
     axes = dict(deployment.axes)
     for one in filters:
         config = axes[one.axis].config

@@ -1,4 +1,4 @@
-"""A design for a fleet, printed, drawn, and written into the file."""
+"""Print, draw and write a design for a fleet."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def table(asked: Driven, rows: Rows) -> Table:
-    """Swing left by each row, in degrees; its lengths are parts of those in the file."""
+    """Return the table: residual swing of each row, deg; lengths are parts of those in the file."""
     made = new_table("left, deg", "run-on, s", "lengths", "worst 5 %", "p50", "p99")
     for name, row in ((name, row) for name, own in rows.items() for row in own):
         of = row.candidate
@@ -36,7 +36,7 @@ def table(asked: Driven, rows: Rows) -> Table:
 
 
 def verdict(asked: Driven, rows: Rows) -> str:
-    """How much less the worst drives leave than with the others, and which drives those are."""
+    """Return the text that compares the worst drives of the design with those of the others."""
     chosen, count = asked.worst_deg, len(asked.left_deg)
     named = {FILE: "the file", BOX: "a box of all lengths", OTHER: "robust shapers for the fleet"}
     left = {name: [row.worst_deg for row in rows[name]] for name in named}
@@ -50,7 +50,7 @@ def verdict(asked: Driven, rows: Rows) -> str:
 
 
 def write_fleet(deployment: Deployment, filters: Sequence[FleetFilter], verb: str) -> list[str]:
-    """Write filters of several axes into the file, all or none; return changed lines and notes."""
+    """Write the filters into the file, all or none; return the changed lines and the notes."""
     changes, notes = list[Change](), list[str]()
     for one in filters:
         gone = dict.fromkeys(deployment.axes[one.axis].config.filter.model_dump(exclude_none=True))
@@ -62,7 +62,7 @@ def write_fleet(deployment: Deployment, filters: Sequence[FleetFilter], verb: st
 
 
 def figure(rows: Rows) -> "Figure":
-    """The front of run-on against what the worst drives leave."""
+    """Return the picture: residual swing of the worst drives against run-on."""
     from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, new_figure  # noqa: PLC0415
 
     drawn = new_figure(700, 450)

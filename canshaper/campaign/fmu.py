@@ -1,4 +1,4 @@
-"""The simulated crane in C as a co-simulation unit, for another's controller or operator."""
+"""The simulated crane in C as a co-simulation unit, for the controller of another tool."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,7 +25,8 @@ def plant_unit(deployment: Deployment) -> Unit:
     """Return the simulated crane of a deployment as a unit.
 
     Raises:
-        ConfigError: the C has no part for something of it.
+        ConfigError: there are several cranes, or one that the C does not support: one with
+            joints or a rope, a slope, wind or too little oil.
     """
     crane, axes = changed_parameters([], deployment), deployment.by_coordinate
     moves_tip = not {*deployment.coordinates.values()} - {*TIP_AXES}

@@ -1,4 +1,4 @@
-"""Figures of many drives, and how sure they are: no distribution is assumed of anything."""
+"""Statistics of many drives, with confidence bounds that assume no distribution."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,18 +9,18 @@ import numpy as np
 from scipy import stats
 
 CONFIDENCE = 0.95
-# A factor is cut into so many parts, with as many drives each, to see what it explains.
+# The range of a factor is divided into so many parts, each with the same number of drives.
 _PARTS = 10
 
 
 @dataclass(frozen=True)
 class Quantile:
-    """A quantile of a measure, with the bounds that hold for its true value.
+    """A quantile of a measure, with the confidence bounds of its true value.
 
     Attributes:
-        value: of the drives that were made.
-        low: the true one is not below; None where there are too few drives to say.
-        high: nor above; the same.
+        value: quantile of the drives.
+        low: lower bound; None where the drives are too few for one.
+        high: upper bound; None where the drives are too few for one.
     """
 
     value: float
@@ -29,12 +29,14 @@ class Quantile:
 
 
 def quantile(values: Sequence[float], share: float, confidence: float = CONFIDENCE) -> Quantile:
-    """Quantile by order statistics: the number of drives below the true one is binomial.
+    """Return a quantile with its bounds by order statistics.
+
+    The number of drives below the true quantile has a binomial distribution.
 
     Args:
-        values: one a drive, in any order.
-        share: which quantile, such as 0.99.
-        confidence: that the true one lies between the bounds, at least.
+        values: one value for each drive, in any order.
+        share: the quantile, such as 0.99.
+        confidence: least probability that the true quantile lies between the bounds.
 
     Raises:
         ValueError: there are no values.
@@ -54,14 +56,14 @@ def quantile(values: Sequence[float], share: float, confidence: float = CONFIDEN
 
 
 def most_of(events: int, count: int, confidence: float = CONFIDENCE) -> float:
-    """Largest share of all drives that may have an event (one-sided, Clopper and Pearson).
+    """Return the largest share of all drives that may have an event (Clopper-Pearson, one-sided).
 
-    Without any event it is 1 - (1 - confidence)^(1 / count), for .95 nearly 3 / count.
+    Without an event it is 1 - (1 - confidence)^(1 / count): nearly 3 / count for 0.95.
 
     Args:
-        events: drives that had it.
-        count: drives that were made.
-        confidence: that the true share is not larger.
+        events: number of drives with the event.
+        count: number of drives.
+        confidence: probability that the true share is not larger.
     """
     if events >= count:
         return 1.0
@@ -73,10 +75,10 @@ class Influence:
     """Influence of one factor on a measure.
 
     Attributes:
-        name: the factor.
-        explained: part of the variance of the measure's ranks that it explains by itself, whatever
-            the shape; corrected for chance.
-        trend: Spearman's rank correlation, whose sign says the direction; None of a word.
+        name: name of the factor.
+        explained: part of the variance of the measure's ranks that the factor alone explains, by a
+            relation of any shape; corrected for chance.
+        trend: Spearman's rank correlation; its sign is the direction. None for a factor of words.
     """
 
     name: str
@@ -87,11 +89,11 @@ class Influence:
 def influences(
     factors: Mapping[str, Sequence[Any]], measure: Sequence[float | None]
 ) -> list[Influence]:
-    """Factors by what they explain of a measure, the largest first.
+    """Return the factors, ordered by how much of a measure they explain.
 
     Args:
-        factors: of each factor a number or a word for every drive.
-        measure: of every drive; those without one are left out.
+        factors: by the name of the factor a number or a word for each drive.
+        measure: the measure of each drive; a drive with None is left out.
     """
     keep = [k for k, value in enumerate(measure) if value is not None]
     if len(keep) < 2 * _PARTS:

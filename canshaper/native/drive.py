@@ -1,6 +1,6 @@
-"""A random drive of any deployment: joystick frames, most of them good, some wrong in every way.
+"""A random drive of any deployment: joystick frames, most of them good, some with a fault.
 
-It needs no simulated crane. The same seed gives the same drive.
+The drive needs no simulated crane. The same seed gives the same drive.
 """
 
 import random
@@ -15,21 +15,21 @@ from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
 from canshaper.protocols.interface import MessageKey
 
-# A thousandth of a tick: a frame is read a little later than it arrives.
+# Time from the arrival of a frame to the next tick.
 READ_NS = 1_000
 BEGIN_NS = 1_000_000_000
 
 
 @dataclass
 class Tick:
-    """One tick of a drive: what has come since the one before.
+    """One tick of a drive: what happened since the tick before.
 
     Attributes:
-        now_ns: its time.
-        missed: ticks that were left out before it.
-        frames: what arrived, in order, each ``READ_NS`` before the tick.
-        stalled: the loop stood still before it.
-        failed: frame of a valve that did not leave in the tick before, or None.
+        now_ns: time of the tick.
+        missed: number of ticks that were left out before it.
+        frames: received frames in order, each ``READ_NS`` before the tick.
+        stalled: the loop stood still before the tick.
+        failed: valve frame of the tick before that could not be sent, or None.
     """
 
     now_ns: int
@@ -41,12 +41,12 @@ class Tick:
 
 @dataclass
 class _Hand:
-    """An operator's hand on one joystick, and what its sender is at."""
+    """An operator's hand on one joystick, and the state of the joystick's sender."""
 
     wanted: dict[str, float]
     held: dict[str, float] = field(default_factory=dict)
-    silent: int = 0  # messages that are still left out
-    resting: int = 0  # ticks in neutral after a tap
+    silent: int = 0  # number of messages still to leave out
+    resting: int = 0  # ticks still to rest in neutral
     count: int = 0
     enable: int = 1
     reset: int = 0
@@ -54,23 +54,23 @@ class _Hand:
 
 
 class Driven(Protocol):
-    """A controller, in whatever language."""
+    """A controller in any language."""
 
     def stalled(self) -> None:
-        """Take note that the loop stood still."""
+        """Note that the loop stood still."""
 
     def send_failed(self, frame: Frame, /) -> None:
-        """Take note that a frame of a valve did not leave."""
+        """Note that a valve frame could not be sent."""
 
     def receive(self, frame: Frame, now_ns: int, /) -> object:
-        """Take a frame that was received."""
+        """Take a received frame."""
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]:
         """Return the frames to send now."""
 
 
 def play(tick: Tick, controller: Driven) -> list[Frame]:
-    """Give a tick of a drive to a controller, and return the frames that leave."""
+    """Give a tick of a drive to a controller; return the frames that it sends."""
     if tick.stalled:
         controller.stalled()
     if tick.failed is not None:
@@ -81,7 +81,7 @@ def play(tick: Tick, controller: Driven) -> list[Frame]:
 
 
 def valve_keys(deployment: Deployment) -> list[MessageKey]:
-    """Bus and id of each valve message, in the order of their axes."""
+    """Return bus and id of each valve message, in the order of the axes."""
     return list(dict.fromkeys(axis.valve.message.key for axis in deployment.axes.values()))
 
 
@@ -90,8 +90,8 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
 
     Args:
         deployment: the machine.
-        seed: of the drive.
-        ticks: how many.
+        seed: seed of the drive.
+        ticks: number of ticks.
     """
     source = random.Random(seed)
     tick_ns = deployment.config.tick_ms * 1_000_000
@@ -126,13 +126,13 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
 
 
 def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -> list[Frame]:
-    """Frames of one joystick in a tick: one, none or two."""
+    """Return the frames of one joystick in a tick: none, one or two."""
     config = bound.config
     if hand.silent > 0:
         hand.silent -= 1
         return []
     hand.count += 1
-    if source.random() < 0.001:  # what the switches do meanwhile is not seen
+    if source.random() < 0.001:  # the switches change while no message comes
         hand.silent, hand.enable = source.randint(1, 15), source.choice((0, 1, 1))
         hand.count += source.randint(0, 9)
         return []
@@ -148,7 +148,7 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
     hand.reset ^= source.random() < 0.01
     raw: dict[str, Any] = {}
     for one in bound.velocities:
-        assert isinstance(one, VelocitySignal)  # no other one is exported
+        assert isinstance(one, VelocitySignal)  # an export has no other kind
         signal = bound.message.get_signal_by_name(one.name)
         raw[one.name] = round((hand.held[one.name] * one.full - one.offset) / one.scale)
         if source.random() < 0.001:
@@ -167,7 +167,7 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
 
 
 def _move(source: random.Random, hand: _Hand) -> None:
-    """Move a joystick as an operator does: strokes, taps with a pause behind them, a jerk."""
+    """Move a joystick as an operator does: strokes, taps with a pause after them, a jerk."""
     hand.resting = max(0, hand.resting - 1)
     if source.random() < 0.004:
         hand.resting = source.randint(20, 150)
@@ -183,13 +183,13 @@ def _move(source: random.Random, hand: _Hand) -> None:
 
 
 def _frame(bound: BoundInput, raw: dict[str, Any]) -> Frame:
-    """A frame of a message; signals that are not given are 0."""
+    """Return a frame of a message; signals without a value are 0."""
     whole = dict.fromkeys((signal.name for signal in bound.message.signals), 0)
     return Frame(*bound.key, bound.layout.encode(whole | raw))
 
 
 def _strange_frames(source: random.Random, deployment: Deployment) -> list[Frame]:
-    """Frames that no one knows; and seldom one with the id of a valve."""
+    """Return frames with unknown ids; seldom one with the id of a valve message."""
     frames, bus = [], next(iter(deployment.config.buses))
     if source.random() < 0.01:
         frames.append(Frame(bus, source.randint(0x500, 0x6FF), False, source.randbytes(8)))

@@ -72,13 +72,13 @@ def export(deployment: Deployment, out: Path, *, single: bool) -> list[str]:
     Args:
         deployment: the machine.
         out: a folder that is new or empty.
-        single: in ``float``; it needs a C compiler here.
+        single: export in ``float`` instead of ``double``; this needs a C compiler here.
 
     Returns:
-        What was written, for a person.
+        Lines for the user: its precision, and how to run the self-test.
 
     Raises:
-        ConfigError: the C has no part for something, or ``canshaper run`` would not begin.
+        ConfigError: the C does not support something, or ``canshaper run`` would not start.
         NativeError: ``single``, and the C cannot be compiled here.
         UsageError: the folder has files.
     """
@@ -106,10 +106,10 @@ def export(deployment: Deployment, out: Path, *, single: bool) -> list[str]:
 
 
 def check_exported(deployment: Deployment, out: Path) -> None:
-    """Look whether a deployment may be exported into a folder.
+    """Check that a deployment may be exported into a folder.
 
     Raises:
-        ConfigError: ``canshaper run`` would not begin.
+        ConfigError: ``canshaper run`` would not start.
         UsageError: the folder has files.
     """
     faults = [*unstated(deployment), *rehearsed_valves(deployment.config)]
@@ -140,7 +140,7 @@ def _readme(deployment: Deployment, numbers: Numbers, golden: Golden, precision:
 
 
 def _bill(deployment: Deployment, out: Path) -> str:
-    """Return the bill of a folder, CycloneDX 1.6: deployment, program, and every file of it."""
+    """Return the bill of materials of a folder, CycloneDX 1.6: deployment, program, every file."""
     identity = deployment.identity
     made_of = {deployment.path.name: identity.deployment, **identity.dbc}
     for path in sorted(one for one in out.rglob("*") if one.is_file()):

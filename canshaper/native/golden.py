@@ -1,4 +1,4 @@
-"""The golden drive of an export: a drive, and what has to come out of it, as C source."""
+"""The golden drive of an export: a drive and its expected frames and states, as C source."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -13,21 +13,21 @@ from canshaper.native.source import real
 from canshaper.native.states import NAMES, rows
 
 TICKS, EVERY = 500, 25
-# Of so many drives the one with the most states and reasons.
+# The golden drive is the one of so many with the most states and reasons.
 SEEDS = 12
-PROBES = 16  # of atan2, which libraries round differently
+PROBES = 16  # of atan2: libraries round it differently
 Row = list[float]
 
 
 @dataclass
 class Golden:
-    """A drive with what came out of it.
+    """A drive with its frames and states.
 
     Attributes:
         ticks: the drive.
-        sent: frames of the valves, by tick.
+        sent: valve frames, by tick.
         rows: inner states after every ``EVERY``-th tick.
-        seen: states of axes with their reasons.
+        seen: pairs of state and reason that an axis had.
     """
 
     ticks: list[Tick]
@@ -37,7 +37,7 @@ class Golden:
 
 
 def golden_drive(deployment: Deployment) -> Golden:
-    """Return the drive of ``SEEDS`` that shows most of the controller, as the controller drives."""
+    """Return the one of ``SEEDS`` drives that shows most states, with the controller's frames."""
 
     def driven(seed: int) -> Golden:
         controller = Controller(deployment.unreported)
@@ -48,7 +48,7 @@ def golden_drive(deployment: Deployment) -> Golden:
 
 
 def in_float(deployment: Deployment, golden: Golden) -> tuple[Golden, int]:
-    """Return the same drive as the C computes it in float here, and how many frames differ.
+    """Return the same drive as the C computes it in float, and the number of frames that differ.
 
     Raises:
         NativeError: the C cannot be compiled here.

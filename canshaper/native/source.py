@@ -1,11 +1,11 @@
-"""Constant tables as C source, exact to the last bit, and the sizes of what changes."""
+"""Constant tables as C source, exact to the last bit, and the sizes of the state."""
 
 import math
 from typing import Any
 
 from canshaper.native.tables import Numbers
 
-# Members that point to an array, and what is in it.
+# Members that point to an array, and the type of its elements.
 ARRAYS = {
     "joystick": "cs_joystick_config",
     "valve": "cs_valve_config",
@@ -29,7 +29,7 @@ const cs_config cs_tables = {};
 
 
 def sizes_source(tables: Numbers) -> str:
-    """Return ``cs_sizes.h``: how much room the state needs."""
+    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
     axes = tables["axis"]
     sizes = {
         "CS_JOYSTICKS": len(tables["joystick"]),
@@ -52,7 +52,7 @@ def tables_source(tables: Numbers) -> str:
 
 
 def _value(one: Any, key: str = "") -> str:
-    """A number, struct or array as an initialiser; what is 0 is left out of a struct."""
+    """Return a number, struct or array as an initialiser; a struct omits members that are 0."""
     if isinstance(one, dict):
         members = [
             f".{name} = {_value(value, name)}"
@@ -70,7 +70,7 @@ def _value(one: Any, key: str = "") -> str:
 
 
 def real(value: float) -> str:
-    """A number of the C, exact; ``R`` makes it one of its precision."""
+    """Return a number as exact C; the macro ``R`` converts it to the precision of the build."""
     if math.isinf(value):
         return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
     return f"R({value.hex()})"

@@ -1,4 +1,4 @@
-"""The inner state of the controller as rows of numbers, in the order of ``c/cs_inspect.c``."""
+"""Inner state of the controller as rows of numbers, in the order of ``c/cs_inspect.c``."""
 
 from canshaper.controller.controller import Controller
 from canshaper.controller.motion import MotionRunner
@@ -16,12 +16,12 @@ NAMES = (
     "recent_low", "recent_high", "demanded_low", "demanded_high", "added",
 )
 # fmt: on
-# The C counts ticks no further, so that a machine may rest for years.
+# The C stops counting ticks here: no counter overflows while a machine rests for years.
 MOST_TICKS = 1_000_000_000
 
 
 def rows(controller: Controller) -> list[list[float]]:
-    """Return a row for each axis, then one for each motion."""
+    """Return one row for each axis, then one for each motion."""
     return [*map(_axis_row, controller.axes.values()), *map(_motion_row, controller.motions)]
 
 
