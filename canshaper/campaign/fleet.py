@@ -7,17 +7,23 @@ the least mean residual swing over its worst twentieth: this mean needs fewer dr
 percentile, and falls with it. Other drives, which chose no candidate, judge the best one.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache, partial
 
 from canshaper.campaign.draw import Setting, draw_drive
-from canshaper.campaign.fleet_filters import (
+from canshaper.campaign.fleet_candidates import (
+    BOX,
+    CHOOSING,
+    FILE,
+    FLEET,
     GFF,
+    JUDGING,
+    OTHER,
     ROBUST,
     Candidate,
+    Driven,
     FleetFilter,
+    Rows,
     designed,
     fitted,
     swinging,
@@ -32,11 +38,6 @@ from canshaper.report.console import OnProgress
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 
-# Seeds of the drives that choose a candidate, and of those that judge it; a campaign begins at 0.
-CHOOSING = range(1_000_000, 1_000_400)
-JUDGING = range(2_000_000, 2_001_000)
-# Share of the drives that count as the worst.
-_WORST = 0.05
 # Option of the command line that sets the run-on.
 _OPTIONS = {ROBUST: "--duration", GFF: "--max-run-on"}
 # Candidates: middle, 0 at the shortest length and 1 at the longest, and half the range as a part of
@@ -47,36 +48,6 @@ _BEFORE = 0.9  # of dwell_s: what runs on longer is counted as residual swing
 _DURATIONS = (0.8, 0.9, 1.0, 1.1, 1.2)  # run-ons of the front, of the one asked for
 
 
-@dataclass(frozen=True)
-class Driven:
-    """Drives of a candidate.
-
-    Attributes:
-        candidate: the candidate; None for the file as it is.
-        filters: one for each swinging axis.
-        left_deg: residual swing of each drive; its largest swing where the grapple swung over.
-        run_on_s: run-on of each drive, until the tip stands.
-        why: why no filters meet the candidate, which then has no drives; "" where they do.
-    """
-
-    candidate: Candidate | None
-    filters: Sequence[FleetFilter] = ()
-    left_deg: list[float] = field(default_factory=list)
-    run_on_s: list[float] = field(default_factory=list)
-    why: str = ""
-
-    @property
-    def worst_deg(self) -> float:
-        """Mean residual swing of the worst drives."""
-        count = math.ceil(_WORST * len(self.left_deg))
-        return math.fsum(sorted(self.left_deg)[-count:]) / count
-
-
-FILE, BOX, FLEET, OTHER = "the file", "box of lengths", "for the fleet", "fleet, robust"
-Rows = Mapping[str, Sequence[Driven]]
-"""Rows of the table by name: the file, the box of all lengths, the best candidate of each run-on,
-and for G_FF the best robust shapers. A row may be empty.
-"""
 Known = Mapping[Candidate | None, Sequence[FleetFilter]]
 
 
@@ -181,12 +152,7 @@ def _lengths(deployment: Deployment) -> tuple[float, float]:
     return min(lengths), max(lengths)
 
 
-def _driven(
-    source: Source,
-    seeds: range,
-    known: Known,
-    candidate: Candidate | None,
-) -> Driven:
+def _driven(source: Source, seeds: range, known: Known, candidate: Candidate | None) -> Driven:
     """Drive a candidate; design its filters first where ``known`` lacks them."""
     deployment, filters = source.load(), known.get(candidate)
     if candidate:

@@ -7,7 +7,7 @@ from canshaper.campaign.native import grapple_numbers, is_simple, steps_of, valv
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.fmu import Unit, Variable
-from canshaper.native.source import real
+from canshaper.native.library import real
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW, TIP_AXES
 from canshaper_sim.cranes import cranes
 from canshaper_sim.parameters import changed_parameters

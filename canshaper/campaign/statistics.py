@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from canshaper.config.uncertainty import MEASURES, QUANTILES
+
+Columns = Mapping[str, Sequence[Any]]
+"""A value of each drive, by the name of its column."""
 CONFIDENCE = 0.95
 # The range of a factor is divided into so many parts, each with the same number of drives.
 _PARTS = 10
@@ -26,6 +30,11 @@ class Quantile:
     value: float
     low: float | None
     high: float | None
+
+    def __str__(self) -> str:
+        """Return the value with its bounds; "?" for a missing one."""
+        low, high = ("?" if bound is None else f"{bound:.3g}" for bound in (self.low, self.high))
+        return f"{self.value:.3g} ({low}..{high})"
 
 
 def quantile(values: Sequence[float], share: float, confidence: float = CONFIDENCE) -> Quantile:
@@ -53,6 +62,11 @@ def quantile(values: Sequence[float], share: float, confidence: float = CONFIDEN
         ordered[lower - 1] if lower >= 1 else None,
         ordered[upper - 1] if upper <= count else None,
     )
+
+
+def named_quantiles(values: Sequence[float]) -> dict[str, Quantile]:
+    """Return the quantiles of a measure that a campaign states, by name."""
+    return {name: quantile(values, share) for name, share in QUANTILES.items()}
 
 
 def most_of(events: int, count: int, confidence: float = CONFIDENCE) -> float:
@@ -123,3 +137,43 @@ def _influence(name: str, column: Sequence[Any], ranks: Any) -> Influence | None
     free, parts = len(ranks) - 1, int(used.sum())
     within = (total - between) / (free + 1 - parts)
     return Influence(name, max(0.0, 1.0 - within * free / total), trend)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One measure of two files, over the same drives.
+
+    Attributes:
+        first: quantiles of the first file.
+        second: quantiles of the second file.
+        better: of the drives that differ, the share in which the second file has less.
+        median: median of the second less the first, drive by drive.
+    """
+
+    first: Mapping[str, Quantile]
+    second: Mapping[str, Quantile]
+    better: float
+    median: Quantile
+
+
+def differences(first: Columns, second: Columns) -> dict[str, Difference]:
+    """Compare the measures of two files over the drives without a fault that both have."""
+    rows = [
+        {seed: k for k, seed in enumerate(one["seed"]) if not one["fault"][k]}
+        for one in (first, second)
+    ]
+    both = sorted(rows[0].keys() & rows[1].keys())
+    by_measure = {}
+    for measure in MEASURES:
+        pairs = [(first[measure][rows[0][s]], second[measure][rows[1][s]]) for s in both]
+        pairs = [(a, b) for a, b in pairs if a is not None and b is not None]
+        if not pairs:
+            continue
+        ones, others = zip(*pairs, strict=True)
+        differ = [b - a for a, b in pairs]
+        unequal = [one for one in differ if one]
+        better = sum(one < 0.0 for one in unequal) / len(unequal) if unequal else 0.0
+        by_measure[measure] = Difference(
+            named_quantiles(ones), named_quantiles(others), better, quantile(differ, 0.5)
+        )
+    return by_measure

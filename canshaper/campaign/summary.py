@@ -9,16 +9,17 @@ from rich.table import Table
 
 from canshaper.campaign.statistics import (
     CONFIDENCE,
+    Columns,
+    Difference,
     Influence,
     Quantile,
     influences,
     most_of,
-    quantile,
+    named_quantiles,
 )
-from canshaper.config.uncertainty import MEASURES, QUANTILES
+from canshaper.config.uncertainty import MEASURES
 from canshaper.report.console import new_table
 
-Columns = Mapping[str, Sequence[Any]]
 # Columns that are not drawn.
 _OUTCOMES = ("seed", *MEASURES, "raw_deg", "broken", "why", "swung_over", "fault", "engine")
 WORST = 10
@@ -125,14 +126,14 @@ def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
     faults = columns["fault"]
     sound = _where(columns, [not fault for fault in faults])
     faulty = _where(columns, [bool(fault) for fault in faults])
-    quantiles = _quantiles(sound)
+    of_sound = _quantiles(sound)
     broken = [k for k, count in enumerate(columns["broken"]) if count]
     engines = dict(Counter(columns["engine"]))
     drives = len(columns["seed"]) - engines.get("native", 0)
     why = f"drive {columns['seed'][broken[0]]} at {columns['why'][broken[0]]}" if broken else ""
     factors = {name: column for name, column in sound.items() if name not in _OUTCOMES}
     return Summary(
-        quantiles,
+        of_sound,
         _quantiles(faulty),
         {
             "without_fault": len(sound["seed"]),
@@ -144,7 +145,7 @@ def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
         _worse(sound),
         {measure: influences(factors, sound[measure]) for measure in MEASURES},
         worst(sound),
-        [_verdict(key, limit, quantiles) for key, limit in accept.items()],
+        [_verdict(key, limit, of_sound) for key, limit in accept.items()],
     )
 
 
@@ -169,12 +170,8 @@ def _where(columns: Columns, keep: Sequence[bool]) -> dict[str, list[Any]]:
 
 def _quantiles(columns: Columns) -> dict[str, dict[str, Quantile]]:
     """Return the quantiles by measure and name; leave out a measure that no drive has."""
-    quantiles = {}
-    for measure in MEASURES:
-        values = [value for value in columns[measure] if value is not None]
-        if values:
-            quantiles[measure] = {name: quantile(values, part) for name, part in QUANTILES.items()}
-    return quantiles
+    had = {one: [value for value in columns[one] if value is not None] for one in MEASURES}
+    return {measure: named_quantiles(values) for measure, values in had.items() if values}
 
 
 def worst(columns: Columns) -> list[dict[str, Any]]:
@@ -194,48 +191,6 @@ def _verdict(key: str, limit: float, quantiles: Mapping[str, Mapping[str, Quanti
     return Verdict(key, limit, one, one.high is not None and one.high <= limit)
 
 
-@dataclass(frozen=True)
-class Difference:
-    """One measure of two files, over the same drives.
-
-    Attributes:
-        first: quantiles of the first file.
-        second: quantiles of the second file.
-        better: of the drives that differ, the share in which the second file has less.
-        median: median of the second less the first, drive by drive.
-    """
-
-    first: Mapping[str, Quantile]
-    second: Mapping[str, Quantile]
-    better: float
-    median: Quantile
-
-
-def differences(first: Columns, second: Columns) -> dict[str, Difference]:
-    """Compare the measures of two files over the drives without a fault that both have."""
-    rows = [
-        {seed: k for k, seed in enumerate(one["seed"]) if not one["fault"][k]}
-        for one in (first, second)
-    ]
-    both = sorted(rows[0].keys() & rows[1].keys())
-    by_measure = {}
-    for measure in MEASURES:
-        pairs = [(first[measure][rows[0][s]], second[measure][rows[1][s]]) for s in both]
-        pairs = [(a, b) for a, b in pairs if a is not None and b is not None]
-        if not pairs:
-            continue
-        ones, others = zip(*pairs, strict=True)
-        differ = [b - a for a, b in pairs]
-        unequal = [one for one in differ if one]
-        by_measure[measure] = Difference(
-            {name: quantile(ones, part) for name, part in QUANTILES.items()},
-            {name: quantile(others, part) for name, part in QUANTILES.items()},
-            sum(one < 0.0 for one in unequal) / len(unequal) if unequal else 0.0,
-            quantile(differ, 0.5),
-        )
-    return by_measure
-
-
 _SHOWN = ("p50", "p95", "p99")
 _INFLUENCES = 5
 _SURE = f"{100 * CONFIDENCE:g} %"
@@ -251,7 +206,7 @@ def tables(summary: Summary) -> Iterator[Table]:
         if quantiles:
             drawn = new_table(f"{title}: {count} drives", *_SHOWN)
             for measure, one in quantiles.items():
-                drawn.add_row(measure, *(bounded(one[name]) for name in _SHOWN))
+                drawn.add_row(measure, *(str(one[name]) for name in _SHOWN))
             yield drawn
     if explained := summary.influences[FIRST]:
         drawn = new_table(f"what drives {FIRST}", "explains", "trend")
@@ -295,8 +250,7 @@ def lines(summary: Summary) -> Iterator[str]:
         verdict = "kept" if one.kept else "NOT SHOWN"
         if one.quantile.low is not None and one.quantile.low > one.limit:
             verdict = "EXCEEDED"
-        value = bounded(one.quantile)
-        yield f"accept.{one.key}: {value}, expected at most {one.limit:g}: {verdict}"
+        yield f"accept.{one.key}: {one.quantile}, expected at most {one.limit:g}: {verdict}"
 
 
 def difference_table(differences: Mapping[str, Difference]) -> Table:
@@ -307,13 +261,7 @@ def difference_table(differences: Mapping[str, Difference]) -> Table:
             measure,
             f"{one.first['p99'].value:.2f}",
             f"{one.second['p99'].value:.2f}",
-            bounded(one.median),
+            str(one.median),
             f"{100 * one.better:.0f} %",
         )
     return drawn
-
-
-def bounded(one: Quantile) -> str:
-    """Return a quantile with its bounds as text; "?" for a missing bound."""
-    low, high = ("?" if bound is None else f"{bound:.3g}" for bound in (one.low, one.high))
-    return f"{one.value:.3g} ({low}..{high})"

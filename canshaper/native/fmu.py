@@ -17,8 +17,14 @@ from xml.sax.saxutils import quoteattr
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.export import check_exported
-from canshaper.native.library import C_FILES, FLAGS, FMU_FILES, compile_library
-from canshaper.native.source import sizes_source, tables_source
+from canshaper.native.library import (
+    C_FILES,
+    FLAGS,
+    FMU_FILES,
+    compile_library,
+    sizes_source,
+    tables_source,
+)
 from canshaper.native.tables import tables
 from canshaper.shaping.states import Reason, State
 from canshaper.shipped import version

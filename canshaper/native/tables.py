@@ -2,8 +2,7 @@
 
 The numbers are read from the objects that the controller runs, so that no rule is computed twice.
 Every key of the file that the C does not support is refused, all in one error. Status messages,
-feedback of the valves and numbers that change at run time are left out: no valve frame depends on
-them.
+valve feedback and numbers that change at run time are left out: valve frames do not need them.
 """
 
 import math
@@ -151,8 +150,7 @@ def _unreadable(place: Place, message: Message, names: Iterable[str | None]) -> 
 
 
 def _field(message: Message, name: str | None) -> Numbers:
-    signal = find_signal(message, name) if name else None
-    if signal is None:
+    if not name or (signal := find_signal(message, name)) is None:
         return {}
     numbers = {n: getattr(signal, n) for n in ("start", "length", "is_signed")}
     return {**numbers, "motorola": signal.byte_order == "big_endian"}

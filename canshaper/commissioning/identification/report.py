@@ -10,7 +10,7 @@ from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.identification.series import Value
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.config.limits import Sway
-from canshaper.edit.edit import Change, FileValue, change, note
+from canshaper.edit.edit import Change, FileValue, change, flow, note
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import stop_fault
@@ -114,11 +114,6 @@ def headlines(findings: Sequence[Finding], advice: Sequence[Advice]) -> list[str
         if len(mine) != 1 or not mine[0].usable:
             texts.append(one.text)
     return texts
-
-
-def flow(values: SwayNumbers) -> str:
-    """The values as they stand in a deployment file."""
-    return "{ " + ", ".join(f"{k}: {v:g}" for k, v in values.items()) + " }"
 
 
 def lines(finding: Finding) -> list[str]:
