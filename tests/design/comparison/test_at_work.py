@@ -29,7 +29,7 @@ def run(monkeypatch: pytest.MonkeyPatch, deployment: Deployment, tmp_path: Path)
     comparison = "canshaper.design.comparison"
     monkeypatch.setattr(f"{comparison}.manoeuvres.candidates", lambda _: filters)
     monkeypatch.setattr(f"{comparison}.measure.measure_all", lambda *_, **_options: outcomes)
-    monkeypatch.setattr(f"{comparison}.limits.least", lambda _: [])
+    monkeypatch.setattr(f"{comparison}.summary.least", lambda _: [])
     monkeypatch.setattr("canshaper.cli.results.Results.picture", lambda *_: None)
     monkeypatch.setattr(work_results, "_SPEEDS", (1.0,))
     monkeypatch.setattr(work_results, "_CATCHES", (0.0,))
