@@ -21,6 +21,7 @@ from canshaper_sim.strokes import Script, Stroke
 from tests.cli.invocation import invoke
 from tests.closed_loop.test_twin import TIMINGS
 from tests.rigs.files import machine_file
+from tests.rigs.swing import crane_of
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n    limits: {"
@@ -141,8 +142,7 @@ def test_filters_are_compared_with_the_motion_on_both_or_off_both(name: str, mot
     if not motion:
         deployment = dataclasses.replace(deployment, motions={})
     recording = drive(deployment, SCRIPTS["demo"])
-    assert recording.crane is not None
-    crane = crane_metrics(recording, recording.crane)
+    crane = crane_metrics(recording, crane_of(recording))
     dips = [axis_metrics(recording, axis).dip or 0.0 for axis in ("slew", "near_far")]
     left, run_on_m, dip = ALIKE[name, motion]
     assert crane.residual_deg == pytest.approx(left, abs=0.05)
