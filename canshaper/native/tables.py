@@ -1,9 +1,8 @@
-"""From a deployment to the constant tables of the C in ``c/``: numbers only, no code.
+"""Constant tables of the C in ``c/`` from a deployment: numbers only, no code.
 
-The numbers are read off the objects that the controller runs, so that no rule is computed twice.
-What the C has no part for is refused by the key of the file, all of it at once. Status messages,
-feedback of the valves and numbers that may be changed at run time are left out: no valve frame
-hangs on them.
+The numbers are read from the objects that the controller runs, so that no rule is computed twice.
+Every key of the file that the C does not support is refused, all in one error. Status messages,
+valve feedback and numbers that change at run time are left out: valve frames do not need them.
 """
 
 import math
@@ -33,7 +32,7 @@ from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 from canshaper.shaping.transfer import Off
 
 Numbers = dict[str, Any]
-"""A struct of the tables, by the names of its members; of an absent member 0."""
+"""A struct of the tables: values by member; an absent member is 0."""
 Refusals = Iterator[tuple[Place, str]]
 _PROTECTED = ("checksum", "e2e", "multiplexor", "source")
 NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
@@ -48,7 +47,7 @@ NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
     ("motion", "*"): ("luffing",),
     ("motion", "*", "radius"): _PROTECTED,
 }
-"""Keys of the file for which the C has no part, by their sections."""
+"""Keys of the file that the C does not support, by their sections."""
 KINDS: dict[type, str] = {
     Off: "CS_OFF",
     Fir: "CS_FIR",
@@ -57,17 +56,17 @@ KINDS: dict[type, str] = {
     FirstOrder: "CS_FIRST_ORDER",
     SCurve: "CS_S_CURVE",
 }
-"""Filters of the C, by their classes here."""
-MOST_BITS = 24  # of a number in a frame: more is not exact in float
+"""Filters of the C, by their classes in Python."""
+MOST_BITS = 24  # most bits of a signal: more are not exact in float
 NONE = -1
-UNLIMITED_TICKS = 2_000_000_000  # more than the C ever counts
+UNLIMITED_TICKS = 2_000_000_000  # no limit: the C counts less
 
 
 def tables(deployment: Deployment) -> Numbers:
     """Return the tables of a deployment, as the struct ``cs_config``.
 
     Raises:
-        ConfigError: all keys for which the C has no part.
+        ConfigError: names every key that the C does not support.
     """
     controller = Controller(deployment)
     problems = [deployment.source.problem(*one) for one in _refused(deployment, controller)]
@@ -98,7 +97,7 @@ def tables(deployment: Deployment) -> Numbers:
 
 
 def _refused(deployment: Deployment, controller: Controller) -> Refusals:
-    """Yield what the C has no part for: where, and what was expected."""
+    """Yield each place that the C does not support, and what was expected there."""
     for pattern, keys in NOT_EXPORTED.items():
         for place, section in _sections((), deployment.config, pattern):
             for key in keys:
@@ -127,7 +126,7 @@ def _refused(deployment: Deployment, controller: Controller) -> Refusals:
 
 
 def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Place, Any]]:
-    """Yield the sections that a pattern fits, * for every name, with their places."""
+    """Yield the sections that match a pattern, with their places; * matches every name."""
     if not pattern:
         yield place, section
     elif section is not None:
@@ -151,8 +150,7 @@ def _unreadable(place: Place, message: Message, names: Iterable[str | None]) -> 
 
 
 def _field(message: Message, name: str | None) -> Numbers:
-    signal = find_signal(message, name) if name else None
-    if signal is None:
+    if not name or (signal := find_signal(message, name)) is None:
         return {}
     numbers = {n: getattr(signal, n) for n in ("start", "length", "is_signed")}
     return {**numbers, "motorola": signal.byte_order == "big_endian"}
@@ -199,7 +197,7 @@ def _joystick(deployment: Deployment, name: str, buses: list[str]) -> Numbers:
 
 
 def _velocities(deployment: Deployment, joystick: str) -> dict[str, VelocitySignal]:
-    """The numbers of a joystick, each once though several axes may read it."""
+    """Return the velocity signals of a joystick, each once though several axes may read it."""
     every = deployment.joysticks[joystick].velocities
     return {one.name: one for one in every if isinstance(one, VelocitySignal)}
 
@@ -216,7 +214,7 @@ def _valve(control: AxisControl, buses: list[str]) -> Numbers:
 
 
 def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
-    """From which joystick an axis gets its demand, and where its setpoint goes."""
+    """Return which joystick gives an axis its demand, and where its setpoint goes."""
     bound, command, valve = control.bound, control.bound.config.command, control.bound.valve
     return {
         "joystick": joysticks.index(command.joystick),
@@ -229,7 +227,7 @@ def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) 
 
 
 def _filter(axis: ShapedAxis) -> Numbers:
-    """Sway model and filter of an axis."""
+    """Return sway model and filter of an axis."""
     transfer, sway = axis._transfer, axis.sway
     shaper = transfer._shaper
     numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis._tick_s, "fade": transfer._fade}
@@ -251,7 +249,7 @@ def _filter(axis: ShapedAxis) -> Numbers:
 
 
 def _limits(axis: ShapedAxis) -> Numbers:
-    """Limits of an axis, and what a motion may add to it."""
+    """Return limits of an axis, and what a motion may add to it."""
     stage, limits = axis._stage, axis._stage.limits
     numbers: Numbers = {
         "neutral_band": axis._neutral_band,

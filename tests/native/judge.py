@@ -10,9 +10,8 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.gated import GatedController
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
-from canshaper.native.drive import play, random_drive
+from canshaper.native.drive import NAMES, play, random_drive, rows
 from canshaper.native.library import C_FILES, NativeController, NativeLibrary, compiler
-from canshaper.native.states import NAMES, rows
 from tests.rigs.files import CONFIG, read
 
 SeenStates = set[tuple[str, str]]

@@ -102,15 +102,6 @@ NativeLibrary(read(CONFIG / "forwarder.yaml"), {more!r})"""
     assert "expected arithmetic as Python's, got another one" in done.stderr
 
 
-def test_without_a_compiler_it_says_what_to_do(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(NativeError, match=r"expected a C compiler .*, got none; apt-get"):
-        NativeLibrary(read(CONFIG / "forwarder.yaml"))
-
-
 def test_what_the_compiler_says_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     needs_compiler()
     with pytest.raises(NativeError, match=r"failed: .*no-such-flag"):

@@ -161,7 +161,7 @@ def for_fleet(
 ) -> None:
     """Design filters of a kind for a fleet, of all swinging axes, print and write them."""
     from canshaper.campaign.fleet import design_fleet
-    from canshaper.campaign.fleet_report import figure, table, verdict, write_fleet
+    from canshaper.campaign.fleet_candidates import figure, table, verdict, write_fleet
     from canshaper.cli.results import Results
     from canshaper.commissioning.origins import written_line
     from canshaper.design.parallel import Processes

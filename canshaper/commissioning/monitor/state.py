@@ -11,8 +11,7 @@ from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
-from canshaper.recording.history import AxisStatus, History, HistoryEvent
-from canshaper.recording.listen import ReceivedFrame
+from canshaper.recording.listen import AxisStatus, History, HistoryEvent, ReceivedFrame
 
 # Rates are counted over so long.
 WINDOW_NS = 2_000_000_000

@@ -28,8 +28,7 @@ from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
 from canshaper.recording.channels import InputFinder, joystick_commands, valve_part
-from canshaper.recording.history import History
-from canshaper.recording.listen import ReceivedFrame
+from canshaper.recording.listen import History, ReceivedFrame
 from canshaper.recording.log import LogFile
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import Recorder
