@@ -46,7 +46,7 @@ BUDGET = {
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
-    "docs/safety.md": 2481,
+    "docs/safety.md": 2450,
     "docs/sensor.md": 1180,
     "docs/service.md": 790,
     "docs/states.md": 300,
