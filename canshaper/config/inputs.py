@@ -246,7 +246,10 @@ class SwaySensorSection(NamedCodes, InputSection):
     merit: str | None = Field(
         None, description="signal of its figure of merit, as in SSI: 0 good, all else measures none"
     )
-    kind: Kind = Field(description="what it measures")
+    kind: Kind = Field(
+        description="what it measures: angle of a joint, inclination of the tool against the "
+        "vertical, rate of a gyro"
+    )
     fusion_s: (
         Annotated[
             float,
@@ -257,10 +260,12 @@ class SwaySensorSection(NamedCodes, InputSection):
     """Time constant with which an inclinometer corrects its gyro by accelerations, of its data
     sheet; 0 without a gyro."""
     use: Literal["watch", "damp"] = Field(
-        "watch", description="say whether it can be trusted, or damp the swing by it too"
+        "watch",
+        description="watch only says whether it could be trusted; damp feeds the swing back, with "
+        "filters of kind robust and gff",
     )
     invert: bool = Field(
-        False, description="a tip that speeds up in positive direction makes it negative"
+        False, description="it is negative where the tip speeds up in positive direction"
     )
     delay_ms: Annotated[
         float, number(0, 500, "ms", "age of a measurement when its frame arrives")

@@ -47,7 +47,7 @@ BUDGET = {
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
     "docs/safety.md": 2450,
-    "docs/sensor.md": 1180,
+    "docs/sensor.md": 1080,
     "docs/service.md": 790,
     "docs/states.md": 290,
     "docs/studio.md": 717,
