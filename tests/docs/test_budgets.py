@@ -53,7 +53,7 @@ BUDGET = {
     "docs/studio.md": 717,
     "docs/study.md": 333,
     "docs/testing.md": 560,
-    "docs/topologies.md": 790,
+    "docs/topologies.md": 710,
     "docs/troubleshooting.md": 590,
     "docs/tuning.md": 780,
     "docs/work.md": 586,
