@@ -13,7 +13,7 @@ from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools import architecture
-from tools.frame_faults import FAULT_TEXTS
+from tools.frame_faults import FAULT_TEXTS, TRUST_TEXTS
 
 ROOT = Path(__file__).parents[2]
 generate: dict[str, Any] = runpy.run_path(str(ROOT / "tools/generate.py"))
@@ -63,7 +63,7 @@ def test_a_valve_state_of_another_message_keeps_its_table() -> None:
 
 
 def test_every_reason_fault_and_state_has_its_texts() -> None:
-    assert [*FAULT_TEXTS] == [*FrameFault]
+    assert [*FAULT_TEXTS, *TRUST_TEXTS] == [*FrameFault, *Trust]
     assert all(FAULT_TEXTS.values())
     assert REASON_TEXTS.keys() == {*Reason}
     assert STATE_TEXTS.keys() == {*State}
