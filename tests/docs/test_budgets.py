@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 790,
     "docs/comparison.md": 610,
     "docs/decisions.md": 953,
-    "docs/deployment.md": 2245,
+    "docs/deployment.md": 1830,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
     "docs/export.md": 556,
