@@ -27,7 +27,7 @@ BUDGET = {
     "docs/api.md": 150,
     "docs/architecture.md": 330,
     "docs/calibration.md": 420,
-    "docs/campaign.md": 1195,
+    "docs/campaign.md": 900,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 790,
