@@ -20,7 +20,7 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 800,
+    "CHANGELOG.md": 690,
     "CONTRIBUTING.md": 595,
     "README.md": 640,
     "SECURITY.md": 430,
