@@ -38,7 +38,7 @@ BUDGET = {
     "docs/doctor.md": 420,
     "docs/export.md": 556,
     "docs/glossary.md": 400,
-    "docs/guide.md": 1030,
+    "docs/guide.md": 970,
     "docs/identification.md": 580,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
