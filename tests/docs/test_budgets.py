@@ -30,7 +30,7 @@ BUDGET = {
     "docs/campaign.md": 900,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
-    "docs/commission.md": 790,
+    "docs/commission.md": 710,
     "docs/comparison.md": 610,
     "docs/decisions.md": 953,
     "docs/deployment.md": 1830,
