@@ -31,7 +31,7 @@ BUDGET = {
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
     "docs/commission.md": 710,
-    "docs/comparison.md": 610,
+    "docs/comparison.md": 590,
     "docs/decisions.md": 953,
     "docs/deployment.md": 1830,
     "docs/devices.md": 560,
