@@ -26,7 +26,7 @@ BUDGET = {
     "SECURITY.md": 430,
     "docs/api.md": 150,
     "docs/architecture.md": 330,
-    "docs/calibration.md": 420,
+    "docs/calibration.md": 400,
     "docs/campaign.md": 900,
     "docs/canopen.md": 780,
     "docs/checksums.md": 230,
