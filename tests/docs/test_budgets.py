@@ -29,7 +29,7 @@ BUDGET = {
     "docs/calibration.md": 400,
     "docs/campaign.md": 900,
     "docs/canopen.md": 780,
-    "docs/checksums.md": 230,
+    "docs/checksums.md": 220,
     "docs/commission.md": 710,
     "docs/comparison.md": 590,
     "docs/decisions.md": 953,
