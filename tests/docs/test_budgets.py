@@ -43,7 +43,7 @@ BUDGET = {
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
     "docs/machines.md": 1060,
-    "docs/monitor.md": 375,
+    "docs/monitor.md": 350,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
     "docs/safety.md": 2481,
