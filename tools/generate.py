@@ -180,6 +180,8 @@ def _default(value: Any) -> str:
     """Default of an optional key, in words of YAML."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list) and value:
+        return f"[{value[0]:g}, {value[1]:g}]"
     return f"{value}".removesuffix(".0") if isinstance(value, int | float | str) else "optional"
 
 

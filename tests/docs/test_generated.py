@@ -84,12 +84,12 @@ def test_the_page_names_every_transition() -> None:
 
 
 def test_a_list_of_keys_has_default_range_unit_and_the_place_of_what_is_below() -> None:
-    links = {"Match": "#the-device", "Limits": "#limits"}
-    rows = list(generate["key_rows"](generate["section_names"]()["Limits"], links))
+    of, links = generate["section_names"](), {"Match": "#the-device", "Limits": "#limits"}
+    rows = [r for n in ("Limits", "Uncertainty", "Bus") for r in generate["key_rows"](of[n], links)]
     assert "- `allow_reverse` (false): the output may go against the joystick" in rows
     assert "- `min_pct` (0, 0 to 50 % of full speed): outputs below this are zero" in rows
-    rows = list(generate["key_rows"](generate["section_names"]()["Bus"], links))
-    assert rows[6].startswith("- [`match`](#the-device) (optional): the device behind")
+    assert "- `damping_pct` ([-50, 100], -95 to 500 %): damping of its joints, from and to" in rows
+    assert any(row.startswith("- [`match`](#the-device) (optional): the device") for row in rows)
 
 
 def test_a_list_of_keys_has_those_of_the_section_itself() -> None:
