@@ -204,5 +204,6 @@ KINDS = (
         interpolable=_by_poles,
         follows=_followed,
         designed_by="tune",
+        runs_ahead=True,
     ),
 )

@@ -199,5 +199,6 @@ KINDS = (
         designed_by="robust",
         stretched=_stretched,
         follows=_stretched,
+        runs_ahead=True,
     ),
 )
