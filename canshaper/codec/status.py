@@ -91,7 +91,7 @@ class ReportedAxis(Protocol):
 
 
 class ReportedAim(Protocol):
-    """Aim point of a crane."""
+    """Where the tip comes to rest if the operator releases the joysticks now."""
 
     @property
     def slew_deg(self) -> float:

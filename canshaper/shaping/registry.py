@@ -78,7 +78,7 @@ def build_shaper(
         The filter, in neutral.
 
     Examples:
-        A joystick that is moved at once, through the mean of the last 0.1 s:
+        A joystick that is moved at once, through a lag with a time constant of 0.1 s:
 
         >>> from canshaper import SwayMode, SwayModel, build_shaper
         >>> sway = SwayModel(SwayMode.from_period(2.4, 0.02), tick_s=0.02)

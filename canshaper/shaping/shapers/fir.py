@@ -55,7 +55,7 @@ class Fir:
 
     def copy_state(self, old: "Fir") -> None:
         """Copy the commands that another filter has seen; its oldest stands for older ones."""
-        count = len(self.taps)
+        count = self._history.maxlen or 0
         seen = [*old._history, *[old._history[-1]] * count]
         self._history.extend(seen[:count])
 
