@@ -1,5 +1,7 @@
 """An enable that was seen released: no fault, and not forgotten while frames cannot be trusted."""
 
+import pytest
+
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import State
 from tests.rigs.forwarder import SLOW_VALVE, Make, Rig
@@ -30,9 +32,13 @@ def test_of_a_joystick_that_is_silent_since_then_silence_is_reported(
     assert rig.reason() == "JOYSTICK_TIMEOUT"
 
 
-def test_it_stays_released_while_the_frames_after_it_cannot_be_trusted(rig: Rig) -> None:
+@pytest.mark.parametrize("accepted", [True, False])
+def test_it_stays_released_while_the_frames_after_it_cannot_be_trusted(
+    rig: Rig, accepted: bool
+) -> None:
     """A counter that stands still says nothing new, and least of all that someone enabled."""
     rig.run(5)
+    rig.counts["JoystickLeft"] -= not accepted
     rig.receive(rig.joystick(Enable=0), rig.joystick("JoystickRight"))
     rig.tick()
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
