@@ -72,7 +72,3 @@ def test_the_kernel_itself_answers() -> None:
 def test_the_real_tree_of_devices() -> None:
     device = read_device("lo")
     assert device == Device("lo", None, None, 0, None, None)
-
-
-def test_an_attribute_that_is_cut_short_ends_them() -> None:
-    assert list(netlink.attributes(field(1, b"ab") + b"\x03\0\x02\0")) == [(1, b"ab")]
