@@ -16,7 +16,6 @@ from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
     close_ports,
@@ -38,6 +37,7 @@ from canshaper.machine.identity import program_sha256
 
 if TYPE_CHECKING:
     from canshaper.daemon.control import Control
+    from canshaper.daemon.follow import TickFollower
 
 log = logging.getLogger("canshaper")
 
@@ -207,7 +207,11 @@ class Daemon:
             parts = self._controller, self._recorder, self._black_box, self._reporter
             self._control = open_control(deployment, *parts)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        self._follower = tick_follower(deployment, self._controller)
+        self._follower: TickFollower | None = None
+        if deployment.config.tick:
+            from canshaper.daemon.follow import tick_follower
+
+            self._follower = tick_follower(deployment, self._controller)
 
     def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment if its buses can be opened.
