@@ -130,11 +130,6 @@ class Daemon:
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
         """Receive all waiting frames, tick the axes and send, then do the housekeeping.
 
-        Args:
-            now_ns: time of the tick.
-            missed: deadlines missed since the last tick.
-            late_ns: lateness of the tick.
-
         Returns:
             Whether the loop continues; False ends it, for good or for a new deployment.
         """

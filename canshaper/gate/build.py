@@ -203,14 +203,12 @@ def slack_of(config: Any) -> float:
     """Return how far a filter may run ahead of the demand, full speed times seconds.
 
     Raises:
-        ValueError: neither the gate nor the filter says whether it runs ahead.
+        ValueError: neither the gate nor the filter's package says whether it runs ahead.
     """
-    kind, ahead = config.filter.kind, config.filter.runs_ahead
-    if kind in SPREADING + DAMPING:
-        ahead = kind in DAMPING
+    kind = config.filter.kind
+    ahead = kind in DAMPING if kind in SPREADING + DAMPING else config.filter.runs_ahead
     if ahead is None:
-        known = ", ".join(SPREADING + DAMPING)
-        raise ValueError(f"expected {known}, or a kind with runs_ahead, got {kind}")
+        raise ValueError(f"expected {', '.join(SPREADING + DAMPING)} or runs_ahead, got {kind}")
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
     one = not (config.gain_schedule or config.profiles or config.sway_sensor)

@@ -106,9 +106,8 @@ class ShaperKind:
         follows: returns the parameters that the filter has while it follows a rope to ``factor``
             times the period, by ``follow(factor)``; None where it cannot follow.
         designed_by: verb of ``canshaper`` that finds the parameters, "" without one.
-        runs_ahead: whether the output may travel farther than the demand by more than 0.4 s of full
-            speed, as one that damps swing may; the gate allows it 1.5 s or more. A kind of another
-            package must say so; of those of this package the gate has its own table.
+        runs_ahead: whether the output travels farther ahead of the demand than 0.4 s of full speed,
+            as to damp swing; the gate has its own table for this package, others must say it.
 
     Raises:
         ValueError: a name is no word, is reserved, or stands twice.
