@@ -8,7 +8,6 @@ import pytest
 
 from canshaper.bus.interface import PROBE_NS, REOPEN_NS
 from canshaper.codec.frame import BusState, FrameFault
-from canshaper.config.bus import Match
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import (
@@ -240,14 +239,6 @@ def test_a_try_that_fails_for_another_reason_waits_for_the_next(matched: Line) -
     later(matched)
     assert matched.received() == []
     assert len(matched.opened_with) == 2
-
-
-def test_a_wrong_device_at_the_start_is_no_port() -> None:
-    def refuse(_ids: BusRoutes | None) -> list[socket.socket]:
-        raise WRONG
-
-    with pytest.raises(WrongDeviceError, match="expected serial number 1"):
-        port_on(refuse, None, lambda _fault: None, match=Match(serial="1"))
 
 
 def test_a_closed_port_does_nothing_more(line: Line) -> None:

@@ -90,18 +90,9 @@ def test_of_buses_that_do_not_all_open_none_stays_open_that_was_not(
 
 
 def test_a_fault_of_a_bus_that_a_reload_opened_is_counted(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[str], list[str]]
+    bench: Bench, log: Callable[[str], list[str]]
 ) -> None:
-    faults: list[Callable[[FrameFault], None]] = []
-    opened = bench._open
-
-    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
-        assert ids.sent == load_deployment(bench.file).routing.buses[name].sent
-        faults.append(fault)
-        return opened(name, bus, fault, ids)
-
-    monkeypatch.setattr("canshaper.daemon.ports.open_port", opens)
-    fails = lambda: faults[1](FrameFault.ERROR_FRAME)  # noqa: E731
+    fails = lambda: bench.faults[1](FrameFault.ERROR_FRAME)  # noqa: E731
     at(bench, {9: lambda: bench.reload(BUS, SECOND), 30: fails}, last=40)
     assert log("fault=ERROR_FRAME")
 
