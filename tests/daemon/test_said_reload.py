@@ -95,6 +95,8 @@ def test_a_fault_of_a_bus_that_a_reload_opened_is_counted(
     fails = lambda: bench.faults[1](FrameFault.ERROR_FRAME)  # noqa: E731
     at(bench, {9: lambda: bench.reload(BUS, SECOND), 30: fails}, last=40)
     assert log("fault=ERROR_FRAME")
+    routes = load_deployment(bench.file).routing.buses
+    assert [ids.sent for ids in bench.routes[1:]] == [routes["two"].sent]
 
 
 def test_who_takes_part_has_the_port_itself_and_who_listens_one_around_it(bench: Bench) -> None:
