@@ -19,7 +19,7 @@ from canshaper.blackbox.ring import Ring, Segment
 from canshaper.blackbox.state import States
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import StateError
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
@@ -92,7 +92,7 @@ class BlackBox:
                 self._log_fault(error.errno or 1)
 
     def around(
-        self, guarded: Guarded, controller: Controller, kind: type[Recorder] = Recorder
+        self, gated: GatedController, controller: Controller, kind: type[Recorder] = Recorder
     ) -> Recorder:
         """Make a recorder of a class for a controller behind its gate; ``begin`` starts it."""
         deployment = controller.deployment
@@ -104,14 +104,14 @@ class BlackBox:
         self._deployment, self._states = deployment, None
         self._short = deployment.config.tick_ms < SHORT_TICK_MS
         try:
-            self._states = States(guarded, controller)
+            self._states = States(gated, controller)
         except StateError as error:  # a filter of another package cannot be saved
             log.warning("black-box=none %s", error)
         if self._folder:
             from canshaper.blackbox.write import last_number
 
             self._number = max(self._number, last_number(self._folder, deployment.path.stem))
-        self._recorder = kind(guarded, controller, self._ring)
+        self._recorder = kind(gated, controller, self._ring)
         return self._recorder
 
     def begin(self, now_ns: int) -> None:

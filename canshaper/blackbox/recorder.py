@@ -7,7 +7,7 @@ from typing import Any
 from canshaper.blackbox.ring import CHUNK, Kind, Ring
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 
 # Plain numbers: each use of a member of an enumeration costs a look-up.
 TICK, RX, TX = int(Kind.TICK), int(Kind.RX), int(Kind.TX)
@@ -23,13 +23,13 @@ class Recorder:
     the notes into the ring after the tick.
 
     Args:
-        guarded: controller behind its gate, which executes the calls.
+        gated: controller behind its gate, which executes the calls.
         controller: the controller itself.
         ring: ring for the records.
     """
 
-    def __init__(self, guarded: Guarded, controller: Controller, ring: Ring) -> None:
-        self._guarded, self._controller = guarded, controller
+    def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
+        self._gated, self._controller = gated, controller
         self._put = ring.put
         self._calls: list[Call] = []
         self._note = self._calls.append
@@ -38,7 +38,7 @@ class Recorder:
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Receive a frame; return the frame for the other bus of a gateway, or None."""
         self._note((RX, frame, 0, now_ns))
-        passed = self._guarded.receive(frame, now_ns)
+        passed = self._gated.receive(frame, now_ns)
         if passed is not None:
             self._note((TX, passed, 0, 0))
         return passed
@@ -52,29 +52,29 @@ class Recorder:
         """Run one tick, and yield the frames to send now."""
         note = self._note
         note((TICK, None, missed, now_ns))
-        for frame in self._guarded.tick(now_ns, missed):
+        for frame in self._gated.tick(now_ns, missed):
             yield frame
             note((TX, frame, 0, 0))
 
     def stalled(self) -> None:
         """Take note that the loop stood still: frames up to the next tick have waited."""
         self._note((Kind.STALLED, None, 0, 0))
-        self._guarded.stalled()
+        self._gated.stalled()
 
     def send_failed(self, frame: Frame) -> None:
         """Take note that a frame did not reach its bus."""
         self._note((Kind.FAILED, frame, 0, 0))
-        self._guarded.send_failed(frame)
+        self._gated.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
         """Return whether a late valve frame moves a valve, and so must not leave."""
         self._note((Kind.WITHHELD, frame, 0, 0))
-        return self._guarded.withhold(frame)
+        return self._gated.withhold(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve."""
         self._note((Kind.NEUTRAL, None, 0, 0))
-        frames = self._guarded.neutral_frames()
+        frames = self._gated.neutral_frames()
         for frame in frames:
             self._note((TX, frame, 0, 0))
         return frames
@@ -91,7 +91,7 @@ class Recorder:
 
     def set(self, values: Mapping[str, object]) -> None:
         """Take note that an operator changed numbers of the file; key to value."""
-        self._guarded.set(values)
+        self._gated.set(values)
         self.flush()
         text = json.dumps(values).encode()
         for at in range(0, len(text), CHUNK):

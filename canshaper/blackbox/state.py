@@ -26,10 +26,9 @@ from pydantic import BaseModel
 from canshaper.codec.layout import Layout
 from canshaper.codec.message import FieldSet
 from canshaper.codec.velocity import FlaggedVelocity
-from canshaper.config.filters import restored_filter
 from canshaper.config.source import Source
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import StateError
 from canshaper.machine.database import Messages
 
@@ -56,7 +55,7 @@ OPCODES = frozenset(
     " EMPTY_TUPLE TUPLE TUPLE1 TUPLE2 TUPLE3 EMPTY_LIST APPEND APPENDS EMPTY_DICT SETITEM SETITEMS"
     " EMPTY_SET ADDITEMS FROZENSET STACK_GLOBAL NEWOBJ REDUCE BUILD".split()
 )
-Root = tuple[Guarded, Controller]
+Root = tuple[GatedController, Controller]
 
 
 def _fixed(number: int) -> Any:
@@ -77,15 +76,15 @@ class States:
     """Saves the state of a controller, and makes controllers from saved states.
 
     Args:
-        guarded: a new controller behind its gate.
+        gated: a new controller behind its gate.
         controller: that controller.
 
     Raises:
         StateError: an object in it cannot be saved.
     """
 
-    def __init__(self, guarded: Guarded, controller: Controller) -> None:
-        self._root: Root = (guarded, controller)
+    def __init__(self, gated: GatedController, controller: Controller) -> None:
+        self._root: Root = (gated, controller)
         self._numbers: dict[int, int] = {}
         self._fixed: list[Any] = []  # kept alive, so that no other object gets their ids
         self._classes: set[type] = set()
@@ -118,14 +117,14 @@ class States:
             for opcode, _, _ in pickletools.genops(state):
                 if opcode.name not in OPCODES:
                     raise StateError(f"expected an opcode that is needed, got {opcode.name}")
-            guarded, controller = _Unpickler(io.BytesIO(state), self._find).load()
+            gated, controller = _Unpickler(io.BytesIO(state), self._find).load()
         except StateError:
             raise
         except Exception as error:  # of many classes: damaged, or of another version
             raise StateError(f"{type(error).__name__}: {error}") from None
-        if type(guarded) is not type(self._root[0]) or type(controller) is not type(self._root[1]):
+        if type(gated) is not type(self._root[0]) or type(controller) is not type(self._root[1]):
             raise StateError("expected a controller, got another object")
-        return guarded, controller
+        return gated, controller
 
     def _number(self, one: Any) -> int | None:
         """Return the number of an object that never changes; None for one saved by value."""
@@ -141,7 +140,7 @@ class States:
         if name == _fixed.__name__ and module == __name__:
             return self._fixed.__getitem__
         value = getattr(sys.modules.get(module), name, None)
-        if value in (_method, restored_filter) or value in self._classes:
+        if value is _method or value in self._classes:
             return value
         # A class of a filter or an event that the new controller did not contain.
         package = module.rpartition(".")[0]

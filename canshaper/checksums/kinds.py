@@ -43,7 +43,11 @@ class Checksum:
     can_id: int = field(default=0, compare=False)
 
     def __reduce__(self) -> tuple[Callable[..., "Checksum"], tuple[object, ...]]:
-        """Pickle the numbers of the row too: a reload binds the deployment in another process."""
+        """Pickle the numbers from which the row is made, so that the reader can add the row.
+
+        A reload binds the deployment in another process. That process may have added the row to its
+        own ``CHECKSUMS``; the algorithm in the row is a function that cannot be pickled.
+        """
         bound = (self.kind, self.byte, self.shift, self.order, self.can_id)
         return _handed_over, (_NUMBERS.get(self.kind), bound)
 

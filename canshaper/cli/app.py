@@ -1,4 +1,7 @@
-"""The ``canshaper`` command: a module of ``canshaper.cli.verbs`` is a verb, loaded when used."""
+"""The ``canshaper`` command: its verbs are the modules of ``canshaper.cli.verbs``.
+
+A module holds one verb, or several joined by ``_and_`` in its name; it is loaded when one is used.
+"""
 
 import sys
 from collections.abc import Callable
@@ -16,8 +19,8 @@ from canshaper.cli import verbs
 from canshaper.cli.common import EXIT_INTERRUPTED, EXIT_WRONG, EXTRAS, echo, fail, install_line
 from canshaper.errors import CanshaperError, UsageError
 
-EXAMPLE_WIDTH = 70  # of an example, which is indented, in 80 columns
-SENTENCE = 200  # longer than any
+EXAMPLE_WIDTH = 70  # columns of an example; its indent fits in 80 too
+SENTENCE = 200  # letters; no first sentence of a verb is longer
 # Each verb's module names its GROUP.
 GROUPS = {
     "setup": "Set up a machine",
@@ -26,16 +29,18 @@ GROUPS = {
     "design": "Design its filters",
     "look": "Look, without a machine",
 }
-# They need a scheduler, sockets and signals that only Linux has.
+# These verbs need a scheduler, sockets and signals that only Linux has.
 LINUX_ONLY = {"commission", "doctor", "gateway", "metrics", "run", "set"}
 
 
 class Verbs(TyperGroup):
-    """Verbs, one for each module; an exception that canshaper raises for a person ends them."""
+    """Group of all verbs; a CanshaperError or an OSError ends a verb with one line."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        names = sorted(module.name.replace("_", "-") for module in iter_modules(verbs.__path__))
+        modules = [module.name for module in iter_modules(verbs.__path__)]
+        self._modules = {verb: name for name in modules for verb in name.split("_and_")}
+        names = sorted(verb.replace("_", "-") for verb in self._modules)
         self.commands = cast(Any, dict.fromkeys(names))  # each loaded when it is used
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -54,18 +59,21 @@ class Verbs(TyperGroup):
             rich_markup_mode=None,
             context_settings={"help_option_names": ["-h", "--help"]},
         )
-        verb = getattr(_module(name), _word(name))
+        verb = getattr(self._module(name), _word(name))
         checked = _linux_only(verb) if name in LINUX_ONLY else verb
         one.command(name, help=pasteable(verb.__doc__ or ""))(checked)
         self.commands[name] = typer.main.get_command(one)
         return self.commands[name]
 
+    def _module(self, name: str) -> Any:
+        return import_module(f"{verbs.__name__}.{self._modules[_word(name)]}")
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List them by group, each with its whole first sentence; click would cut it off."""
+        """List the verbs by group, each with its whole first sentence; click would shorten it."""
         rows: dict[str, list[tuple[str, str]]] = {group: [] for group in GROUPS}
         for name in self.commands:
             text = self.get_command(ctx, name).get_short_help_str(SENTENCE)
-            rows[_module(name).GROUP].append((name, text))
+            rows[self._module(name).GROUP].append((name, text))
         for group, title in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl(rows[group])
@@ -86,21 +94,17 @@ class Verbs(TyperGroup):
 
 
 def _word(name: str) -> str:
-    """Return the name of a verb in Python, of its module and its function."""
+    """Return the name of a verb in Python: that of its function."""
     return name.replace("-", "_")
 
 
-def _module(name: str) -> Any:
-    return import_module(f"{verbs.__name__}.{_word(name)}")
-
-
 def pasteable(text: str) -> str:
-    """Help whose examples are not broken anywhere: what needs another line says so to the shell."""
+    """Return the help with examples that can be pasted: a long one is continued by a backslash."""
     paragraphs = []
     for paragraph in cleandoc(text).split("\n\n"):
         words = " ".join(paragraph.split())
         if words.startswith(("canshaper ", "sudo canshaper ")):
-            # Behind a line with \b click leaves a paragraph as it is.
+            # After a line with \b click does not wrap the paragraph.
             first, *others = wrap(words, EXAMPLE_WIDTH, break_on_hyphens=False)
             paragraphs.append("\b\n  " + " \\\n      ".join((first, *others)))
         else:

@@ -1,4 +1,4 @@
-"""Shared parts of the verbs: deployments by name, bus options, pictures, errors for people."""
+"""Parts that verbs share: options, loading a deployment, exit codes, printing of errors."""
 
 import shlex
 import signal
@@ -29,11 +29,12 @@ if TYPE_CHECKING:
     from canshaper.campaign.engine import Engine
     from canshaper.machine.deployment import Deployment
 
-MOST_WARNINGS = 10  # of DBC files; the others are counted
-EXIT_USELESS = 1  # of a filter that leaves more than half of the swing
-EXIT_WRONG = 2  # of a file, an option, or what is not installed
-EXIT_INTERRUPTED = 130  # by SIGINT, as a shell has it
-# What ends a command with another code.
+MOST_WARNINGS = 10  # warnings of DBC files that are printed; the rest is only counted
+EXIT_NOT_ENOUGH_DATA = 1  # a measurement of an axis has not enough data
+EXIT_USELESS = 1  # the filter leaves more than half of the swing
+EXIT_WRONG = 2  # a file or an option is wrong, or a package is not installed
+EXIT_INTERRUPTED = 130  # SIGINT, as a shell reports it
+# Exit code of each kind of error; of any other error it is EXIT_WRONG.
 EXITS: dict[type[Exception], int] = {
     InternalError: 1,
     ControlError: 1,
@@ -41,7 +42,7 @@ EXITS: dict[type[Exception], int] = {
     NodeError: 1,
     BusError: 3,  # the file is good; the service manager tries again until the interface is there
 }
-# The extra that installs a package.
+# Extra of canshaper that installs each optional package.
 EXTRAS = {
     **dict.fromkeys(("canopen", "casadi", "matplotlib", "numpy", "scipy"), "tools"),
     **dict.fromkeys(("starlette", "uvicorn", "websockets"), "studio"),
@@ -61,7 +62,7 @@ CHANNEL = typer.Option(
 CRANE = typer.Option(
     None,
     "--crane",
-    help="Which one, where the deployment has several: the first part of axis names.",
+    help="Name of the crane if the deployment has several: the first part of its axis names.",
 )
 DEFAULT, SENSED = "forwarder-robust.yaml", "forwarder-sensor.yaml"
 SENSOR: bool = typer.Option(
@@ -71,21 +72,26 @@ SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
 )
 PLANT = typer.Option(
-    None, "--plant", metavar="FMU", help="A crane of yours, in place of the simulated one."
+    None, "--plant", metavar="FMU", help="Your own crane model, instead of the simulated one."
 )
-PROCESSES = typer.Option(None, "--processes", min=1, help="Processes; by default one a processor.")
+PROCESSES = typer.Option(
+    None, "--processes", min=1, help="Number of processes; by default one for each processor."
+)
 SCHEDULER = typer.Option(
     None, "--scheduler", metavar="ADDRESS", help="Dask cluster, such as tcp://10.0.0.1:8786."
 )
 NETWORK = typer.Option(
-    False, "--network", help="Share a bus of udp_multicast over the network; else it stays local."
+    False, "--network", help="Send a udp_multicast bus over the network too, not only locally."
 )
 
 EXPORT = typer.Option(
-    None, "--export", metavar="FILE", help="The drive, anti-sway on, as .mcap or .mf4."
+    None, "--export", metavar="FILE", help="Write the drive with anti-sway on as .mcap or .mf4."
 )
 REPORT = typer.Option(
-    None, "--report", metavar="FILE.html", help="Write it all into one file, to print and sign."
+    None,
+    "--report",
+    metavar="FILE.html",
+    help="Write all results into one file, to print and sign.",
 )
 PICTURE = typer.Option(
     None, "--picture", metavar="FILE", help="Write the picture here: .png, .svg or .pdf."
@@ -93,7 +99,7 @@ PICTURE = typer.Option(
 
 
 class Stop:
-    """Asked for by SIGTERM or SIGINT; a second time it ends at once."""
+    """Records that SIGTERM or SIGINT asked the verb to stop; a second signal ends it at once."""
 
     def __init__(self) -> None:
         self.requested = False
@@ -109,7 +115,7 @@ class Stop:
 def engine(
     processes: int | None, scheduler: str | None, cluster: Literal["slurm"] | None = None
 ) -> "Engine":
-    """Return the engine of parallel work: processes here, a Dask scheduler, or jobs of Slurm."""
+    """Return what runs parallel work: processes on this computer, a Dask cluster, or Slurm jobs."""
     from canshaper.campaign.engine import Cluster, Slurm
     from canshaper.design.parallel import Processes
 
@@ -124,19 +130,19 @@ def engine(
 
 
 def echo(text: str, *, err: bool = False) -> None:
-    """Print lines; control characters of what others wrote are shown, and do nothing."""
+    """Print lines; control characters from files or frames are shown as text, never executed."""
     typer.echo(printable(text), err=err)
 
 
 def fail(error: Exception, code: int | None = None) -> typer.Exit:
-    """Print an error, and return the exit; its code is that of its kind where ``code`` is None."""
+    """Print an error and return the exit to raise; without ``code`` the error's kind chooses it."""
     echo(str(error), err=True)
     codes = (exit_code for kind, exit_code in EXITS.items() if isinstance(error, kind))
     return typer.Exit(next(codes, EXIT_WRONG) if code is None else code)
 
 
 def end_interrupted(at: str) -> None:
-    """End a verb that Ctrl-C has interrupted, saying at what; "" where none has."""
+    """End the verb with EXIT_INTERRUPTED if Ctrl-C interrupted it ``at`` a task; "" means no."""
     if at:
         echo(f"interrupted at {at}", err=True)
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -144,7 +150,7 @@ def end_interrupted(at: str) -> None:
 
 @contextmanager
 def os_errors(path: Path) -> Iterator[None]:
-    """Report an OSError in the block as an error for the person: which file, and why."""
+    """Turn an OSError in the block into a UsageError with the file and the reason."""
     try:
         yield
     except OSError as error:
@@ -152,20 +158,20 @@ def os_errors(path: Path) -> Iterator[None]:
 
 
 def install_line(package: str) -> str:
-    """How to get what an extra installs, from anywhere."""
+    """Return the pip command that installs a package with the others of its extra."""
     packages = [name for name, extra in EXTRAS.items() if extra == EXTRAS[package]]
     return f"{shlex.quote(sys.executable)} -m pip install {' '.join(packages)}"
 
 
 def refuse_shipped(file: str, option: str = "--write") -> None:
-    """Refuse to write into a deployment that is only found among the shipped ones.
+    """Refuse to write into a deployment that is shipped with the package.
 
     Args:
-        file: as the command line names it.
-        option: that asks for writing.
+        file: name on the command line.
+        option: option that asks for writing, named in the error.
 
     Raises:
-        ConfigError: it is one of them.
+        ConfigError: the name means a shipped deployment.
     """
     if deployment_path(file) != Path(file):
         text = "shipped with the package; copy it, then write to the copy"
@@ -173,10 +179,10 @@ def refuse_shipped(file: str, option: str = "--write") -> None:
 
 
 def sensed(file: str, sensor: bool) -> str:
-    """The deployment to show: with ``--sensor`` the shipped one with a sway sensor.
+    """Return the file to load: with ``--sensor`` the shipped deployment with a sway sensor.
 
     Raises:
-        UsageError: both are asked for.
+        UsageError: the command line has both a file and ``--sensor``.
     """
     if sensor and file != DEFAULT:
         raise UsageError(f"--sensor: expected without FILE, got {file}: it is {SENSED}")
@@ -191,9 +197,9 @@ def loader(
     network: bool = False,
     inside: Path | None = None,
 ) -> "Callable[[], Deployment]":
-    """Return a function that loads the deployment with the bus options of the command line.
+    """Return a function that loads the deployment and applies the bus options of the command line.
 
-    With ``inside`` it reads no DBC file outside of that directory.
+    With ``inside`` the function reads no DBC file outside of that directory.
     """
     from canshaper.machine.binding import load_deployment
 
@@ -212,7 +218,7 @@ def loader(
                 text = f"expected NAME=CHANNEL with one of {', '.join(buses)}, got {item!r}"
                 raise ConfigError([Problem("command line", None, "--channel", text)])
             buses[name] = buses[name].model_copy(update={"channel": channel})
-        if interface:  # what the file says of sharing was said of its own interface
+        if interface:  # the file's ``network`` was meant for its own interface
             update = {"interface": interface, "network": False}
             buses = {n: b.model_copy(update=update) for n, b in buses.items()}
         if network:
@@ -229,7 +235,7 @@ def loader(
 
 
 def names_of(paths: Sequence[Path]) -> list[str]:
-    """A name for each deployment, different ones for different files."""
+    """Return a name for each deployment: its stem, with a number where two files share it."""
     stems = [path.stem for path in paths]
     return [
         stem if stems.count(stem) == 1 else f"{stem}-{stems[: i + 1].count(stem)}"
@@ -238,7 +244,7 @@ def names_of(paths: Sequence[Path]) -> list[str]:
 
 
 def channels_of(given: Sequence[str]) -> dict[str, str]:
-    """Channels of a log by bus from BUS=CHANNEL."""
+    """Parse BUS=CHANNEL options; return the channel of the log by bus."""
     channels = {}
     for item in given:
         bus, mark, channel = item.partition("=")
@@ -249,16 +255,16 @@ def channels_of(given: Sequence[str]) -> dict[str, str]:
 
 
 def buses_line(deployment: "Deployment") -> str:
-    """The buses of a deployment: name, interface and channel of each."""
+    """Return name, interface and channel of each bus, as one line."""
     buses = deployment.config.buses.items()
     return ", ".join(f"{name} ({bus.interface} {bus.channel})" for name, bus in buses)
 
 
 def control_socket(deployment: "Deployment") -> Path:
-    """Path of the control socket of its daemon.
+    """Return the path of the daemon's control socket.
 
     Raises:
-        UsageError: the file has none.
+        UsageError: the file has no control section.
     """
     section = deployment.config.control
     if section is None:
@@ -271,7 +277,10 @@ def control_socket(deployment: "Deployment") -> Path:
 
 
 def print_warnings(count: int, warnings: list[Problem], are: str) -> None:
-    """Show the first faults of DBC files in what ``are`` says of them, and how many."""
+    """Print how many warnings the DBC files gave, and the first of them.
+
+    ``are`` says which messages and tables they are about, such as "not used".
+    """
     if count:
         echo(f"  {count} WARNING{'S' if count > 1 else ''} in messages and tables that are {are}:")
     for warning in warnings[:MOST_WARNINGS]:

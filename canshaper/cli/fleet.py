@@ -1,6 +1,6 @@
-"""Many logs at once, of machines and days: one row for each, those that cannot be read reported.
+"""Folders of logs: one row for each log and axis; a log that cannot be read is reported.
 
-Below the folder that is given, the folder of a log is its machine.
+The folder of a log, relative to the folder on the command line, names its machine.
 """
 
 import json
@@ -31,9 +31,9 @@ class Log:
 
     Attributes:
         path: the file.
-        machine: folder that it lies in, below the one that was given.
-        rows: what it shows, one for each axis and deployment.
-        fault: why there is nothing; empty where there is.
+        machine: its folder, relative to the folder on the command line.
+        rows: one row for each axis and deployment.
+        fault: why the log could not be read; empty if it could.
     """
 
     path: Path
@@ -43,7 +43,7 @@ class Log:
 
 
 def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
-    """Machine and path of every log, and bundle, in a folder and those in it, by name."""
+    """Return (machine, path) of every log or bundle below a folder, sorted by name."""
     known = {*READERS, SUFFIX, *bundles} - {".txt"}  # most of them are notes
     logs = [
         path
@@ -54,14 +54,14 @@ def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
 
 
 def check_only_folders(paths: Sequence[Path], options: Mapping[str, object]) -> None:
-    """Refuse what says nothing of many logs.
+    """Refuse single logs, and options for a single log, next to a folder.
 
     Args:
-        paths: folders, the first is one.
-        options: of one log, by their names.
+        paths: paths of the command line; the first is a folder.
+        options: values of the options for a single log, by name.
 
     Raises:
-        UsageError: a path is no folder, or an option was given.
+        UsageError: a path is no folder, or one of the options was given.
     """
     if others := [str(path) for path in paths if not path.is_dir()]:
         raise UsageError(f"{others[0]}: expected a folder like {paths[0]}, got none")
@@ -77,17 +77,18 @@ def run_fleet(
     out: Path,
     results: Results,
 ) -> None:
-    """Do the work with every log, show and write what it gives, and what was wrong with logs.
+    """Work on every log below the folders; print tables and faults, and write all numbers.
 
     Args:
-        engine: who does it.
-        work: gives the rows of a log.
-        folders: of the logs.
-        show: prints the tables of all logs, which are in the order of machines and paths.
-        out: folder for all numbers.
-        results: takes what is printed.
+        engine: runs the work in parallel.
+        work: returns the rows of a log.
+        folders: folders of the logs.
+        show: prints the tables; it gets all logs, sorted by machine and path.
+        out: folder for ``fleet.json``.
+        results: console of the verb.
 
     Raises:
+        UsageError: the folders have no log.
         typer.Exit: a log could not be read.
     """
     logs = [log for folder in folders for log in logs_below(folder)]
@@ -181,7 +182,7 @@ def identified(
 
 
 def _start_ns(path: Path) -> int:
-    """Time of the first frame of a log; 0 of a table of a phone."""
+    """Return the time of the first frame; 0 for a phone's table, which has no date."""
     try:
         return next((frame.time_ns for frame in LogFile(path)), 0)
     except CanshaperError:
@@ -189,7 +190,10 @@ def _start_ns(path: Path) -> int:
 
 
 def period_drifts(logs: Sequence[Log]) -> Iterator[str]:
-    """Where the period of a machine has changed by more than its intervals, from first to last."""
+    """Yield a line for each axis whose period changed by more than the intervals of both logs.
+
+    The first day of the axis is compared with its last one.
+    """
     by_axis: dict[tuple[str, str], list[Row]] = {}
     for log in logs:
         for row in log.rows:
@@ -219,9 +223,9 @@ _PERIODS = {"period_s": "{:.3f}", "damping_ratio": "{:.4f}"}
 
 
 def show_replays(logs: Sequence[Log], results: Results) -> None:
-    """Show a table of each deployment with a row for each log and axis; then all logs together.
+    """Print a table for each deployment, a row for each log and axis; then a table of all logs.
 
-    Log and axis are one column: the first one stands in every part of a table that is cut.
+    Log and axis share the first column, because a table that is too wide repeats that column.
     """
     by_deployment: dict[str, list[tuple[Log, Row]]] = {}
     for log, row in _rows(logs):
@@ -243,7 +247,7 @@ def show_replays(logs: Sequence[Log], results: Results) -> None:
 
 
 def show_periods(logs: Sequence[Log], results: Results) -> None:
-    """A row for each log and axis, and where a period has drifted."""
+    """Print a table with a row for each log and axis, then a line for each drifted period."""
     table = new_table("machine, log", "day", "period, s", "damping ratio", "usable")
     for log, row in _rows(logs):
         cells = []
@@ -258,11 +262,7 @@ def show_periods(logs: Sequence[Log], results: Results) -> None:
 
 
 def _finish(logs: Sequence[Log], out: Path, results: Results) -> int:
-    """Report what was wrong with logs, those that could not be read too, and write everything.
-
-    Returns:
-        The exit code.
-    """
+    """Print notes and faults of the logs, write ``fleet.json``, and return the exit code."""
     for log in logs:
         for note in dict.fromkeys(text for row in log.rows for text in row["notes"]):
             results.print(f"note: {_name(log)}: {note}", soft_wrap=True)

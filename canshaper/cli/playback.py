@@ -1,4 +1,4 @@
-"""``canshaper studio`` of a log, or of drives of a campaign: what can be chosen in the page."""
+"""Finished drives for ``canshaper studio``: a log, or drives of a campaign, as choices."""
 
 import tempfile
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from canshaper.studio.playback_app import Choice
 
 MOST_DEPLOYMENTS = 2
-"""Deployments besides the recorded crane, or the raw one: the page shows three."""
+"""Most --with options: the page shows three cranes, one of them the recorded or raw one."""
 BUNDLE = ".zip"
 
 
 def is_drive(file: str) -> bool:
-    """Whether a file is a log, a black box or a recording, by its suffix."""
+    """Return whether the suffix is that of a log, a black box or a recording."""
     from canshaper.recording.log import READERS
 
     suffix = Path(file.lower().removesuffix(".gz")).suffix
@@ -37,20 +37,20 @@ def opened_drives(
     window: "Window",
     changes: Sequence[str],
 ) -> "list[Choice]":
-    """Return the drives to choose from in the page; the first is made, to report its errors here.
+    """Return the drives that the page offers. The first is made now, so that its errors show here.
 
     Args:
-        file: log, black box or recording; of seeds the deployment.
-        others: other deployments, shown next to it.
-        seeds: drives of a campaign.
-        folder: of a campaign; its worst drives come behind them.
-        channels: of a log, BUS=CHANNEL.
-        window: what is shown of a log, s.
-        changes: parameters of the simulated crane, NAME=VALUE.
+        file: log, black box or recording; with ``seeds`` or ``folder`` a deployment.
+        others: other deployments to show next to it.
+        seeds: seeds of drives of a campaign.
+        folder: folder of a campaign; its worst drives follow the seeds.
+        channels: channels of a log, as BUS=CHANNEL.
+        window: part of a log to show, seconds.
+        changes: parameters of the simulated crane, as NAME=VALUE.
 
     Raises:
-        UsageError: options that do not go together.
-        CanshaperError: what cannot be replayed or driven.
+        UsageError: the options exclude each other.
+        CanshaperError: the first drive cannot be replayed or driven.
     """
     if len(others) > MOST_DEPLOYMENTS:
         raise UsageError(f"--with: expected {MOST_DEPLOYMENTS} at most, got {len(others)}")
@@ -130,10 +130,10 @@ def _drives_of_campaign(
 
 
 def _worst(folder: Path, deployment: "Deployment", changes: Sequence[str]) -> dict[int, str]:
-    """Titles of the worst drives of a campaign, by their seeds.
+    """Return the titles of the worst drives of a campaign, by seed.
 
     Raises:
-        CampaignError: the folder has none, or those of something else.
+        CampaignError: the folder has no drives, or those of another campaign.
     """
     from canshaper.campaign.run import Source
     from canshaper.campaign.store import Store

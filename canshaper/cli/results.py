@@ -1,9 +1,10 @@
 """Output of a verb: lines and tables on the terminal, pictures, and all of it as one HTML file."""
 
 import io
+import json
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import typer
 from rich.table import Table
 
 from canshaper import __version__
-from canshaper.cli.common import install_line
+from canshaper.cli.common import echo, install_line
 from canshaper.errors import UsageError
 from canshaper.report import html
 from canshaper.report.console import SafeConsole
@@ -23,26 +24,26 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
 
 FORMATS = (".png", ".svg", ".pdf")
-# A drawing that takes more is a picture of dots in the report, which is to stay below 2 MB.
+# A larger SVG enters the report as PNG, so that the report stays below 2 MB.
 MOST_SVG_BYTES = 400_000
 
 
 class Results(SafeConsole):
-    """The terminal of a verb, which keeps what it prints for the report.
+    """Console of a verb; it keeps everything it prints for the report.
 
     Args:
-        title: of the report.
-        deployment: what it is of, where there is one.
-        report: file to write the report to; None for none.
-        picture: file for the picture instead of the verb's own.
-        options: of rich's console.
+        title: title of the report.
+        deployment: deployment that the results are about, if any.
+        report: file to write the report to; None for no report.
+        picture: file for the picture, instead of the verb's default.
+        options: options of rich's console.
 
     Attributes:
-        deployment: as above; it may be known later.
+        deployment: as above; a verb may set it later.
 
     Raises:
-        UsageError: report or picture has another suffix than it can be written with.
-        OSError: the folder of one cannot be made.
+        UsageError: report or picture has a suffix that cannot be written.
+        OSError: the folder of either cannot be made.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Results(SafeConsole):
             if path and path.suffix not in known:
                 got = f"got {path}"
                 raise UsageError(f"{option}: expected a file with {' or '.join(known)}, {got}")
-            if path:  # reported before anything is driven
+            if path:  # an error here comes before minutes of driving
                 path.parent.mkdir(parents=True, exist_ok=True)
         self._title = title
         self.deployment = deployment
@@ -69,20 +70,20 @@ class Results(SafeConsole):
         self._parts: list[str] = []
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print, and keep."""
+        """Print on the terminal, and keep it for the report."""
         for one in objects:
             self._parts.append(html.table(one) if isinstance(one, Table) else html.text(str(one)))
         super().print(*objects, **options)
 
     def picture(self, path: Path | None, figure: Callable[[], "Figure"]) -> Path | None:
-        """Draw, stamp and write a picture, in a folder that is made.
+        """Draw a picture, stamp it with file, version and date, and write it.
 
         Args:
-            path: where, without --picture; None for only in the report.
-            figure: draws it.
+            path: file unless --picture names one; None to draw it for the report only.
+            figure: draws the picture.
 
         Returns:
-            Where it is; None where it was not written, or matplotlib is missing.
+            The written file; None if none was written or matplotlib is missing.
         """
         path = self._picture or path
         if not (path or self._report):
@@ -103,11 +104,48 @@ class Results(SafeConsole):
         return path
 
     def picture_line(self, path: Path | None) -> None:
-        """Say where the picture is, or why there is none; the report has it."""
+        """Print where the picture is, or why there is none; the report needs no such line."""
         super().print(f"Picture: {path or _no_picture()}", soft_wrap=True)
 
+    def conclude(
+        self,
+        show: Callable[["Results"], None],
+        *,
+        figure: Callable[[], "Figure"] | None = None,
+        path: Path | None = None,
+        data: Callable[[Path | None], Mapping[str, Any]] | None = None,
+        after: Sequence[str] = (),
+        code: int = 0,
+    ) -> None:
+        """End a verb that measured or designed: results, picture, what follows, exit code.
+
+        What the verb writes into the deployment file is written before: the reader of its output
+        may end at any line.
+
+        Args:
+            show: prints the results.
+            figure: draws their picture; None where there is nothing to draw.
+            path: file of the picture without --picture; None for only in the report.
+            data: of ``--json``, by the file of the picture; None where JSON is not asked for.
+            after: lines on what was written, and what to do next.
+            code: exit code.
+
+        Raises:
+            typer.Exit: the exit code is not 0.
+            OSError: picture or report cannot be written.
+        """
+        show(self)
+        drawn = self.picture(path, figure) if figure else None
+        if data:
+            echo(json.dumps(data(drawn), indent=2, default=str))
+        if figure and (path or self._picture):
+            self.picture_line(drawn)
+        if after:
+            self.print("\n".join(after), soft_wrap=True)
+        self.write(code)
+
     def write(self, code: int = 0) -> None:
-        """Write the report, where one is asked for; end the verb with its exit code, if not 0."""
+        """Write the report if --report asks for one; then raise the exit code, if it is not 0."""
         if self._report:
             command = ("command", shlex.join(["canshaper", *sys.argv[1:]]))
             facts = [command, *html.facts(self.deployment, self._date)]
@@ -123,7 +161,7 @@ def _no_picture() -> str:
 
 
 def _embedded(drawn: "Figure", name: str) -> str:
-    """A picture inside the report: a drawing, or dots where the drawing is large."""
+    """Return a picture for the report: SVG, or PNG if the SVG is too large."""
     data = _file(drawn, "svg")
     if len(data) < MOST_SVG_BYTES:
         return html.picture(data, "svg+xml", name)

@@ -42,10 +42,6 @@ class StatusField(Generic[Source]):
     required: bool = False
     largest: int | None = None
 
-    def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
-        """Pickle only the name: a reload binds the deployment in a process of its own."""
-        return _field, (self.name,)
-
     def shown(self, value: object) -> str:
         """Return a decoded value as text: the name of a code, "unknown" for codes without one."""
         if isinstance(value, IntEnum):
@@ -67,11 +63,11 @@ class _Code:
 
 
 def _command_pct(one: Any) -> float:
-    return 100.0 * float(one.axis.command)
+    return 100.0 * float(one.axis.demand)
 
 
 def _applied_pct(one: Any) -> float:
-    return 100.0 * float(one.axis.sent)
+    return 100.0 * float(one.axis.output.setpoint)
 
 
 # Nothing here may be a lambda: a deployment is pickled by the process that has read it.
@@ -111,12 +107,6 @@ AIM: list[StatusField[Any]] = [
     StatusField("AimKnown", attrgetter("known"), bool, True, 1),
 ]
 """How far the tip still travels if the joysticks are released now."""
-
-
-def _field(name: str) -> StatusField[Any]:
-    """Return the field of that name from the tables of this process."""
-    fields: list[StatusField[Any]] = [*AXIS_STATUS, *SERVICE_STATUS, *IDENTITY, *AIM]
-    return next(field for field in fields if field.name == name)
 
 
 class StatusCodec(Generic[Source]):

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from canshaper.config.desk import Objective
 from canshaper.config.inputs import InputSection, NamedCodes
 from canshaper.config.limits import Limits, Sway
-from canshaper.config.objective import Objective
 from canshaper.config.section import RUN, Origin, Section, expanded, number
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Parameter, ShaperKind
@@ -142,10 +142,6 @@ class FilterSection(Section):
         """Return the swing and valve that the filter was designed for, where the file has them."""
         return getattr(self, "designed_for", None)
 
-    def __reduce__(self) -> Any:
-        # No module holds the class of a kind; the other process made its own from the same row.
-        return restored_filter, (self.kind, self.model_fields_set, self.__dict__)
-
 
 def _section(kind: ShaperKind) -> type[FilterSection]:
     """The section of a kind, such as ``TwoModeFilter``."""
@@ -156,9 +152,11 @@ def _section(kind: ShaperKind) -> type[FilterSection]:
     if kind.designed_by:
         text = f"what canshaper {kind.designed_by} designed it for"
         fields["designed_for"] = (DesignedFor | None, Field(None, description=text))
+    # No class can be written down here: a package adds a kind when it is installed.
     return create_model(
         f"{kind.name.title().replace('_', '')}Filter",
         __base__=FilterSection,
+        __module__=__name__,
         __doc__=kind.summary,
         **fields,
     )
@@ -197,11 +195,7 @@ def _or_false(schema: dict[str, Any]) -> None:
 
 SECTIONS = {name: _section(kind) for name, kind in KINDS.items()}
 """Section of each kind, by its name."""
-
-
-def restored_filter(kind: str, given: set[str], values: dict[str, Any]) -> FilterSection:
-    """Restore the section of a filter that ``pickle`` took apart."""
-    return SECTIONS[kind].model_construct(given, **values)
+globals().update({section.__name__: section for section in SECTIONS.values()})  # for pickle
 
 
 def _named_off(section: Any) -> Any:

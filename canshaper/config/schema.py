@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from canshaper.config.bus import Bus, Control, Gateway
 from canshaper.config.crane import CraneSection, Motion
+from canshaper.config.desk import Accept, Uncertainty
 from canshaper.config.filters import (
     Breakpoint,
     Filter,
@@ -25,7 +26,6 @@ from canshaper.config.inputs import (
 )
 from canshaper.config.limits import Hydraulics, Limits, Slewing, Sway
 from canshaper.config.section import VERSION, Section, number
-from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.shaping.registry import KINDS
 
 WITHOUT_ENABLE = (

@@ -15,7 +15,7 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
     close_ports,
@@ -183,17 +183,17 @@ class Daemon:
         if before:
             self._recorder.reloads()
         self._controller = Controller(deployment)
-        guarded = Guarded(self._controller)
+        gated = GatedController(self._controller)
         if before:
             self._controller.carry_over(before)
-            guarded.carry_over(self._guarded)
-        self._guarded: Guarded = guarded
+            gated.carry_over(self._gated)
+        self._gated: GatedController = gated
         kind, control = Recorder, deployment.config.control
         if control and control.rehearse_faults:
             from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
             kind = Rehearsal
-        self._recorder = self._black_box.around(guarded, self._controller, kind)
+        self._recorder = self._black_box.around(gated, self._controller, kind)
         self._reporter.use(self._controller, self._ports)
         self._control: Control | None = None
         if control:
@@ -251,10 +251,10 @@ class Daemon:
 
     def _read(self, waited: Iterable[Frame]) -> None:
         """Receive frames that waited during a reload; they are too old to move an axis."""
-        self._guarded.stalled()
+        self._gated.stalled()
         now_ns = boottime_ns()
         for frame in waited:
-            self._guarded.receive(frame, now_ns)
+            self._gated.receive(frame, now_ns)
 
     # -- ends ----------------------------------------------------------------------------------
 
@@ -289,7 +289,7 @@ class Daemon:
     def _send_identity(self) -> None:
         """Send the digest of program and deployment, if the file has a message for it."""
         frame = self._controller.status.identity(self._controller.silent_buses)
-        passes = frame and self._guarded.passes(frame, boottime_ns())
+        passes = frame and self._gated.passes(frame, boottime_ns())
         if frame and passes and not self._ports[frame.bus].send(frame):
             self._recorder.send_failed(frame)
 

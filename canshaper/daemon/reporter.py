@@ -110,8 +110,8 @@ class Reporter:
                 name: {
                     "state": one.axis.state.name,
                     "reason": one.reason.name,
-                    "joystick": one.axis.command,
-                    "setpoint": one.axis.sent,
+                    "joystick": one.axis.demand,
+                    "setpoint": one.axis.output.setpoint,
                     "sway_deg": one.sway_deg,
                     "set": one.active_set,
                 }

@@ -20,7 +20,7 @@ from canshaper.config.load import load_config
 from canshaper.design.processes import Transport, canshaper_command, end
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.studio.sliders import adjustable, sliders
+from canshaper.studio.numbers import adjustable, sliders
 from canshaper.studio.view import CraneView, Report
 from canshaper_sim.axes import ON_ROPE, ROTATOR
 from canshaper_sim.crane import CraneParameters

@@ -29,8 +29,8 @@ from canshaper.machine.deployment import Deployment
 from canshaper.studio.access import Access
 from canshaper.studio.client import MOST_BYTES, TRY_AGAIN_LATER, Client
 from canshaper.studio.commission import Commission
+from canshaper.studio.numbers import RANGES
 from canshaper.studio.seen import residuals, sway_of
-from canshaper.studio.sliders import RANGES
 from canshaper.studio.stage import MACHINE, RAW, Stage
 from canshaper_sim.axes import LUFFING, OVERHEAD, TOWER, kind_of
 from canshaper_sim.crane import CraneParameters

@@ -17,9 +17,8 @@ from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane, CraneSession
 from canshaper.studio.in_process import InProcessCrane
-from canshaper.studio.numbers import LiveNumbers
+from canshaper.studio.numbers import LiveNumbers, Number, sliders, values
 from canshaper.studio.preference import AS_IN_FILE, PREFERENCE, Preference, offered
-from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.view import CraneView
 from canshaper.studio.words import Events, said
 from canshaper_sim.hand import Hand, Held

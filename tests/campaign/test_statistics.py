@@ -9,7 +9,7 @@ from scipy import stats
 
 from canshaper.campaign.statistics import Influence, influences, most_of, quantile
 from canshaper.campaign.summary import lines, summarise, tables
-from canshaper.config.uncertainty import MEASURES
+from canshaper.config.desk import MEASURES
 
 DISTRIBUTIONS = {
     "normal": stats.norm(),

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from canshaper.campaign.measure import measured_drive
 from canshaper.cli.app import app
-from canshaper.config.uncertainty import Uncertainty
+from canshaper.config.desk import Uncertainty
 from canshaper.design.lockstep import driven_part
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.cranes import cranes

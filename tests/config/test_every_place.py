@@ -4,6 +4,8 @@ The files are made from the schemas themselves, so that no new section is forgot
 key, also those that exclude each other; such problems may come on top of what is looked for.
 """
 
+import math
+import re
 import types
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,9 +25,27 @@ from canshaper.shaping.registry import KINDS
 from studies.crane.config import CraneConfig
 
 FILES = [(DeploymentConfig, kind) for kind in KINDS] + [(CraneConfig, "")]
+RANGE = re.compile(
+    r"expected (a whole number, )?[-+.\de]+( to [-+.\de]+)?.*, got (-?1(0{12}|e\+12)|nan)"
+)
 files = pytest.mark.parametrize(
     ("schema", "kind"), FILES, ids=[f"{schema.__name__} {kind}" for schema, kind in FILES]
 )
+
+
+class Dumper(yaml.SafeDumper):
+    """Writes ``Keys`` as any other mapping."""
+
+
+class Keys(dict[str, Any]):
+    """A section, and those of its keys that it must have."""
+
+    def __init__(self, data: dict[str, Any], required: list[str]) -> None:
+        super().__init__(data)
+        self.required = required
+
+
+Dumper.add_representer(Keys, yaml.SafeDumper.represent_dict)
 
 
 def whole(annotation: Any, kind: str, metadata: tuple[Any, ...] = ()) -> Any:
@@ -41,7 +61,9 @@ def whole(annotation: Any, kind: str, metadata: tuple[Any, ...] = ()) -> Any:
         entries = [whole(arguments[-1], kind) for _ in range(least)]
         return entries if origin is list else {f"name{i}": e for i, e in enumerate(entries)}
     if isinstance(annotation, type) and issubclass(annotation, Section):
-        return {name: of_field(field, kind) for name, field in annotation.model_fields.items()}
+        fields = annotation.model_fields.items()
+        keys = [name for name, field in fields if field.is_required() and name != "kind"]
+        return Keys({name: of_field(field, kind) for name, field in fields}, keys)
     if annotation in (int, float):
         return annotation(limits[annotated_types.Ge].ge)
     of_literal = kind if kind in arguments else next(iter(arguments), None)
@@ -83,7 +105,7 @@ def put(data: Any, place: Place, value: Any) -> None:
 def problems(directory: Path, schema: type[Section], data: Any) -> dict[str, Problem]:
     """Problems by their places; each has the line of its key, or of the section that lacks it."""
     file = directory / "file.yaml"
-    text = yaml.safe_dump(data, sort_keys=False)
+    text = yaml.dump(data, Dumper=Dumper, sort_keys=False)
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as caught:
         load_section(file, schema)
@@ -131,6 +153,35 @@ def test_a_wrong_type_at_every_place(tmp_path: Path, schema: type[Section], kind
             assert message.startswith("expected ")
             assert message.endswith((", got 3", ", got ['wrong']"))
             assert "Input should" not in message  # which is what pydantic says
+
+
+@files
+def test_no_key_in_any_section_that_needs_it(
+    tmp_path: Path, schema: type[Section], kind: str
+) -> None:
+    for depth in range(1, 1 + max(len(place) for place, _ in places(whole(schema, kind)))):
+        data = whole(schema, kind)
+        sections = [(p, v) for p, v in places(data) if len(p) == depth and isinstance(v, Keys)]
+        missing = {where((*place, key)) for place, one in sections for key in one.required}
+        for _, section in sections:
+            for key in section.required:
+                del section[key]
+        problem_at = problems(tmp_path, schema, data) if missing else {}
+        assert all(problem_at[place].message.startswith("missing: ") for place in missing)
+
+
+@files
+def test_a_number_beyond_its_range_at_every_place(
+    tmp_path: Path, schema: type[Section], kind: str
+) -> None:
+    numbers = [(p, type(v)) for p, v in places(whole(schema, kind)) if type(v) in (int, float)]
+    for value in (-(10**12), 10**12, float("nan")):
+        data = whole(schema, kind)
+        for place, number in numbers:
+            put(data, place, number(value) if math.isfinite(value) else value)
+        problem_at = problems(tmp_path, schema, data)
+        for place, _ in numbers:
+            assert RANGE.match(problem_at[where(place)].message), where(place)
 
 
 @pytest.mark.parametrize("value", ["wrong", ["wrong"], {}, None])

@@ -84,47 +84,15 @@ def test_the_json_schema_accepts_it(shipped: str, text: str, parameters: dict[st
 
 
 BAD = [
-    ("kind: first_order", "time_constant_s: missing: time to 63 % of a step (s)"),
-    ("kind: first_order, time_constant_s: 0.001", "expected 0.01 to 5 s, got 0.001"),
-    ("kind: first_order, time_constant_s: .nan", "expected 0.01 to 5 s, got nan"),
-    ("kind: first_order, time_constant_s: 1, tau: 1", "tau: expected one of the keys kind, time_"),
-    ("kind: s_curve, rate_per_s: 1", "jerk_per_s2: missing: fastest change of the rate (full"),
-    (
-        "kind: s_curve, rate_per_s: 0.1, jerk_per_s2: 9",
-        "rate_per_s: expected 0.2 to 100 full speeds per s, got 0.1",
-    ),
-    (
-        "kind: s_curve, rate_per_s: 1, jerk_per_s2: 1001",
-        "jerk_per_s2: expected 0.2 to 1000 full speeds per s^2, got 1001",
-    ),
-    ("kind: zv, residual_pct: 5", "residual_pct: expected one of the keys kind"),
-    ("kind: zvd, a1: 0.4", "a1: expected one of the keys kind"),
-    ("kind: ei, residual_pct: 0", "residual_pct: expected 0.1 to 20 %, got 0"),
-    ("kind: ei, residual_pct: 21", "residual_pct: expected 0.1 to 20 %, got 21"),
-    ("kind: two_mode, period_s: 1", "damping_ratio: missing: damping ratio of the second mode"),
-    (
-        "kind: two_mode, period_s: 26, damping_ratio: 0",
-        "period_s: expected 0.15 to 25 s, got 26",
-    ),
-    ("kind: two_mode, period_s: 1, damping_ratio: 1", "expected 0 to 0.95, got 1"),
     ("kind: gff, third_pole_rad_s: -4", "expected a1 and a2, or poles_rad_s, got neither"),
     ("kind: gff, a1: 0.42", "expected a1 and a2, or poles_rad_s, got a1"),
     (
         "kind: gff, poles_rad_s: [-4, -4], a1: 1",
         "expected a1 and a2, or poles_rad_s, got a1, poles_rad_s",
     ),
-    (
-        "kind: gff, poles_rad_s: [-4, -4], third_pole_rad_s: 4",
-        "third_pole_rad_s: expected -100 to -0.1 rad/s, got 4",
-    ),
-    ("kind: robust, taps: [1]", "tick_ms: missing: period of the taps: that of the valve (ms)"),
-    ("kind: robust, tick_ms: 20", "filter.taps: missing"),
     ("kind: robust, tick_ms: 20, taps: []", "taps: expected 1 or more entries, got []"),
     ("kind: robust, tick_ms: 20, taps: [0.5, 0.4]", "sum of the taps: expected 1, got 0.9"),
     ("kind: robust, tick_ms: 20, taps: [1.5, -0.5]", "taps.0: expected 0 to 1, got 1.5"),
-    ("kind: robust, tick_ms: 20, taps: [1, .nan]", "taps.1: expected 0 to 1, got nan"),
-    ("kind: robust, tick_ms: 0, taps: [1]", "expected a whole number, 1 to 200 ms, got 0"),
-    ("kind: robust, tick_ms: 20, taps: 1", "taps: expected a list, got 1"),
 ]
 
 

@@ -21,32 +21,13 @@ KINDS = "'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei', 'two_mode', 
         # unknown keys, wherever they stand, with those allowed there
         ("tick_ms", "ticks", f"ticks: expected one of the keys {TOP}"),
         (
-            "channel: vcan0",
-            "channel: a, speed: 1",
-            "buses.crane.speed: expected one of the keys interface, channel, bitrate",
-        ),
-        (
             "enable: Enable",
             "enable: Enable\n    on: X",
             "joysticks.left.on: expected one of the keys bus, message, alive_counter, checksum,"
             " e2e, cycle_ms, multiplexor, source, timeout_ms, alive_max_step, qualify, enable,"
             " enable_of, reset, anti_sway_off, next_profile, node, stuck_s",
         ),
-        (
-            "{ joystick: left,",
-            "{ joystick: left, deadzone: 1,",
-            "axes.slew.command.deadzone: expected one of the keys full, zero, invert, codes,"
-            " joystick, signal, flags, negative, neutral_pct",
-        ),
-        (
-            "kind: gff,",
-            "kind: gff, a3: 1,",
-            "axes.slew.filter.a3: expected one of the keys kind, a1, a2, poles_rad_s",
-        ),
-        ("kind: off", "kind: off, a1: 1", "axes.lift.filter.a1: expected one of the keys kind"),
         # missing keys, with what they mean
-        ("interface: socketcan, ", "", "buses.crane.interface: missing: python-can interface"),
-        ("joystick: left, ", "", "axes.slew.command.joystick: missing: name of a joystick"),
         (", full_speed_m_s: 1.5", "", "axes.slew.sway.full_speed_m_s: missing: speed of the tip"),
         # numbers
         ("tick_ms: 20", "tick_ms: 0", "expected a whole number, 1 to 50 ms, got 0"),
@@ -70,26 +51,13 @@ KINDS = "'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei', 'two_mode', 
             "rise_per_s: {a: 5}",
             "expected 0.2 to 100 full speeds per s, got {'a': 5}",
         ),
-        (
-            "neutral_pct: 2",
-            "neutral_pct: 20.1",
-            "expected 0.1 to 20 % of full deflection, got 20.1",
-        ),
-        (
-            "period_s: 2.356",
-            "period_s: 0.1",
-            "axes.slew.sway.period_s: expected 0.15 to 25 s, got 0.1",
-        ),
-        ("damping_nms: 120", "damping_nms: -1", "expected 0 to 1e+06 N m s/rad, got -1"),
         # other types
         (
             "channel: vcan0",
             "channel: 0",
             "expected text (in quotes where it looks like a number), got 0",
         ),
-        ("tail_s: 2.0", "allow_reverse: 1", "expected true or false, got 1"),
         ("tail_s: 2.0", "allow_faster: yes", "expected true or false, got 'yes'"),
-        ("[../dbc/forwarder.dbc]", "a.dbc", "dbc: expected a list, got 'a.dbc'"),
         ("[../dbc/forwarder.dbc]", "[]", "dbc: expected 1 or more entries, got []"),
         (
             "[../dbc/forwarder.dbc]",

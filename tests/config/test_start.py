@@ -5,10 +5,10 @@ import sys
 
 import pytest
 
+from canshaper.config.desk import Accept
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Limits
 from canshaper.config.schema import AxisSection, DeploymentConfig, FeedbackSection
-from canshaper.config.uncertainty import Accept
 
 START = """
 import inspect

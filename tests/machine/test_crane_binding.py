@@ -36,20 +36,16 @@ def test_without_it_the_names_say_it() -> None:
     [
         ("hoist: hoist }", "hoist: winch }", "crane.hoist: expected an axis, got 'winch'"),
         ("trolley: trolley", "trolley: bridge", "crane.trolley: expected an axis of its own, got"),
-        ("bridge: bridge,", "slew: bridge,", "crane.slew: expected one of the keys simulated,"),
         (
             "kind: cartesian",
             "kind: polar",
             "crane.kind: expected one of 'cylindrical', 'cartesian'",
         ),
         ("kind: cartesian, ", "", "crane.kind: expected one of 'cylindrical', 'cartesian'"),
-        (RANGE, "lowest_m: 0, highest_m: 30", "lowest_m: expected 0.3 to 150 m, got 0"),
         (RANGE, "lowest_m: 5, highest_m: 5", "highest_m: expected more than lowest_m, got 5"),
-        (RANGE, "lowest_m: .nan, highest_m: 5", "lowest_m: expected 0.3 to 150 m, got nan"),
         (RANGE, "offset_m: -15, lowest_m: 1.5, highest_m: 150", "within the range of RopeLength"),
         (RANGE, f"{RANGE}, lost: guess", "lost: expected 'longest', 'hold' or 'neutral'"),
         ("signal: RopeLength", "signal: Rope", "expected a signal of CranePosition, got 'Rope'"),
-        ("kind: robust", "kind: zv", "tick_ms: expected one of the keys kind"),
     ],
 )
 def test_what_is_none_is_said_in_a_line(tmp_path: Path, old: str, new: str, says: str) -> None:

@@ -93,7 +93,6 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
             "{ profile: p05, data_id: 0x10000 }",
             ": data_id: expected up to 0xffff with profile p05, got 0x10000",
         ),
-        (JOYSTICK, "{ data_id: 1 }", ".profile: missing: profile of AUTOSAR E2E"),
         (
             JOYSTICK,
             "{ profile: p01, data_id: 1 }",
@@ -138,19 +137,9 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
             ".data_ids: expected 16 entries at most, got [",
         ),
         (
-            JOYSTICK,
-            f"{{ profile: p02, data_ids: {[*IDS[:15], 256]} }}",
-            ".data_ids.15: expected a whole number, 0 to 255, got 256",
-        ),
-        (
             "data_id: 0x123",
             "data_id: 0x10000",
             ": data_id: expected up to 0xffff with profile p01, got 0x10000",
-        ),
-        (
-            "data_id: 0x123",
-            "data_id: -1",
-            ".data_id: expected a whole number, 0 to 4294967295, got -1",
         ),
         (
             "data_id_mode: both",
@@ -161,11 +150,6 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
             "0x123, data_id_mode: both",
             "0x1234, data_id_mode: nibble",
             ": data_id: expected up to 0xfff in mode nibble, got 0x1234",
-        ),
-        (
-            "data_id_mode: both",
-            "data_id_mode: both, offset: 8",
-            ".offset: expected one of the keys profile, data_id, data_id_mode, data_ids",
         ),
     ],
 )

@@ -73,26 +73,9 @@ def test_two_channels_that_nothing_distinguishes(tmp_path: Path, first: str, sec
     [
         ("{}", "match", "expected one of serial, path, port, driver, bitrate, got none"),
         (
-            "{ serial: 17 }",
-            "match.serial",
-            "expected text (in quotes where it looks like a number), got 17",
-        ),
-        (
             '{ serial: "" }',
             "match.serial",
             "expected text (in quotes where it looks like a number), got ''",
-        ),
-        ("{ port: 64 }", "match.port", "expected a whole number, 0 to 63, got 64"),
-        (
-            "{ bitrate: 9999 }",
-            "match.bitrate",
-            "expected a whole number, 10000 to 1000000 bit/s, got 9999",
-        ),
-        ("{ name: can0 }", "match.name", "expected one of the keys serial, path, port, driver"),
-        (
-            "true",
-            "match",
-            "expected a section with the keys serial, path, port, driver, bitrate, got True",
         ),
         (
             "{ bitrate: 500000 }",

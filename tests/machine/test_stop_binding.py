@@ -73,10 +73,6 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
             "emergency_stop.timeout_ms: expected 40 ms or more, twice the cycle of Stop, got 39",
         ),
         (
-            STOP.replace("100", "1001"),
-            "emergency_stop.timeout_ms: expected a whole number, 10 to 1000 ms, got 1001",
-        ),
-        (
             f"{STOP}, alive_counter: Pressed, alive_max_step: 2",
             "emergency_stop.alive_counter: expected a free signal, got 'Pressed', which is signal"
             " already",
@@ -98,8 +94,6 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
             "emergency_stop.checksum.signal: expected a free signal, got 'Check', which is"
             " alive_counter already",
         ),
-        (f"{STOP}, stuck_s: 5", "emergency_stop.stuck_s: "),
-        (f"{STOP}, enable: Pressed", "emergency_stop.enable: "),
         (
             STOP.replace("Stop", "JoystickLeft").replace("Pressed", "Reset"),
             "emergency_stop.message: JoystickLeft has the id 0x110 on bus crane, which is used"
@@ -112,13 +106,6 @@ def test_what_an_emergency_stop_may_not_say(stoppable: Machine, text: str, says:
     stoppable.in_dbc("(0.8,0)", "(1,0)")
     (problem,) = stoppable.problems()
     assert problem.startswith(f"machine.yaml:{line}: {says}")
-
-
-@pytest.mark.parametrize("key", ["bus: crane", "message: Stop", "signal: Pressed"])
-def test_what_an_emergency_stop_must_say(stoppable: Machine, key: str) -> None:
-    line = stop(stoppable, STOP.replace(f"{key}, ", "") + " }")
-    (problem,) = stoppable.problems()
-    assert problem.startswith(f"machine.yaml:{line}: emergency_stop.{key.partition(':')[0]}: ")
 
 
 def test_an_emergency_stop_without_a_cycle_is_a_problem_of_the_dbc(stoppable: Machine) -> None:

@@ -138,9 +138,6 @@ SAYS = [
         ".signal: expected a signal of GrappleSway, got 'Sway'; there are SwayPerpendicular,"
         " SwayParallel",
     ),
-    (f"{ALONG}, delay_ms: 501", ".delay_ms: expected 0 to 500 ms, got 501"),
-    (f"{ALONG}, noise_deg: 9", ".noise_deg: expected 0.01 to 5 deg, deg/s, got 9"),
-    (f"{ALONG}, offset_max_deg: 21", ".offset_max_deg: expected 0.1 to 20 deg, deg/s, got 21"),
     (f"{ALONG}, node: tool", ".node: expected a node of bus crane, got 'tool'; there are none"),
     (
         f"{ALONG}, fusion_s: 5",
@@ -161,7 +158,6 @@ SAYS = [
         changed("timeout_ms: 80", "timeout_ms: 30"),
         ".timeout_ms: expected 40 ms or more, twice the cycle of GrappleSway, got 30",
     ),
-    (f"{ALONG}, second_period_s: 3.1", ".second_period_s: expected 0.15 to 3 s, got 3.1"),
     (
         f"{ALONG}, second_period_s: 1.2",
         ".second_period_s: expected up to 1.10 s, half of the first swing, got 1.2 s",
@@ -169,7 +165,6 @@ SAYS = [
 ]
 STARTS = [
     (changed("GrappleSway", "GrappleSwing"), ".message: "),
-    (changed("kind: angle", "kind: force"), ".kind: "),
 ]
 
 

@@ -9,7 +9,7 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shipped import deployment_path
 from canshaper.studio.crane import copied
 from canshaper.studio.in_process import MOST_MS, InProcessCrane
-from canshaper.studio.sliders import sliders, values
+from canshaper.studio.numbers import sliders, values
 from canshaper_sim.hand import Held
 
 REST, SLEWING = Held(enable=True), Held({"slew": 0.6}, enable=True)

@@ -10,7 +10,7 @@ from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.studio.crane import copied
-from canshaper.studio.sliders import LENGTH, RANGES, adjustable, sliders, values
+from canshaper.studio.numbers import LENGTH, RANGES, adjustable, sliders, values
 from tests.rigs.files import CONFIG, machine_file
 
 FILES = sorted(path.name for path in CONFIG.glob("*.yaml") if "axes:" in path.read_text())

@@ -1,4 +1,7 @@
-"""Answers to questions: checked when given, asked again until valid, or all accepted at once."""
+"""Questions and their answers: typed by a person, read from a file, or proposals accepted at once.
+
+Every answer is parsed; a person is asked again until it is valid.
+"""
 
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -18,17 +21,17 @@ MOST_LISTED = 20
 
 
 class Given:
-    """Answers out of a file, for questions that no one is asked.
+    """Answers from a file, so that no one is asked.
 
-    A line is ``QUESTION = ANSWER``, the question by its first words, that of an axis after its
-    name; ``#`` begins a comment. A question without a line takes what Enter would.
+    A line is ``QUESTION = ANSWER``. The question is given by its first words, that of an axis with
+    its name first; ``#`` begins a comment. A question without a line gets its default.
 
     Args:
-        path: the file; None for no line at all.
+        path: the file; None answers every question with its default.
 
     Raises:
-        OSError: it cannot be read.
-        ConfigError: it is no text, or a line is none.
+        OSError: the file cannot be read.
+        ConfigError: the file is no UTF-8 text, or a line is no ``QUESTION = ANSWER``.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -58,13 +61,13 @@ class Given:
             raise ConfigError(problems)
 
     def answer(self, text: str, parse: Callable[[str], _T], default: str) -> _T:
-        """The answer to a question.
+        """Return the parsed answer to a question.
 
         Raises:
-            ConfigError: it is none.
+            ConfigError: the answer is invalid.
         """
         question = text.strip()
-        if text.startswith("    "):  # one more on the same axis
+        if text.startswith("    "):  # another question about the same axis
             question = f"{self._axis}: {question}"
         elif text.startswith("  "):
             self._axis = question.partition(":")[0]
@@ -77,10 +80,10 @@ class Given:
             raise ConfigError([Problem(str(self._path), number, words, str(error))]) from None
 
     def check_all_used(self) -> None:
-        """Refuse answers to what was not asked.
+        """Check that every line answered a question.
 
         Raises:
-            ConfigError: there are some.
+            ConfigError: some lines did not.
         """
         problems = [
             Problem(
@@ -96,20 +99,20 @@ class Given:
 
 
 class Proposed:
-    """The proposals of all questions as their answers, for a person to look at before.
+    """Answers every question with its proposal, and keeps both for a person to look at.
 
     Attributes:
-        rows: question and proposal.
+        rows: questions with their proposals.
     """
 
     def __init__(self) -> None:
         self.rows: list[tuple[str, str]] = []
 
     def answer(self, text: str, parse: Callable[[str], _T], default: str) -> _T:
-        """The proposal.
+        """Return the parsed proposal.
 
         Raises:
-            ValueError: there is none.
+            ValueError: the question has no valid proposal.
         """
         value = parse(default)
         self.rows.append((text, default))
@@ -121,7 +124,7 @@ _given: Given | Proposed | None = None
 
 @contextmanager
 def _answered(given: Given | Proposed | None) -> Iterator[None]:
-    global _given  # noqa: PLW0603  # of the one command that runs
+    global _given  # noqa: PLW0603  # a process runs one command
     _given = given
     try:
         yield
@@ -131,9 +134,9 @@ def _answered(given: Given | Proposed | None) -> Iterator[None]:
 
 @contextmanager
 def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
-    """Take the answers to all questions in the block from a file, where there is one.
+    """Answer the questions in the block from a file, if there is one.
 
-    With ``yes`` what has no line in it is answered as by Enter, without a file everything.
+    Questions without a line get their defaults. With ``yes`` and no file all questions do.
     """
     given = Given(path) if path or yes else None
     with _answered(given):
@@ -143,14 +146,14 @@ def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
 
 
 def confirmed(text: str, *, default: bool) -> bool:
-    """Ask for yes or no."""
+    """Ask a question that is answered by yes or no."""
     if _given:
         return _given.answer(text, one(("yes", "no")), "yes" if default else "no") == "yes"
     return typer.confirm(text, default=default)
 
 
 def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
-    """Ask until the answer is one."""
+    """Ask until ``parse`` accepts the answer; return what it makes of it."""
     if _given:
         return _given.answer(text, parse, default)
     while True:
@@ -162,7 +165,7 @@ def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
 
 
 def name(used: Collection[str]) -> Callable[[str], str]:
-    """Takes a word that can be a name in a deployment file and is not in use, or NONE."""
+    """Return a parser of an unused name for a deployment file, or NONE."""
 
     from canshaper.edit.edit import plain
 
@@ -178,21 +181,21 @@ def name(used: Collection[str]) -> Callable[[str], str]:
 
 
 def channel(text: str) -> str:
-    """The name of a CAN interface."""
+    """Parse the name of a CAN interface."""
     if not text or not text.isprintable() or " " in text:
         raise ValueError(f"expected a name without spaces, such as can0, got {text!r}")
     return text
 
 
 def _listed(allowed: Sequence[str], text: str) -> str:
-    """Those that are allowed, not more than a person reads, and the one that looks like a text."""
+    """Return up to MOST_LISTED allowed words, the typed text, and a word that resembles it."""
     names = ", ".join(allowed[:MOST_LISTED])
     more = f" and {len(allowed) - MOST_LISTED} more" if len(allowed) > MOST_LISTED else ""
     return f"{names}{more}, got {text!r}{did_you_mean(text, allowed)}"
 
 
 def one(allowed: Sequence[str]) -> Callable[[str], str]:
-    """Takes one of these."""
+    """Return a parser that accepts one of these words."""
 
     def parse(text: str) -> str:
         if text not in allowed:
@@ -203,7 +206,7 @@ def one(allowed: Sequence[str]) -> Callable[[str], str]:
 
 
 def several(allowed: Sequence[str]) -> Callable[[str], list[str]]:
-    """Takes one or more of these, with spaces or commas between."""
+    """Return a parser of one or more of these words, separated by spaces or commas."""
 
     def parse(text: str) -> list[str]:
         names = text.replace(",", " ").split()
@@ -215,7 +218,7 @@ def several(allowed: Sequence[str]) -> Callable[[str], list[str]]:
 
 
 def number(low: float, high: float) -> Callable[[str], float]:
-    """Takes a number within [low, high]."""
+    """Return a parser of a number within [low, high]."""
 
     def parse(text: str) -> float:
         fault = f"expected a number, {low:g} to {high:g}, got {text!r}"
@@ -231,7 +234,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
 
 
 def whole(low: float, high: float) -> Callable[[str], int]:
-    """Takes a whole number within [low, high]."""
+    """Return a parser of a whole number within [low, high]."""
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
@@ -242,22 +245,22 @@ def whole(low: float, high: float) -> Callable[[str], int]:
 
 
 def period_ms(message: str) -> int:
-    """Ask for the period of a message, in ms."""
+    """Ask for the period of a message, ms."""
     return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")
 
 
-# What may be answered, as the end of a question says it.
+# End of a question, which lists possible answers; the table of proposals leaves it out.
 _CHOICES = re.compile(r", (of|such as) .*|, - for none")
 
 
 def accepted(ask: Callable[[], _T]) -> _T | None:
-    """Ask for all answers at once: show what Enter would answer, and whether to accept it.
+    """Show the proposals of all questions, and ask whether to accept them at once.
 
     Args:
-        ask: asks the questions.
+        ask: asks the questions, and returns a result from the answers.
 
     Returns:
-        None where not, or where a question has no proposal: then they have to be asked.
+        The result; None if the person declines, or a question has no valid proposal.
     """
     from canshaper.report.console import SafeConsole, new_table
 
@@ -271,6 +274,6 @@ def accepted(ask: Callable[[], _T]) -> _T | None:
     for question, proposal in proposed.rows:
         table.add_row(_CHOICES.sub("", question), "none" if proposal == NONE else proposal)
     SafeConsole().print(table)
-    echo("What no DBC says, such as swing and speeds, is a guess until it is measured.")
+    echo("Numbers that no DBC states, such as swing and speeds, are guesses until measured.")
     question = "Accept all of these (no: answer them one by one)"
     return made if confirmed(question, default=True) else None

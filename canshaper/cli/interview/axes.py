@@ -1,4 +1,4 @@
-"""Questions of ``canshaper init`` on the axes of a joystick, their valves and their signals."""
+"""Questions of ``canshaper init`` about the axes of a joystick, their valves and signals."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -35,7 +35,10 @@ def add_axes(
     others: list[Message],
     nodes: Nodes,
 ) -> None:
-    """Ask for the axes of a joystick and add them; ``others`` are the messages of no joystick."""
+    """Ask about the axes of a joystick and append them to ``axes``.
+
+    ``others`` are the messages that belong to no joystick; those of chosen valves are removed.
+    """
     two_sided = suggest.velocities(message)
     for command in two_sided or suggest.one_sided(message):
         names = [axis.name for axis in axes]
@@ -86,9 +89,9 @@ def add_axes(
 def _valve_of(
     axis: str, command: Signal, others: list[Message], axes: list[FirstAxis]
 ) -> tuple[Message, Signal] | None:
-    """Message and signal of the valve of an axis; it is taken from those that are left.
+    """Ask for message and signal of the valve of an axis; None if the axis is left out.
 
-    A message is left as long as it has another signal that can command one.
+    The message leaves ``others`` when none of its other signals can command a valve.
     """
     candidates = suggest.valves(others, command.name)
     possible = [m for m in candidates if _valve_timeouts(m.cycle_time or 0) is not None]
@@ -115,17 +118,17 @@ def _valve_of(
 
 
 def _valve_timeouts(cycle_ms: int) -> tuple[int, int] | None:
-    """Shortest and longest of a valve that is commanded so often; None where there is none."""
+    """Return shortest and longest timeout of a valve with this cycle, ms; None if none fits."""
     least, most = (int(ms) for ms in limits(Valve, "timeout_ms"))
     shortest = max(least, FRAMES_PER_TIMEOUT * cycle_ms)
     return (shortest, most) if shortest <= most else None
 
 
 def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
-    """Ask for the timeout of a valve; ``set_ms`` is what it has by its EDS, 0 for none.
+    """Ask for the timeout of a valve; ``set_ms`` is that of its EDS, 0 for none.
 
     Returns:
-        The timeout in ms, and whether EDS or operator say it: else it is our proposal.
+        The timeout in ms, and whether it is known: from the EDS, or typed instead of our proposal.
     """
     timeouts = _valve_timeouts(cycle_ms)
     if timeouts is None:
@@ -142,7 +145,7 @@ MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
 
 
 def command_scaling(signal: Signal, message: Message) -> FirstScaling:
-    """Ask how a joystick signal gives a command: around a value, with flags, or by two signals."""
+    """Ask how a signal encodes the direction: by a middle value, flags, or a second signal."""
     if symmetrical_range(signal) is None:
         return FirstScaling()
     if suggest.two_sided(signal):
@@ -165,7 +168,7 @@ def command_scaling(signal: Signal, message: Message) -> FirstScaling:
 
 
 def valve_scaling(signal: Signal) -> FirstScaling:
-    """Ask for the scaling of a valve's signal."""
+    """Ask for the scaling of a valve's signal where the DBC does not state it."""
     if symmetrical_range(signal) is None:
         return FirstScaling()
     return _around_zero(signal) if suggest.two_sided(signal) else _around_middle(signal)
@@ -192,12 +195,12 @@ def _full(signal: Signal, zero: float) -> float:
 
 
 def _inverted(signal: Signal) -> bool:
-    text = f"  {signal.name}: does it count the other way round (invert)"
+    text = f"  {signal.name}: is this signal reversed (invert)"
     return confirmed(text, default=False)
 
 
 def _three(allowed: Sequence[str]) -> Callable[[str], tuple[str, str, str]]:
-    """Takes three different ones of these, with spaces or commas between."""
+    """Return a parser of three different words out of these, separated by spaces or commas."""
 
     def parse(text: str) -> tuple[str, str, str]:
         names = text.replace(",", " ").split()

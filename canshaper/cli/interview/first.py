@@ -1,4 +1,4 @@
-"""Knowledge of a person about a new machine, for its first deployment file."""
+"""Answers of ``canshaper init`` as data: what its first deployment file is written from."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,30 +8,34 @@ from canshaper.config.filters import Filter, filter_of
 from canshaper.config.limits import Limits, Sway
 from canshaper.config.load import limits
 
-# Proposals where nothing is known: ten swings in s, speeds of the tip (m/s) and of slewing (rad/s),
-# largest radius in m, timeout of a valve in ms. What stays as it is, the file says as assumed.
+# Proposals where nothing is known: time of ten swings (s), speeds of the tip (m/s) and of slewing
+# (rad/s), largest radius (m), timeout of a valve (ms). The file lists unchanged ones as assumed.
 TEN_SWINGS_S, TIP_M_S, SLEWING_RAD_S, RADIUS_M, VALVE_TIMEOUT_MS = 23.6, 1.0, 0.5, 9.0, 200
-# Of the measured radius of the tip.
+# Timeout of the measured radius of the tip.
 RADIUS_TIMEOUT_MS = 200
-# Of full speed, for the first motion; raised step by step while it works.
+# Percent of full speed for the first motion; a person raises it step by step.
 FIRST_MAX_PCT = 40
-# Tail and longest stop: what the run-on of a filter for a swing of two to three seconds takes.
+# Tail and longest stop: the run-on of a filter for a swing of two to three seconds fits in.
 FIRST_TAIL_S = 2.2
-# Run-on of the first day: 0.36 periods are those of robust 1.8 s at 2.36 s, and a quarter more.
+# Run-on in periods of the swing: 0.36 of a robust shaper of 1.8 s at 2.36 s, and a quarter more.
 RUN_ON_PERIODS = 0.45
-# Poles next to the frequency of the swing: the first step of the filter is what was asked, no more.
+# Poles around the frequency of the swing: the first step of the output equals the command's.
 POLES_TO_OMEGA = (0.9, 1.1)
-# Room for a wrong stopwatch in what may be changed while it works.
+# Range of the period that may be set on the running machine: room for a wrong stopwatch.
 PERIOD_RANGE = (0.7, 1.4)
 
 
 @dataclass(frozen=True)
 class FirstJoystick:
-    """A joystick: its name, message, switches and alive counter; its cycle, where the DBC has none.
+    """A joystick.
 
-    ``switch`` is the message of its enable switch, where that is another one, ``code`` the value
-    of that signal that enables, ``enable_of`` the joystick whose switch enables it; ``node`` is the
-    name of its node on CANopen, ``multiplexor`` the value with which a multiplexed message counts.
+    Attributes:
+        cycle_ms: cycle of its message if the DBC states none.
+        switch: message of its enable switch if that is another one.
+        code: value of that switch's signal that enables.
+        enable_of: joystick whose switch enables this one.
+        node: its CANopen node.
+        multiplexor: value at which the multiplexed message is meant.
     """
 
     name: str
@@ -51,7 +55,7 @@ class FirstJoystick:
 
 @dataclass(frozen=True)
 class Stopwatch:
-    """Ten swings, how far the first and the last one went, and the speed of the tip."""
+    """Ten swings by the stopwatch: time, amplitudes of the first and last one, speed of the tip."""
 
     ten_swings_s: float
     first: float
@@ -60,17 +64,17 @@ class Stopwatch:
 
     @property
     def period_s(self) -> float:
-        """Time of one full swing."""
+        """Time of one full swing, seconds."""
         return self.ten_swings_s / 10.0
 
     @property
     def decay_per_swing(self) -> float:
-        """Part of the amplitude that is lost over a full swing."""
+        """Part of the amplitude that a full swing loses."""
         return 1.0 - math.pow(self.last / self.first, 0.1)
 
     @property
     def filter(self) -> Filter:
-        """A filter to begin with."""
+        """G_FF filter to begin with."""
         omega = 2.0 * math.pi / self.period_s
         poles = [float(rounded(-share * omega)) for share in POLES_TO_OMEGA]
         return filter_of("gff", poles_rad_s=poles)
@@ -85,20 +89,20 @@ class Stopwatch:
 
 @dataclass(frozen=True)
 class FirstSlewing:
-    """An axis that turns the crane: its full speed, and how far out the tip may be."""
+    """Full speed of an axis that turns the crane, and the largest radius of the tip."""
 
     full_speed_rad_s: float
     largest_radius_m: float
 
     @property
     def full_speed_m_s(self) -> float:
-        """Full speed of the tip, farthest out."""
+        """Full speed of the tip at the largest radius."""
         return self.full_speed_rad_s * self.largest_radius_m
 
 
 @dataclass(frozen=True)
 class FirstMotion:
-    """Slew and near-far as one motion, and MESSAGE.SIGNAL of the radius where it is measured."""
+    """Slew and near-far as one motion; ``radius`` is MESSAGE.SIGNAL if the radius is measured."""
 
     slew: str
     near_far: str
@@ -108,9 +112,10 @@ class FirstMotion:
 
 @dataclass(frozen=True)
 class FirstLoad:
-    """Time of ten swings with a log, by axis, and the signal that says that there is one.
+    """Time of ten swings with a log, by axis, and the signal that says that a log is gripped.
 
-    Without a signal one response has to hold for both; ``empty`` and ``log`` are its values.
+    ``empty`` and ``log`` are the values of the signal. Without a signal one response holds for both
+    an empty grapple and a log.
     """
 
     ten_swings_s: Mapping[str, float]
@@ -124,7 +129,7 @@ class FirstLoad:
 
 @dataclass(frozen=True)
 class FirstSensor:
-    """A sway sensor, to be watched first; an inclination has a time constant of its fusion."""
+    """A sway sensor, which is only watched at first; ``fusion_s`` belongs to an inclination."""
 
     message: str
     signal: str
@@ -137,7 +142,7 @@ class FirstSensor:
 
 @dataclass(frozen=True)
 class FirstCanopen:
-    """Our node on a bus of CANopen, and the others: id and longest silence (ms) by name."""
+    """Our own CANopen node, and the others by name: id and heartbeat timeout (ms)."""
 
     node: int
     master: bool
@@ -146,7 +151,7 @@ class FirstCanopen:
 
 @dataclass(frozen=True)
 class FirstCia408:
-    """A valve of CiA 408: its control word, and message and signal of its status word."""
+    """Control word of a CiA 408 valve, and message and signal of its status word."""
 
     control: str
     message: str
@@ -157,10 +162,10 @@ class FirstCia408:
 
 @dataclass(frozen=True)
 class FirstScaling:
-    """Meaning of a signal where the DBC does not give it.
+    """Scaling of a signal where the DBC does not state it.
 
-    ``flags`` are those of neutral, negative and positive, ``negative`` is the second signal of a
-    rocker.
+    ``flags`` are the signals of neutral, negative and positive; ``negative`` is the second signal
+    of a rocker.
     """
 
     full: float | None = None
@@ -172,7 +177,7 @@ class FirstScaling:
 
 @dataclass(frozen=True)
 class FirstAxis:
-    """An axis: its joystick, its valve, its swing where it has one, and how it turns the crane."""
+    """An axis: joystick, valve, and its swing and slewing if it has them."""
 
     name: str
     joystick: str
@@ -194,10 +199,10 @@ class FirstAxis:
     codes: Mapping[str, str] = field(default_factory=dict)
     """Codes of its command, see ``NamedCodes``."""
     timeout_known: bool = False
-    """Whether the timeout is that of an EDS, or typed."""
+    """Whether the timeout comes from an EDS or was typed."""
 
     def assumed(self) -> list[str]:
-        """Keys of numbers that are proposals still."""
+        """Return the keys of the file whose numbers are unchanged proposals."""
         keys = [] if self.timeout_known else ["valve.timeout_ms"]
         if self.swing and self.swing.ten_swings_s == TEN_SWINGS_S:
             keys += ["sway.period_s", "sway.decay_per_swing"]
@@ -214,7 +219,7 @@ class FirstAxis:
 
 @dataclass(frozen=True)
 class FirstMachine:
-    """Everything that is asked; ``notes`` are said at the top of the file."""
+    """All answers; ``notes`` become comments at the top of the file."""
 
     channel: str
     bitrate: int
@@ -227,31 +232,31 @@ class FirstMachine:
     interface: str = "socketcan"
     canopen: FirstCanopen | None = None
     data_bitrate: int | None = None
-    """Bit rate of the data of a bus of CAN FD."""
+    """Data bit rate of a CAN FD bus, bit/s."""
     notes: Sequence[str] = field(default=())
     load: FirstLoad | None = None
 
 
 def ten_swings_s() -> tuple[float, float]:
-    """Shortest and longest time of ten swings whose period may be changed as far as is written."""
+    """Return shortest and longest time of ten swings whose PERIOD_RANGE the file may state."""
     least, most = limits(Sway, "period_s")
     low, high = 10.0 * least / PERIOD_RANGE[0], 10.0 * most / PERIOD_RANGE[1]
-    # In tenths and inwards, so that both are allowed as they are written.
+    # Rounded inwards to tenths, so that both ends are allowed as they are written.
     return math.ceil(10.0 * low) / 10.0, math.floor(10.0 * high) / 10.0
 
 
 def stop_distance_m(
     full_speed_m_s: float, period_s: float, joystick_timeout_ms: int, valve_timeout_ms: int
 ) -> float:
-    """Room for the run-on of a filter and for a lost joystick, rounded up to a tenth of a metre.
+    """Return a stop distance (m) for run-on and a lost joystick, rounded up to a tenth.
 
-    At most what a file may have: no machine with sense needs more.
+    It is never more than a file may state; no sensible machine needs more.
 
     Args:
-        full_speed_m_s: speed of the tip.
-        period_s: of the swing; a filter that we recommend runs on for a third of it.
+        full_speed_m_s: full speed of the tip.
+        period_s: period of the swing, to which the run-on is proportional.
         joystick_timeout_ms: age at which the joystick counts as lost.
-        valve_timeout_ms: that of the valve, of which its cycle is a third at most.
+        valve_timeout_ms: timeout of the valve; its cycle is at most a third of it.
     """
     waits_s = joystick_timeout_ms / 1000.0 + 2.0 * valve_timeout_ms / 3000.0
     distance_m = math.ceil(10.0 * full_speed_m_s * (waits_s + RUN_ON_PERIODS * period_s)) / 10.0
@@ -259,5 +264,5 @@ def stop_distance_m(
 
 
 def rounded(number: float) -> str:
-    """A number as it is written."""
+    """Return a number as text, with four digits."""
     return f"{number:.4g}"

@@ -1,4 +1,4 @@
-"""The text of a first deployment file."""
+"""Text of the first deployment file, from the answers."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -25,12 +25,12 @@ from canshaper.edit.edit import plain
 
 
 def first_deployment(machine: FirstMachine) -> str:
-    """The deployment file, with a filter to begin with and reduced speed."""
+    """Return the text of the deployment file, with reduced speed and a filter to begin with."""
     return "\n".join(_lines(machine)) + "\n"
 
 
 def _text(value: object) -> str:
-    """A value as it is written; texts are as they are, a mapping is one line."""
+    """Return a value as YAML in one line; a text must already be YAML."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
@@ -39,13 +39,13 @@ def _text(value: object) -> str:
 
 
 def _flow(**values: object) -> str:
-    """A section in one line; keys without a value are left out."""
+    """Return a section as YAML in one line, without keys whose value is None."""
     texts = (f"{key}: {_text(value)}" for key, value in values.items() if value is not None)
     return f"{{ {', '.join(texts)} }}"
 
 
 def _block(indent: int, **values: object) -> Iterator[str]:
-    """A section, a key a line; those without a value are left out."""
+    """Yield a section as YAML, a key a line, without keys whose value is None."""
     for key, value in values.items():
         if value is not None:
             yield f"{' ' * indent}{key}: {_text(value)}"
@@ -85,7 +85,7 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
         yield ""
     if (load := machine.load) and load.message:
         keys = {"message": load.message, "signal": load.signal, "timeout_ms": load.timeout_ms}
-        yield "# What the grapple holds; silent for so long, and the axes' own filters hold."
+        yield "# Load of the grapple. After timeout_ms of silence the axes use their own filters."
         yield f"load_state: {_flow(bus='crane', **keys, codes=_codes(load.codes))}"
         yield ""
     for key in ("status", "identity"):
@@ -93,8 +93,8 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
             yield f"{key}: {_flow(bus='crane', message=message)}"
             yield ""
     if assumed := [key for axis in machine.axes for key in axis.assumed()]:
-        yield "# Guesses that no one has measured or typed: a verb with --write takes out what it"
-        yield "# measures. What stands in a manual: correct it above, and take it out here."
+        yield "# Guesses that no one has measured or typed. A verb with --write removes those it"
+        yield "# measures. If a manual has the number, write it above and remove its key here."
         yield "assumed:"
         yield from (f"  - {key}" for key in assumed)
         yield ""
@@ -102,7 +102,9 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
 
 
 def _adjustable(machine: FirstMachine) -> Iterator[str]:
-    by_load = bool(machine.load and machine.load.message)  # it chooses the numbers of those
+    by_load = bool(
+        machine.load and machine.load.message
+    )  # then the load chooses the numbers of axes that swing
     if not (settable := [axis for axis in machine.axes if not (axis.swing and by_load)]):
         return
     yield "# What `canshaper set` may change while the machine works."
@@ -148,7 +150,10 @@ def _joystick(joystick: FirstJoystick) -> Iterator[str]:
 
 
 def _switches(machine: FirstMachine) -> Iterator[str]:
-    """Enable switches in messages of their own, which come as often as the joystick."""
+    """Yield the enable switches that are in another message than their joystick.
+
+    They get cycle and timeout of the joystick.
+    """
     having = [joystick for joystick in machine.joysticks if joystick.switch]
     if not having:
         return
@@ -196,7 +201,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> 
         keys |= {"use": "watch", "timeout_ms": sensor.timeout_ms, "node": sensor.node}
         yield "    # Sign, delay and noise: `canshaper sensor FILE --live --write`. Then use: damp."
         yield f"    sway_sensor: {_flow(bus='crane', **keys)}"
-    yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."
+    yield "    # After the swing is measured: `canshaper robust FILE --axis NAME --write`."
     yield f"    {_filter(swing)}"
     if load and load.message:
         yield from _schedule(swing, load, load.ten_swings_s[axis.name])
@@ -212,7 +217,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> 
 
 
 def _schedule(swing: Stopwatch, load: FirstLoad, ten_swings_s: float) -> Iterator[str]:
-    """The swing and filter of an empty grapple and of a log."""
+    """Yield the gain schedule: sway and filter of an empty grapple and of a log."""
     yield f"    gain_schedule: # with a log ten swings in {ten_swings_s:g} s"
     with_log = replace(swing, ten_swings_s=ten_swings_s)
     for value, one in sorted([(load.empty, swing), (load.log, with_log)], key=lambda pair: pair[0]):
@@ -232,7 +237,7 @@ def _filter(swing: Stopwatch) -> str:
 
 
 def _scaling(scaling: FirstScaling) -> dict[str, object]:
-    """Its keys."""
+    """Return the keys of a scaling, by name; None for a key that is left out."""
     full, zero = (v if v is None else f"{v:.12g}" for v in (scaling.full, scaling.zero))
     names = ("neutral", "negative", "positive")
     return {
@@ -245,13 +250,13 @@ def _scaling(scaling: FirstScaling) -> dict[str, object]:
 
 
 def _codes(codes: Mapping[str, str]) -> dict[str, str] | None:
-    """Key ``codes`` of a section."""
+    """Return the key ``codes`` of a section; None without a code."""
     return {json.dumps(name, ensure_ascii=False): means for name, means in codes.items()} or None
 
 
 def _motion(motion: FirstMotion) -> Iterator[str]:
     yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
-    yield "# It waits until the first motion is done: the step motion of commission takes that out."
+    yield "# waits: true keeps it off; the step motion of commission removes that key."
     yield "motion:"
     yield "  crane:"
     yield from _block(4, waits=True, slew=motion.slew, near_far=motion.near_far)

@@ -1,4 +1,4 @@
-"""Questions of ``canshaper init`` on a machine: its bus, joysticks and switches."""
+"""Questions of ``canshaper init`` about the machine: its bus, joysticks and switches."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -30,23 +30,23 @@ from canshaper.config.schema import Joystick
 from canshaper.errors import UsageError
 from canshaper.machine.corrections import corrected, multiplexor
 
-FEWEST_CYCLES = 5  # of a joystick's message in its timeout
-FIRST_DATA_BITRATE = 2_000_000  # of most buses of CAN FD
+FEWEST_CYCLES = 5  # cycles of a joystick's message in its proposed timeout
+FIRST_DATA_BITRATE = 2_000_000  # bit/s, as on most CAN FD buses
 
 
 def machine_of(
     messages: list[Message], dbc: Sequence[str], interface: str, nodes: Nodes
 ) -> FirstMachine:
-    """Ask for a machine.
+    """Ask all questions about a machine, and return the answers.
 
     Args:
-        messages: of all its DBC files, and of its nodes.
-        dbc: those files, as the deployment file names them.
-        interface: of python-can.
-        nodes: its nodes of CANopen.
+        messages: messages of its DBC files and of its CANopen nodes.
+        dbc: the DBC files, as the deployment file will name them.
+        interface: interface of python-can.
+        nodes: its CANopen nodes.
 
     Raises:
-        UsageError: no machine can be made of these messages, or of the answers.
+        UsageError: the messages have no joystick, or the answers leave no axis.
     """
     possible = suggest.joysticks(messages)
     if not messages:
@@ -96,7 +96,7 @@ def machine_of(
 def _meanings(
     joysticks: Sequence[FirstJoystick], axes: Sequence[FirstAxis], motion: FirstMotion | None
 ) -> set[str]:
-    """MESSAGE.SIGNAL of what was given a meaning."""
+    """Return every signal that an answer uses, as MESSAGE.SIGNAL."""
     used = {f"{one.switch or one.message}.{one.enable}" for one in joysticks}
     used |= {
         f"{one.message}.{name}" for one in joysticks for name in (one.reset, one.anti_sway_off)
@@ -108,7 +108,7 @@ def _meanings(
 
 
 def _data_bitrate(messages: list[Message], uses: Collection[str], bitrate: int) -> int | None:
-    """Ask for the bit rate of the data where a message that is used is one of CAN FD."""
+    """Ask for the data bit rate if a used message is one of CAN FD; else return None."""
     if not any(is_fd(message) for message in messages if message.name in uses):
         return None
     most = limits(Bus, "data_bitrate")[1]
@@ -117,7 +117,7 @@ def _data_bitrate(messages: list[Message], uses: Collection[str], bitrate: int) 
 
 
 def _chosen(messages: list[Message]) -> list[str]:
-    """Ask for the messages of the joysticks."""
+    """Ask which messages are those of joysticks; return their names."""
     possible, likely = suggest.joysticks(messages), suggest.likely_joysticks(messages)
     enabled = [m.name for m in likely if suggest.named(suggest.switches(m), suggest.ENABLE)]
     offered = [message.name for message in likely]
@@ -127,7 +127,7 @@ def _chosen(messages: list[Message]) -> list[str]:
 
 
 def _page(message: Message) -> tuple[Message, int | None]:
-    """A message as it is with the multiplexor with which it is meant, and that."""
+    """Ask for the multiplexor value that is meant; return the message with it, and the value."""
     signal = multiplexor(message)
     if signal is None:
         return message, None
@@ -145,17 +145,20 @@ def _joystick(
     before: Sequence[FirstJoystick],
     nodes: Nodes,
 ) -> tuple[FirstJoystick, Message]:
-    """A joystick, and its message; ``before`` are those that there are already."""
+    """Ask about a joystick; return it and its message. ``before`` are the joysticks so far."""
     message, page = _page(whole_message)
     whole = suggest.switches(message)
-    left = [*whole, *suggest.switch_parts(message)]  # a switch has one meaning
+    left = [*whole, *suggest.switch_parts(message)]  # signals that are no switch yet
 
     def switch(text: str, default: str | None) -> str | None:
         allowed = [*(signal.name for signal in left), NONE]
         listed = ", ".join([*allowed[: min(MOST_LISTED, len(left))], NONE])
         likely = NONE if default is None else default
         answer = ask(f"{message.name}: {text}, of {listed}", one(allowed), likely)
-        gone = {answer, answer.partition("/")[0]}  # itself, and the whole of a bit or its bits
+        gone = {
+            answer,
+            answer.partition("/")[0],
+        }  # the signal, and the signal of a bit or the bits of a signal
         left[:] = [s for s in left if s.name not in gone and s.name.partition("/")[0] != answer]
         return None if answer == NONE else answer
 
@@ -193,8 +196,9 @@ def _switch_elsewhere(
     """Ask for the enable switch of a joystick that has none in its own message.
 
     Returns:
-        message and signal of its enable switch, or None and None and the joystick that shares its;
-        of a signal of more than two bits the value that enables.
+        (message, signal, joystick, code). Either message and signal of the switch are given, with
+        the enabling value if the signal has more than two bits, or the joystick that shares its
+        switch. All are None without a switch.
     """
     others = [one for one in messages if one.name != message.name]
     joysticks = [joystick.name for joystick in before]
@@ -218,7 +222,7 @@ def _switch_elsewhere(
 
 
 def _code(signal: Signal) -> int:
-    """Ask for the value of a signal that enables."""
+    """Ask which value of a signal enables."""
     choices: Mapping[int, object] = signal.choices or {}
     text = f"{signal.name}: value that enables, of "
     text += ", ".join(f"{code} {name}" for code, name in choices.items())

@@ -1,4 +1,4 @@
-"""Questions of ``canshaper init`` on nodes of CANopen, of which it has the EDS files."""
+"""Questions of ``canshaper init`` about CANopen nodes, which it knows from their EDS files."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -18,27 +18,27 @@ if TYPE_CHECKING:
     from canshaper.commissioning.nodes.parameters import MessageTiming, Parameter
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
-_NAME_LETTERS = 20  # of a node; its messages' names have 32
-_STATUS_CYCLES = 3  # of a status word in its timeout
+_NAME_LETTERS = 20  # most letters of a node's name; the names of its messages may have 32
+_STATUS_CYCLES = 3  # cycles of a status word in its proposed timeout
 
 Timing = tuple[int | None, int]
-"""How a deployment uses a message: sent every so many ms, lost after so many."""
+"""Cycle of a message, ms or None, and the age at which it counts as lost, ms."""
 
 
 class Nodes:
-    """Nodes of CANopen by their EDS files: asks for name, id, and switches of each.
+    """CANopen nodes from their EDS files; asks for name, id and switches of each.
 
-    Without a file it does without the canopen library, which is an extra.
+    Without a file the class does not need the canopen library, which is an extra.
 
     Args:
-        files: EDS or DCF files, one of a device that is there twice also twice.
+        files: EDS or DCF files, one for each node; a device that exists twice is listed twice.
 
     Attributes:
         named: the nodes by name.
-        messages: those of their PDOs.
+        messages: the messages of their PDOs.
 
     Raises:
-        ConfigError: a file is none, or has no PDO that can be used.
+        ConfigError: a file is no EDS file, or has no PDO that can be used.
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
@@ -51,7 +51,9 @@ class Nodes:
 
         read = [eds.Eds(path) for path in files]
         for one in read:
-            node.Node(one, one.node or _FIRST)  # one without PDO is said before any question
+            node.Node(
+                one, one.node or _FIRST
+            )  # a file without a PDO is refused before any question
         for one in read:
             self._add(one)
 
@@ -88,11 +90,11 @@ class Nodes:
         self._pdos |= {messages.message_name(name, pdo): (name, pdo) for pdo in node.pdos}
 
     def name_of(self, message: str) -> str | None:
-        """Name of the node that a message is of."""
+        """Return the name of the node of a message; None if no node has it."""
         return self._pdos[message][0] if message in self._pdos else None
 
     def supervised(self, message: str) -> str | None:
-        """Name of the node that a message is of, if that node has a heartbeat."""
+        """Return the name of the node of a message if that node has a heartbeat; else None."""
         if (name := self.name_of(message)) is None:
             return None
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
@@ -100,11 +102,11 @@ class Nodes:
         return name if heartbeat_ms(self.named[name]) else None
 
     def timer_ms(self, message: str) -> int:
-        """Event timer of a PDO; 0 where it has none."""
+        """Return the event timer of a PDO, ms; 0 if it has none."""
         return self._pdos[message][1].event_timer_ms or 0 if message in self._pdos else 0
 
     def cia408(self, valve: str) -> FirstCia408 | None:
-        """Control and status word, where a message commands a valve of CiA 408."""
+        """Return control and status word if the message commands a CiA 408 valve; else None."""
         if (name := self.name_of(valve)) is None:
             return None
         from canshaper.commissioning.nodes import messages
@@ -126,7 +128,7 @@ class Nodes:
         return None
 
     def canopen(self, used: Collection[str]) -> FirstCanopen:
-        """Our node, and the others of messages that are used."""
+        """Ask about our own node; return it with the nodes of the ``used`` messages."""
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
 
         ids = [node.id for node in self.named.values()]
@@ -150,7 +152,7 @@ class Nodes:
         ]
 
     def missing(self, uses: Mapping[str, Timing]) -> Iterator[str]:
-        """Yield what the nodes of messages with these timings do not have."""
+        """Yield what the nodes of messages with these timings lack."""
         if not self.named:
             return
         from canshaper.commissioning.nodes.parameters import missing
@@ -172,7 +174,7 @@ class Nodes:
 
 
 def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Timing]:
-    """How a machine uses messages: how often they come, and when they are lost."""
+    """Return the timing of each message that the machine uses, by name."""
     cycles = {message.name: message.cycle_time for message in messages}
     uses: dict[str, Timing] = {}
 
@@ -195,7 +197,7 @@ def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Tim
 
 
 def _label(pdo: "Pdo", key: tuple[int, int]) -> str | None:
-    """Signal of an object in a PDO."""
+    """Return the signal of an object (index, subindex) in a PDO; None if it is not mapped."""
     from canshaper.commissioning.nodes.messages import labels
 
     named = zip(pdo.objects, labels(pdo.objects), strict=True)
@@ -209,7 +211,7 @@ def _likely_name(stem: str, used: Collection[str]) -> str:
 
 
 def _name(used: Collection[str]) -> Callable[[str], str]:
-    """Takes a word that can begin the names of messages, and is none of those in use."""
+    """Return a parser of an unused word with which names of messages can begin."""
 
     def parse(text: str) -> str:
         if not (text.isidentifier() and text.isascii() and len(text) <= _NAME_LETTERS):
@@ -223,7 +225,7 @@ def _name(used: Collection[str]) -> Callable[[str], str]:
 
 
 def _node_id(used: Collection[int]) -> Callable[[str], int]:
-    """Takes a node id that no other node has, decimal or as 0x10."""
+    """Return a parser of an unused node id, decimal or as 0x10."""
 
     def parse(text: str) -> int:
         try:

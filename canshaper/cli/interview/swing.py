@@ -1,4 +1,4 @@
-"""Questions of ``canshaper init`` on what swings: each axis, and slew and near-far together."""
+"""Questions of ``canshaper init`` about swing: each axis, slew with near-far, and the load."""
 
 import re
 from collections.abc import Collection, Sequence
@@ -32,17 +32,20 @@ from canshaper.machine.filters import filter_fault
 from canshaper.machine.named_codes import is_guess
 from canshaper.machine.sway_sensor import LEAST_FUSION
 
-# By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
+# Names of axes that cause no swing, that turn the crane, and that move its tip in and out.
 CALM = re.compile(r"lift|hoist|winch|rotat|turn|grip|open|close", re.IGNORECASE)
 SLEW = re.compile(r"slew|swing|swivel", re.IGNORECASE)
 NEAR_FAR = re.compile(r"near|far|radial|reach|crowd", re.IGNORECASE)
-SENSOR_CYCLES = 4  # of a sensor's message in its timeout
-# Of a tip; what it travels when it stops is then a distance that the file may have.
+SENSOR_CYCLES = 4  # cycles of a sensor's message in its proposed timeout
+# Fastest tip; its stopping distance is still one that the file may state.
 _FASTEST_M_S = 40.0
 
 
 def swing_of(axis: str, period_s: float) -> Stopwatch | None:
-    """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
+    """Ask about the swing that an axis causes; None if it causes none.
+
+    Its valve is commanded every ``period_s`` seconds, which bounds the swing that a filter can run.
+    """
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
         return None
@@ -59,7 +62,14 @@ def swing_of(axis: str, period_s: float) -> Stopwatch | None:
 def sensor_of(
     axis: str, swing_s: float, others: list[Message], bound: list[FirstAxis]
 ) -> FirstSensor | None:
-    """Ask for the sway sensor of an axis, in ``others``; ``bound`` are the axes before it."""
+    """Ask for the sway sensor of an axis; None if it has none.
+
+    Args:
+        axis: name of the axis.
+        swing_s: period of its swing, seconds.
+        others: messages that may carry the sensor.
+        bound: axes before it, whose sensors are taken.
+    """
     used = {(one.sensor.message, one.sensor.signal) for one in bound if one.sensor}
     possible = {
         f"{message.name}.{signal.name}": (message, signal)
@@ -90,7 +100,7 @@ def sensor_of(
 
 
 def slewing_of(axis: str) -> FirstSlewing | None:
-    """How an axis turns the crane; None where it does not."""
+    """Ask how fast an axis turns the crane; None if it does not turn it."""
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
@@ -103,9 +113,9 @@ def slewing_of(axis: str) -> FirstSlewing | None:
 
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:
-    """Shortest and longest time of ten swings with which the filter can run at a valve's period.
+    """Return shortest and longest time of ten swings for which a filter runs at a valve's period.
 
-    And with the shortest period that may then be set on the running machine.
+    The filter must also run at the shortest swing that may be set on the running machine.
     """
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s
@@ -113,11 +123,14 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
         every = [Stopwatch(part * tenth / 10.0, 1.0, 1.0, 1.0) for part in (1.0, PERIOD_RANGE[0])]
         if all(filter_fault(w.filter, w.sway, period_s, rate) is None for w in every):
             return tenth / 10.0, high
-    return low, high  # with none at all: the check of the whole file says why
+    return low, high  # no swing fits: the check of the whole file says why
 
 
 def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | None:
-    """Slew and near-far as one motion, where there are both; ``others`` are messages left over."""
+    """Ask about slew and near-far as one motion; None without both.
+
+    ``others`` are the messages that may carry the measured radius.
+    """
     slew = next((axis.name for axis in axes if axis.slewing), None)
     possible = [axis.name for axis in axes if axis.swing and not axis.slewing]
     if slew is None or not possible:
@@ -139,20 +152,20 @@ def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | Non
     return FirstMotion(slew, near_far, radius, code_meanings(signals[radius]))
 
 
-# Proposals: of the time of ten swings, and kg. The log of forwarder-load.yaml does so.
+# Proposals for a log: factor on the time of ten swings, and kg, as in forwarder-load.yaml.
 _SLOWER, _LOG_KG = 1.14, 600.0
-_CYCLES, _CYCLE_MS = 5, 200  # of its message in its timeout; where the DBC has none
+_CYCLES, _CYCLE_MS = 5, 200  # cycles in its proposed timeout; cycle if the DBC has none
 
 
 def load_of(
     axes: Sequence[FirstAxis], messages: Sequence[Message], used: Collection[str]
 ) -> FirstLoad | None:
-    """Ask what says that a log is gripped, or whether one response is to hold for both.
+    """Ask which signal says that a log is gripped; without one, if one response holds for both.
 
     Args:
-        axes: of the machine.
-        messages: of it, without those of the valves.
-        used: MESSAGE.SIGNAL of what has a meaning already.
+        axes: axes of the machine.
+        messages: its messages, without those of the valves.
+        used: signals that have a meaning already, as MESSAGE.SIGNAL.
     """
     swinging = [axis for axis in axes if axis.swing]
     signals, likely = _possible(messages, used)
@@ -177,7 +190,7 @@ def load_of(
 def _possible(
     messages: Sequence[Message], used: Collection[str]
 ) -> tuple[dict[str, tuple[Message, Signal]], list[str]]:
-    """Signals that can say it, and the names of those that are called so."""
+    """Return the signals that may tell the load, and the names of those that are named so."""
     signals = {
         f"{message.name}.{signal.name}": (message, signal)
         for message, signal in suggest.loads(messages)
@@ -187,7 +200,7 @@ def _possible(
 
 
 def _values(signal: Signal) -> tuple[float, float]:
-    """Value of a signal with an empty grapple, and with a log."""
+    """Ask for the values of a signal with an empty grapple and with a log."""
     if signal.length <= suggest.SWITCH_BITS:
         log = ask(f"  {signal.name}: its value while a log is gripped", whole(0, 1), "1")
         return 1.0 - log, float(log)
@@ -205,7 +218,7 @@ def _values(signal: Signal) -> tuple[float, float]:
 
 
 def _with_log(axes: Sequence[FirstAxis]) -> dict[str, float]:
-    """Time of ten swings with a log, by axis, s."""
+    """Ask for the time of ten swings with a log; return it by axis, seconds."""
     times_s = {}
     for axis in axes:
         assert axis.swing is not None
@@ -217,7 +230,10 @@ def _with_log(axes: Sequence[FirstAxis]) -> dict[str, float]:
 
 
 def code_meanings(signal: Signal, scaling: FirstScaling | None = None) -> dict[str, str]:
-    """Which values of a signal that the DBC names are measurements, where it does not say it."""
+    """Ask whether named values (VAL_) whose name does not tell are faults or measurements.
+
+    ``scaling`` are the corrections of the signal from earlier answers.
+    """
     if scaling:
         given = Scaling(full=scaling.full, zero=scaling.zero, invert=scaling.invert)
         signal = scaled(signal, Correction(given, bool(scaling.flags or scaling.negative)))

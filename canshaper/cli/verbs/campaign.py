@@ -1,4 +1,4 @@
-"""``canshaper campaign``: many drives, drawn from what is not known of a machine."""
+"""``canshaper campaign``: many drives, drawn from the uncertainty of a machine."""
 
 import json
 from dataclasses import replace
@@ -37,26 +37,29 @@ def campaign(
     file: str = typer.Argument(
         "forwarder-robust.yaml", help="Deployment file; by default a shipped one."
     ),
-    drives: int = typer.Option(1000, "--drives", "-n", min=1, help="How many."),
+    drives: int = typer.Option(1000, "--drives", "-n", min=1, help="Number of drives."),
     first: int = typer.Option(0, "--first", min=0, help="Seed of the first drive."),
     against: str | None = typer.Option(
-        None, "--against", metavar="FILE", help="Another deployment, over the same drives."
+        None, "--against", metavar="FILE", help="Compare with this deployment, on the same drives."
     ),
     out: Path = typer.Option(Path("out/campaign"), "--out", help="Folder for the drives."),
-    resume: bool = typer.Option(False, "--resume", help="Go on with what the folder has."),
+    resume: bool = typer.Option(False, "--resume", help="Continue the campaign in the folder."),
     processes: int | None = PROCESSES,
     scheduler: str | None = SCHEDULER,
     cluster: Literal["slurm"] | None = typer.Option(
-        None, "--cluster", help="In jobs of this batch system, as many as --processes."
+        None, "--cluster", help="Run as jobs of this batch system, as many as --processes."
     ),
     shard: str | None = typer.Option(
-        None, "--shard", metavar="I/N", help="Make only the I-th of N shares of the drives."
+        None, "--shard", metavar="I/N", help="Drive only the I-th of N shares."
     ),
     merge: list[Path] | None = typer.Option(
-        None, "--merge", metavar="FOLDER", help="Make none; take those of this folder too."
+        None,
+        "--merge",
+        metavar="FOLDER",
+        help="Drive nothing; add the drives of this folder; repeatable.",
     ),
     native: Literal["native", "python"] | None = typer.Option(
-        None, "--engine", help="What drives; by default C where a compiler is."
+        None, "--engine", help="Engine of the drives; by default native (C) if there is a compiler."
     ),
     plant: Path | None = PLANT,
     changes: list[str] | None = SET,
@@ -65,11 +68,13 @@ def campaign(
     """Drive the real controller on many simulated cranes, and say how sure the result is.
 
     Each drive draws tool, load, radius, valves, operator and faults from its seed and the ranges
-    in the file's "uncertainty" section. Quantiles have bounds that hold with 95 % confidence.
-    Exit code 1: a promise was broken, or a limit of the file's "accept" section is not shown to be
-    kept. The folder gets one Parquet row a drive; Ctrl-C keeps what is done. A drive is looked at
-    by `canshaper demo FILE --seed SEED`. With --plant operators and faults are drawn, not the
-    crane, and it takes one process.
+    in the file's "uncertainty" section. Quantiles have bounds that hold with 95 % confidence. The
+    folder gets one Parquet row a drive; Ctrl-C keeps the finished drives. `canshaper demo FILE
+    --seed SEED` shows a drive. With --plant the crane is not drawn, only operators and faults, and
+    there is only one process.
+
+    Exit code 1 when a promise was broken, or the drives do not prove that a limit of the file's
+    "accept" section is kept.
 
     Examples:
 
@@ -96,7 +101,7 @@ def campaign(
     from canshaper_sim.recorder import dwell_s
 
     deployment = loader(file)()
-    changed_parameters(changes or [], deployment)  # wrong ones are named before anything begins
+    changed_parameters(changes or [], deployment)  # a wrong one is reported before the work
     seeds = shard_of(range(first, first + drives), shard)
     files = [deployment, *([loader(against)()] if against else [])]
     check_same_axes(files[0], files[-1])
@@ -130,7 +135,7 @@ def campaign(
             raise UsageError(text)
         if engine_name == "python" and not native:
             echo("engine: python, for want of a C compiler", err=True)
-        for source in sources:  # compiled, and held against Python, before anything begins
+        for source in sources:  # compile it and compare it with Python before the work
             if isinstance(why := source.native(), ConfigError):
                 echo(f"driven by Python: {why}", err=True)
         interrupted = _drive(workers, sources, seeds, stores)
@@ -144,7 +149,7 @@ def campaign(
 
 
 def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "list[Store]") -> bool:
-    """Make the drives of every file; return whether they were interrupted."""
+    """Drive the seeds with every file; return whether Ctrl-C interrupted them."""
     from canshaper.campaign.run import run_campaign
     from canshaper.report.console import progress_bar
 
@@ -159,7 +164,8 @@ def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "li
 
 def _report(files: "list[Deployment]", stores: "list[Store]", results: "Results") -> bool:
     """Print and write the results; return whether the first file's limits accept them all."""
-    from canshaper.campaign.summary import difference_table, differences, lines, summarise, tables
+    from canshaper.campaign.statistics import differences
+    from canshaper.campaign.summary import difference_table, lines, summarise, tables
 
     accept = files[0].config.accept.model_dump(exclude_none=True)
     columns, accepted = [store.columns() for store in stores], True

@@ -1,4 +1,4 @@
-"""``canshaper check``: is a deployment fit to start?"""
+"""``canshaper check``: check a deployment before it starts."""
 
 import json
 from dataclasses import asdict
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 GROUP = "setup"
 
-# What joysticks do while the daemon is away.
+# What the joysticks move while the daemon is away, by ``fallback`` of the gateway.
 FALLBACKS = {
     "stop": "no joystick does without us",
     "neutral": "neutral joysticks do without us",
@@ -34,20 +34,29 @@ def check(
 ) -> None:
     """Load a deployment against its DBC files and report every problem at once.
 
-    Shows how far each axis still travels after release, reversal, lost joystick and lost enable,
+    It shows how far each axis still travels after release, reversal, lost joystick and lost enable,
     and how far its limits allow; for which pendulums its filters hold, and what they leave of the
-    swing at the ends of that range; and what each value means that the DBC names (VAL_) in a signal
-    that is read.
+    swing at the ends of that range; and what each named value (VAL_) means in the signals that are
+    read.
 
-    Exit code 0 when it is good, 2 when it is not. What is wrong in the DBC files with messages that
-    the deployment does not use is a warning, and so is a table of values (VAL_) without its
-    signal. A bus that is loaded above 50 % at its bit rate
-    is a warning; so is an interface of this machine that is not the device of its bus, and an axis
-    that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
-    not start; and a filter that was designed for another swing, valve or tail than the file has
-    now, and one that leaves more than a tenth of the swing; and what was measured on a simulated
-    crane, or is assumed; and what a machine may have but is more often a mistake, such as one
-    joystick signal on two valves.
+    Exit code 0 when the deployment is good, 2 when it is not. Warnings do not change the exit code.
+    It warns of:
+
+    - faults of the DBC files in messages that the deployment does not use, and a table of values
+    (VAL_) without its signal;
+
+    - a bus that is loaded above 50 % at its bit rate, and an interface of this machine that is not
+    the device of its bus;
+
+    - an axis that may travel on for more than 2 m without a stop_distance_m in the file: run does
+    not start with it;
+
+    - a filter that was designed for another swing, valve or tail than the file has now, and one
+    that leaves more than a tenth of the swing;
+
+    - numbers that were measured on a simulated crane, or are assumed;
+
+    - what is possible but usually a mistake, such as one joystick signal on two valves.
 
     Examples:
 
@@ -59,7 +68,7 @@ def check(
 
     try:
         deployment = loader(file)()
-        changed_parameters([], deployment)  # what its crane is simulated with
+        changed_parameters([], deployment)  # parameters of its simulated crane
     except ConfigError as error:
         if as_json:
             problems = [asdict(problem) for problem in error.problems]
@@ -76,7 +85,7 @@ def check(
 
 
 def _as_dict(deployment: "Deployment") -> dict[str, Any]:
-    """Everything as plain data; travel in seconds of full speed."""
+    """Return all results as plain data; travel is in seconds of full speed."""
     from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import stopping
     from canshaper.design.tuning.verdict import verdicts
@@ -122,7 +131,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
 
 
 def _print(deployment: "Deployment") -> None:
-    """Everything for people."""
+    """Print all results."""
     from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import print_stopping
     from canshaper.design.tuning.verdict import verdicts
@@ -174,7 +183,7 @@ def _print(deployment: "Deployment") -> None:
 
 
 def _of_axis(deployment: "Deployment", name: str) -> "Iterator[str]":
-    """Describe sensor, end stops and oil of an axis, in words."""
+    """Yield lines on sensor, end stops, oil and pendulums of an axis."""
     from canshaper.shaping.registry import KINDS
 
     config = deployment.config
@@ -193,7 +202,7 @@ def _of_axis(deployment: "Deployment", name: str) -> "Iterator[str]":
 
 
 def _print_codes(codes: "Sequence[NamedCode]") -> None:
-    """Print how named values are taken; signals with equal ones share a line."""
+    """Print the meaning of named values; signals with the same meanings share a line."""
     meanings: dict[str, dict[str, list[str]]] = {}
     for code in codes:
         of_signal = meanings.setdefault(f"{code.message}.{code.signal}", {})
@@ -207,7 +216,7 @@ def _print_codes(codes: "Sequence[NamedCode]") -> None:
 
 
 def _match(bus: "Bus") -> str:
-    """Whether it holds on this machine, in words; the file is good either way."""
+    """Return in words whether ``match`` of a bus holds on this machine, or a warning."""
     from canshaper.bus.device import match_fault, whereabouts
 
     try:
@@ -218,10 +227,10 @@ def _match(bus: "Bus") -> str:
 
 
 def _motion(deployment: "Deployment", motion: "Motion") -> str:
-    """How far an axis moves without its joystick, in words."""
+    """Return a line on how far the motion moves near-far without its joystick."""
     if motion.near_far is None:
         return f"  motion of {motion.slew} alone: nothing is known of near-far"
-    from canshaper.shaping.motion import farthest_m
+    from canshaper.shaping.two_axis_motion import farthest_m
 
     axis = deployment.axes[motion.near_far].config
     assert axis.sway is not None  # checked with the deployment
@@ -236,9 +245,9 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
 
 
 def _pendulums(deployment: "Deployment", axis: str) -> "Iterator[str]":
-    """For which pendulums each filter holds, and what its machine leaves of the swing at both ends.
+    """Yield for each filter its range of pendulum lengths, and the swing left at both ends.
 
-    Those that it was designed for, else those that a campaign draws.
+    The range is that of its design, else that from which a campaign draws.
     """
     from canshaper.design.tuning.evaluate import evaluate
     from canshaper.design.tuning.verdict import on_axis

@@ -1,4 +1,4 @@
-"""``canshaper commission``: the day of commissioning, step by step."""
+"""``canshaper commission``: the steps of commissioning, in order."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -37,12 +37,14 @@ YES, AGAIN, SKIP, STOP = "yes", "again", "skip", "stop"
 
 def commission(
     file: str = FILE,
-    step: str | None = typer.Option(None, "--step", metavar="NAME", help="Do this one again."),
-    listed: bool = typer.Option(False, "--list", help="Show how far it has come, and exit."),
+    step: str | None = typer.Option(None, "--step", metavar="NAME", help="Repeat this step."),
+    listed: bool = typer.Option(False, "--list", help="Show the status of each step, and exit."),
     simulated: bool = typer.Option(
-        False, "--simulated", help="Rehearse at the desk, with a copy of FILE."
+        False,
+        "--simulated",
+        help="Rehearse at the desk, on a simulated crane, with a copy of FILE.",
     ),
-    yes: bool = typer.Option(False, "--yes", help="Accept every step that lacks nothing."),
+    yes: bool = typer.Option(False, "--yes", help="Accept every step that has enough data."),
     answers: Path | None = typer.Option(
         None, "--answers", metavar="FILE", help="Ask nothing: lines of QUESTION = ANSWER."
     ),
@@ -53,16 +55,16 @@ def commission(
 ) -> None:
     """Lead through the commissioning of a machine, step by step, to a report that is signed.
 
-    Each step says what to do, shows its numbers and its picture, and what it would write into FILE;
-    nothing is written before yes. How far it has come stands in FILE.commission.json: the same
-    command goes on at the first open step. Logs, pictures and the report are in FILE.commission/.
+    Each step says what to do, and shows its numbers, its picture and what it would write into FILE.
+    It writes nothing before you answer yes. The progress is kept in FILE.commission.json: the same
+    command continues at the first open step. Logs, pictures and the report are in FILE.commission/.
 
-    With --simulated a crane is simulated, --set says which one, and no bus is opened. It works on
-    FILE.rehearsal.yaml, a copy that is made at the first time: nothing that was measured at the
-    desk gets into FILE.
+    With --simulated it simulates a crane, which --set may change, and opens no bus. It works on
+    FILE.rehearsal.yaml, a copy that it makes the first time: no measurement at the desk gets into
+    FILE.
 
-    Ctrl-C ends it at any time, with neutral valves; what is done stays done. Exit code 1 where a
-    step stays open, 2 where a file or an option is wrong, 3 where a bus cannot be opened.
+    Ctrl-C ends it at any time, with neutral valves; finished steps stay finished. Exit code 1 when
+    a step stays open, 2 when a file or an option is wrong, 3 when a bus cannot be opened.
 
     Examples:
 
@@ -85,7 +87,7 @@ def commission(
     work = path
     if simulated:
         origin = loader(file)()
-        check_rehearsal(origin)  # what is wrong in it is named by its own name
+        check_rehearsal(origin)  # its faults name FILE, not the copy
         changed_parameters(changes or [], origin)
         work = rehearsal_of(path) if listed else copy_for_rehearsal(path)
     files = Files(work)
@@ -104,14 +106,14 @@ def commission(
 
 
 def _words(interface: str | None, channels: list[str] | None, *, network: bool) -> list[str]:
-    """Return the bus options, as ``canshaper run`` takes them."""
+    """Return the bus options as words of a command line of ``canshaper run``."""
     words = ["--interface", interface] if interface else []
     words += [word for channel in channels or [] for word in ("--channel", channel)]
     return [*words, *(["--network"] if network else [])]
 
 
 def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: bool) -> "Bench":
-    """Return the bench; a rehearsal goes on with the crane that it was begun with."""
+    """Return the bench: the machine, or the simulated crane with which the rehearsal began."""
     from canshaper.commissioning.procedure.bench import Simulated
     from canshaper.commissioning.procedure.machine import Machine
     from canshaper.commissioning.procedure.state import read_state
@@ -125,7 +127,7 @@ def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: b
 def _procedure(
     files: "Files", bench: "Bench", load: Callable[[Path], "Deployment"], path: Path
 ) -> "Procedure":
-    """The steps, and what is to be said before the first of them."""
+    """Return the procedure; for a rehearsal, print that it is one."""
     from canshaper.commissioning.procedure.procedure import Procedure
 
     procedure = Procedure(files, bench, load, origin=path if bench.simulated else None)
@@ -135,7 +137,7 @@ def _procedure(
 
 
 def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
-    """Print how far the procedure has come."""
+    """Print the status of every step."""
     from canshaper.commissioning.procedure.procedure import STEPS
     from canshaper.commissioning.procedure.state import State, read_state
     from canshaper.report.console import SafeConsole, new_table
@@ -151,7 +153,7 @@ def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
 
 
 def _lead(procedure: "Procedure", name: str | None) -> None:
-    """Lead step by step, to the end or to the first step that stays open."""
+    """Lead through the step of that name, or through every open step."""
     step = procedure.step(name) if name else procedure.next_open()
     while step:
         _one(procedure, step)
@@ -161,10 +163,10 @@ def _lead(procedure: "Procedure", name: str | None) -> None:
 
 
 def _one(procedure: "Procedure", step: "Step") -> None:
-    """Lead through one step, until it is done or left out.
+    """Run one step until the person accepts or skips it.
 
     Raises:
-        typer.Exit: it stays open.
+        typer.Exit: the person stops; the step stays open.
     """
     number = procedure.steps.index(step) + 1
     while True:
@@ -190,7 +192,7 @@ def _one(procedure: "Procedure", step: "Step") -> None:
 
 
 def _show(procedure: "Procedure", outcome: "Outcome") -> None:
-    """Show the results of a step, and what it would write."""
+    """Print the results of a step, and the change that it would make to the file."""
     from canshaper.commissioning.procedure.files import shown
     from canshaper.report.console import SafeConsole
 
@@ -209,15 +211,15 @@ def _show(procedure: "Procedure", outcome: "Outcome") -> None:
 
 
 class Prompts:
-    """Prompts of the steps; with ``--yes`` or ``--answers`` they wait for no one."""
+    """Prompts of the steps; with ``--yes`` or ``--answers`` they do not wait."""
 
     def ready(self, words: str) -> None:
-        """Say what to do, and wait for Enter."""
+        """Print an instruction, and wait for Enter."""
         echo(f"\n  {words}")
         ask("Enter begins", str, "")
 
     def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
-        """Ask for a word, until it is one that is allowed."""
+        """Ask until the answer is one of the allowed words; without any, every word is."""
         return ask(question, one(allowed) if allowed else str, default)
 
     @contextmanager

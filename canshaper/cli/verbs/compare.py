@@ -1,4 +1,4 @@
-"""``canshaper compare``: every filter on the same work."""
+"""``canshaper compare``: drive every filter through the same work and compare them."""
 
 import json
 from dataclasses import asdict
@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from canshaper.cli.results import Results
-    from canshaper.design.comparison.limits import Least
     from canshaper.design.comparison.manoeuvres import Candidate
-    from canshaper.design.comparison.summary import Row
+    from canshaper.design.comparison.summary import Least, Row
     from canshaper.machine.deployment import Deployment
 
 GROUP = "design"
@@ -45,10 +44,12 @@ def compare(
     out: Path = typer.Option(Path("out/compare"), "--out", help="Directory for picture and data."),
     as_json: bool = typer.Option(False, "--json", help="Print the rows as JSON, no table."),
     work: bool = typer.Option(
-        False, "--work", help="Seconds a move of a model operator too: minutes."
+        False, "--work", help="Measure the seconds a move of a model operator too; takes minutes."
     ),
     fleet: bool = typer.Option(
-        False, "--fleet", help="With the file's filters, and robust ones for its fleet: a minute."
+        False,
+        "--fleet",
+        help="Add the file's filters, and robust ones for its fleet; takes a minute.",
     ),
     seeds: int = typer.Option(6, "--seeds", min=1, help="Working cycles with each filter."),
     processes: int | None = typer.Option(
@@ -59,20 +60,23 @@ def compare(
 ) -> None:
     """Drive every filter through the same manoeuvres and say which to take.
 
-    Each filter is put on slew and near-far of the file, and the simulated crane driven under the
-    output limits and with the two-axis motion of the file: pulses, taps and reversals of each
-    axis, strokes of both, random joysticks, a loading cycle, a load picked up on the way, a slow
-    valve, a small pump, an end stop, a start with swing; at -30 to +30 % pendulum length. The
-    tables have the largest swing that is left, what the operator feels, the worst case of each
-    filter, which of ours stops as soon and leaves less, and what no shaper can beat. A file whose
-    sway sensors damp has rows with them. Writes compare.png and compare.json. Takes one to two
-    minutes. With --work the operator of canshaper work who catches the swing works with each, at
-    30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
-    shows what is done until then. With --fleet two more rows: the file's own filters, and those
-    that canshaper robust --fleet designs.
+    Each filter is put on slew and near-far of the file. The simulated crane is driven with the
+    output limits and the two-axis motion of the file: pulses, taps and reversals of each axis,
+    strokes of both, random joysticks, a loading cycle, a load picked up on the way, a slow valve,
+    a small pump, an end stop, and a start with swing, each with pendulums of -30 to +30 % length.
 
-    Of a crane with a rope it is one table of the swing left by the length of the rope and the
-    work, next to ZVD for one length and ZV by length; of a filter for two modes to ZV of both.
+    The tables have the largest swing left, what the operator feels, the worst case of each filter,
+    a filter of ours that stops as soon and leaves less, and the limits of any shaper. A file whose
+    sway sensors damp gets rows with them. It writes compare.png and compare.json, and takes one to
+    two minutes.
+
+    With --work the operator of canshaper work who catches the swing works with each filter, at
+    30 cm and 6 degrees and where only the tip counts: seconds a move, empty grapple / log. Ctrl-C
+    shows the results so far. --fleet adds two rows: the file's own filters, and those that
+    canshaper robust --fleet designs.
+
+    For a crane with a rope it prints one table: the swing left by rope length and work, compared
+    with ZVD for one length and ZV by length; a filter for two modes is compared with ZV of both.
 
     Examples:
 
@@ -87,11 +91,10 @@ def compare(
       canshaper compare --json --processes 1
     """
     from canshaper.cli.results import Results
-    from canshaper.design.comparison.limits import AXIS, least, limits_for
     from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.ropes import on_rope
-    from canshaper.design.comparison.summary import recommendations, rows
+    from canshaper.design.comparison.summary import AXIS, least, limits_for, recommendations, rows
     from canshaper.design.profiles import swinging_axis
     from canshaper.report.console import progress_bar
 
@@ -102,7 +105,7 @@ def compare(
             raise UsageError("--work, --fleet: expected slew and near-far, got a rope")
         _ropes(deployment, results, out, processes, as_json=as_json)
         return
-    out.mkdir(parents=True, exist_ok=True)  # reported before minutes of driving
+    out.mkdir(parents=True, exist_ok=True)  # an error here comes before minutes of driving
     tasks = manoeuvres()
     filters = candidates(deployment)
     if fleet:
@@ -156,7 +159,7 @@ def _ropes(
     *,
     as_json: bool,
 ) -> None:
-    """Compare the filters of a crane with a rope."""
+    """Compare the filters of a crane with a rope, print the table and write it."""
     from canshaper.design.comparison.ropes import compare_ropes
     from canshaper.report.console import new_table, progress_bar
 
@@ -177,9 +180,9 @@ def _ropes(
 
 
 def _for_fleet(deployment: "Deployment", processes: int | None) -> "list[Candidate]":
-    """Filters of the file, and robust ones for its fleet."""
-    from canshaper.campaign.fleet import FLEET, design_fleet
-    from canshaper.campaign.fleet_filters import ROBUST
+    """Return two candidates: the filters of the file, and robust ones for its fleet."""
+    from canshaper.campaign.fleet import design_fleet
+    from canshaper.campaign.fleet_candidates import FLEET, ROBUST
     from canshaper.config.filters import filter_of
     from canshaper.design.comparison.manoeuvres import AXES, Candidate
     from canshaper.design.parallel import Processes
@@ -200,7 +203,7 @@ def _for_fleet(deployment: "Deployment", processes: int | None) -> "list[Candida
 def _work(
     deployment: "Deployment", filters: "list[Candidate]", seeds: int, processes: int | None
 ) -> "tuple[Table, dict[str, Any], str]":
-    """Seconds a move of an operator with each filter: table, data, where it was interrupted."""
+    """Return seconds a move with each filter: table, data, and the task that Ctrl-C interrupted."""
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp
     from canshaper.campaign.work_results import OFF, TASKS, as_data, at_work, choice
@@ -216,7 +219,7 @@ def _work(
 
 
 def _residuals(table: "list[Row]") -> "Table":
-    """Largest swing left by kind of work."""
+    """Return a table of the largest swing left, by kind of work."""
     from canshaper.report.console import new_table
 
     drawn = new_table("left, deg", *_WORKS)

@@ -1,4 +1,4 @@
-"""``canshaper demo``: the same drive with anti-sway off and on, measured and drawn."""
+"""``canshaper demo``: one drive with anti-sway off and one with it on, measured and drawn."""
 
 import json
 import sys
@@ -38,40 +38,42 @@ if TYPE_CHECKING:
 
 GROUP = "look"
 
-# What `report.json` says of a drive without a bus.
 EXIT_NOT_DRIVEN = 1
+# Transport of a drive without a bus, in report.json.
 LOCKSTEP = "lock-step, no bus"
 
 
 def demo(
     file: str = typer.Argument(DEFAULT, help="Deployment file; by default a shipped one."),
     sensor: bool = SENSOR,
-    script: str = typer.Option("demo", "--script", help="What the operator does."),
+    script: str = typer.Option(
+        "demo", "--script", help="Script of the operator; `canshaper operator --list` lists them."
+    ),
     rest: float | None = typer.Option(
         None,
         "--rest",
         min=1.0,
         max=120.0,
         metavar="S",
-        help="Seconds of rest at the end, to see when the grapple hangs still without filters too.",
+        help="Seconds of rest at the end, to see when the grapple hangs still without anti-sway.",
     ),
     out: Path = typer.Option(Path("out/demo"), "--out", help="Directory for picture and report."),
     lockstep: bool = typer.Option(
         False,
         "--lockstep",
-        help="Without bus and clock, in a second or two; always so outside Linux.",
+        help="Drive without bus and clock, in a second or two; the only way outside Linux.",
     ),
     transport: str = typer.Option(
         "auto", "--transport", help="auto, vcan0 (or another SocketCAN channel), udp_multicast."
     ),
     seed: int | None = typer.Option(
-        None, "--seed", min=0, help="This drive of `canshaper campaign FILE`, in lock-step."
+        None, "--seed", min=0, help="Repeat this drive of `canshaper campaign FILE`, in lock-step."
     ),
     ranges: str | None = typer.Option(
         None,
         "--ranges",
         metavar="FILE",
-        help="Draw it from this file's ranges, as `campaign FILE --against` does.",
+        help="Draw the drive of --seed from this file's ranges, as `campaign FILE --against` does.",
     ),
     crane: str | None = CRANE,
     plant: Path | None = PLANT,
@@ -82,13 +84,13 @@ def demo(
 ) -> None:
     """Drive the simulated crane twice, anti-sway off and on, and show the difference.
 
-    Without FILE it is the recommended deployment, forwarder-robust.yaml. The script "demo" moves
-    slew and near-far (or joints, or bridge and trolley) together. Of several cranes it is the first
-    one.
+    Without FILE it drives the recommended deployment, forwarder-robust.yaml. The script "demo"
+    moves slew and near-far (or joints, or bridge and trolley) together. If the deployment has
+    several cranes, it drives the first one.
 
-    Operator, daemon and plant run as three processes and exchange frames on vcan0 where the
-    kernel has it, otherwise on python-can's udp_multicast, and in lock-step with --plant. Prints
-    a table and writes demo.png and report.json.
+    Operator, daemon and plant run as three processes. They exchange frames on vcan0 if the kernel
+    has it, else on python-can's udp_multicast. With --plant they run in lock-step, without a bus.
+    It prints a table and writes demo.png and report.json.
 
     Examples:
 
@@ -177,7 +179,7 @@ def _drawn(
     nominal: "CraneParameters",
     plant: Path | None,
 ) -> "Setting":
-    """Draw a drive of a campaign; with the ranges of another file, one of its second file."""
+    """Draw a drive of a campaign of this file, or of one of ``ranges`` ``--against`` this file."""
     from canshaper.campaign.draw import check_same_axes, draw_drive, on_unit
 
     first = loader(ranges)() if ranges else deployment
@@ -194,7 +196,7 @@ def _driven(
     changes: list[str],
     export: Path | None,
 ) -> tuple["Recording", "Recording", int]:
-    """As ``_drive_twice``, with an end for people whatever comes; the second drive is exported."""
+    """Drive twice and export the second drive; end the verb with one line if a drive fails."""
     from canshaper.recording.export import exporting
 
     try:
@@ -217,13 +219,13 @@ def _drive_twice(
     changes: list[str],
     on_frame: "OnFrame | None",
 ) -> tuple[list["Recording"], int]:
-    """Drives with anti-sway off and on, and the deadlines that the daemon missed in both.
+    """Drive with anti-sway off and on; return both drives and the deadlines missed in them.
 
     Args:
         deployment: the machine.
         way: the bus to drive on; None for lock-step.
         played: what the operator does.
-        options: of a drive in lock-step.
+        options: options of a drive in lock-step.
         changes: parameters of the crane on a bus, NAME=VALUE.
         on_frame: called with the frames of the drive with anti-sway on.
     """

@@ -1,4 +1,4 @@
-"""``canshaper export``: the tuned axes of a machine as C99, or as a unit for co-simulation."""
+"""``canshaper export``: the axes of a machine as C99, or as a unit for co-simulation."""
 
 from pathlib import Path
 
@@ -12,20 +12,22 @@ GROUP = "design"
 
 def export(
     file: str = FILE,
-    out: Path = typer.Option(..., "--out", metavar="DIR", help="A new or empty folder."),
-    single: bool = typer.Option(False, "--float", help="In float; it needs a C compiler here."),
+    out: Path = typer.Option(..., "--out", metavar="DIR", help="Folder to write, new or empty."),
+    single: bool = typer.Option(
+        False, "--float", help="Compute in float; this computer needs a C compiler."
+    ),
     fmu: str | None = typer.Option(
-        None, "--fmu", help="controller or plant: as one FMI 3.0 co-simulation unit, in double."
+        None, "--fmu", help="controller or plant: write one FMI 3.0 co-simulation unit, in double."
     ),
 ) -> None:
     """Write the axes and their motion as C99, for a controller without Python.
 
-    The C is the same for every machine; only its tables are made, and equal this program to the
-    last bit. What it has no part for (sway sensors, gain schedules, E2E, J1939, CANopen and more)
-    is refused by its key. The folder has a golden drive as self-test, for the target too:
-    make -C axis && axis/selftest.
+    The C code is the same for every machine; export writes its tables. Its valve frames equal
+    those of this program to the last bit. A key that the C code does not support (sway sensors,
+    gain schedules, E2E, J1939, CANopen and more) is refused by name. The folder has a self-test
+    with a golden drive, which also runs on the target: make -C axis && axis/selftest.
 
-    With --fmu it is a unit for other simulators: the same C, or the simulated crane.
+    --fmu writes a unit for other simulators: the same C code, or the simulated crane.
 
     Examples:
 

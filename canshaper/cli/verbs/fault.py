@@ -15,9 +15,14 @@ EXIT_WRONG_REACTION = 1
 def fault(
     file: str = FILE,
     only: list[str] | None = typer.Option(
-        None, "--only", metavar="NAME", help="This one: a name, its part before ':', or a row."
+        None,
+        "--only",
+        metavar="NAME",
+        help="Only this fault: its name, the part before ':', or a row.",
     ),
-    listed: bool = typer.Option(False, "--list", help="Show the faults and what to expect; exit."),
+    listed: bool = typer.Option(
+        False, "--list", help="List the faults and the expected reactions; exit."
+    ),
     control: Path | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
@@ -25,11 +30,11 @@ def fault(
     """Rehearse faults at the running machine: is each reaction the one of the safety concept?
 
     The daemon has to run with control.rehearse_faults in its file, which needs reduced speed. Each
-    fault is announced and needs your yes. The daemon then makes it on its inputs: frames are lost,
-    frozen or wrong for controller and gate alike, never with a larger demand than the joystick's.
-    Let the joystick go, and the fault ends. It is over by itself after some seconds.
+    fault is announced and needs your yes. The daemon then simulates it on its inputs: it loses,
+    freezes or falsifies frames, for controller and gate alike. The demand is never larger than that
+    of the joystick. The fault ends when you release the joystick, or after some seconds.
 
-    Ctrl-C ends the fault, and what moves trips. The report of canshaper commission has the table.
+    Ctrl-C ends the fault; axes that move trip. The report of canshaper commission has the table.
 
     Exit code 0 when each reaction was right, 1 when one was not or the daemon refuses, 2 when the
     file or the command line is wrong.

@@ -1,4 +1,4 @@
-"""``canshaper gateway``: the kernel's rules of a gateway in the line."""
+"""``canshaper gateway``: the kernel's forwarding rules (can-gw) between two buses."""
 
 from typing import TYPE_CHECKING, Literal
 
@@ -19,19 +19,19 @@ def gateway(
     file: str = FILE,
     state: Literal["running", "away", "down", "show"] = typer.Argument(
         "show",
-        help="running: pass what is not ours; away: and the deployment's fallback for joysticks;"
-        " down: nothing; show: say what is there.",
+        help="running: forward the frames that are not ours; away: those, and joysticks by the"
+        " deployment's fallback; down: forward nothing; show: list the rules.",
     ),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
 ) -> None:
     """Set up, show or remove the rules of can-gw that pass frames between the buses of a gateway.
 
-    Other rules between the two interfaces are removed, and shown. The service does this before the
-    daemon starts (running) and after it has ended, however it ended (away).
+    It removes other rules between the two interfaces, and lists them. The service calls it before
+    the daemon starts (running) and after the daemon has ended for any reason (away).
 
-    Exit code 0 when the rules are as asked, with show when they are those of running or away; 1
-    when they are others; 2 when the file is wrong; 3 when the kernel refuses.
+    Exit code 0 when the rules are set, or with show when they are those of running or away; 1 when
+    show finds others; 2 when the file is wrong; 3 when the kernel refuses.
 
     Examples:
 
@@ -69,10 +69,10 @@ def gateway(
 
 
 def _look_at_devices(deployment: "Deployment") -> None:
-    """Check that the interface of a rule is the device of the deployment.
+    """Check that each interface of a rule is the device that its bus has to match.
 
     Raises:
-        BusError: it is another one than the deployment names, or cannot be looked at.
+        BusError: it is another device, or the device cannot be examined.
     """
     from canshaper.bus.device import match_fault
 

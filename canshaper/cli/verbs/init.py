@@ -1,4 +1,4 @@
-"""``canshaper init``: a first deployment, by a few questions."""
+"""``canshaper init``: write a first deployment file from the answers to a few questions."""
 
 import math
 import os
@@ -30,42 +30,47 @@ GROUP = "setup"
 def init(
     file: Path = typer.Argument(Path("machine.yaml"), help="Deployment file to write."),
     dbc: list[Path] | None = typer.Option(
-        None, "--dbc", help="DBC file of the machine; several with the option again."
+        None, "--dbc", help="DBC file of the machine; repeatable."
     ),
     eds: list[Path] | None = typer.Option(
-        None, "--eds", help="EDS or DCF file of a CANopen node; for each node once."
+        None, "--eds", help="EDS or DCF file of a CANopen node; once for each node."
     ),
     interface: str = typer.Option("socketcan", "--interface", help="python-can interface."),
     set_by_sdo: bool = typer.Option(
-        False, "--set-by-sdo", help="Set what has to be set in the nodes; a real bus is asked for."
+        False, "--set-by-sdo", help="Write the parameters into the nodes; asks first on a real bus."
     ),
-    force: bool = typer.Option(False, "--force", help="Replace a file that is there."),
+    force: bool = typer.Option(False, "--force", help="Replace an existing file."),
     answers: Path | None = typer.Option(
         None, "--answers", metavar="FILE", help="Ask nothing: lines of QUESTION = ANSWER."
     ),
 ) -> None:
     """Ask a few questions about a machine and write its first deployment.
 
-    Looks through the DBC files for joysticks, valves and switches, and shows the whole machine as
-    it would be; where that is not right, or something is missing, it asks. Enter then takes what
-    stands in brackets, "-" leaves a thing out. What the DBC does not say is asked: full deflection,
-    value in the middle, direction by flags or by a second signal. What says that a log is gripped
-    gives filters for an empty grapple and for a log; where nothing does, one response may hold for
-    both. Written with reduced
-    speed, and as we recommend: a robust shaper for each axis that swings (without SciPy a G_FF to
-    begin with), slew and near-far as one motion, which is off until the step motion of commission
-    is done. What is a guess of its own stands under assumed. A switch may be one bit of a signal,
-    as SIGNAL/BIT; without one a draft is kept. Ctrl-C writes nothing; should the check of the
-    whole file find something after all, the answers stay in a draft next to it. Machines of J1939
-    begin with a copy of the shipped j1939-forwarder.yaml.
+    It looks for joysticks, valves and switches in the DBC files and shows the whole machine as a
+    proposal. If you do not accept it, or something is missing, it asks the questions one by one.
+    Enter takes the answer in brackets; "-" leaves a thing out. It asks for facts that the DBC does
+    not state: full deflection, value in the middle, direction by flags or by a second signal. A
+    switch may be one bit of a signal, as SIGNAL/BIT.
 
-    With --eds nodes of CANopen are taken from their makers' files: PDOs as they are mapped, event
-    timers, heartbeats. They become a DBC file next to the deployment. What has to be set in a node
-    is said, and with --set-by-sdo written: each object is read, set, and read again.
+    If a signal says that a log is gripped, the axes get a filter for the empty grapple and one for
+    the log; without such a signal one response may hold for both.
 
-    With --answers nothing is asked. Each line of that file has a question by its first words, that
-    of an axis after its name, such as "slew: time of ten full swings = 24.1"; yes or no; "#" begins
-    a comment. What has no line is answered as by Enter.
+    The file has reduced speed. Each axis that swings gets a robust shaper (without SciPy a G_FF for
+    a start). Slew and near-far become one motion, which is off until the step motion of commission
+    is done. Numbers that init has guessed are listed under assumed.
+
+    Ctrl-C writes nothing. If the check of the whole file finds a fault, such as a missing enable
+    switch, the answers are kept in a draft next to it. For a J1939 machine begin with a copy of the
+    shipped j1939-forwarder.yaml.
+
+    With --eds it reads CANopen nodes from their makers' files: mapping of the PDOs, event timers,
+    heartbeats. It writes them as a DBC file next to the deployment. It lists the parameters that
+    have to be set in a node; with --set-by-sdo it writes them: it reads each object, sets it, and
+    reads it again.
+
+    With --answers it asks nothing. Each line of that file is QUESTION = ANSWER. A question is given
+    by its first words, that of an axis with its name first, such as "slew: time of ten full swings
+    = 24.1". "#" begins a comment. A question without a line is answered as by Enter.
 
     Examples:
 
@@ -131,7 +136,7 @@ def init(
 
 
 def _confirmed(machine: "FirstMachine", parameters: "Sequence[Parameter]") -> bool:
-    """Whether parameters are to be written; on a real bus the operator is asked."""
+    """Return whether to write the parameters; on a real bus ask the person first."""
     if not parameters:
         return False
     where = f"{machine.interface} channel {machine.channel}"
@@ -159,7 +164,7 @@ def _write_dbc(path: Path, nodes: "Nodes") -> None:
 
 
 def _designed(file: Path, axis: "FirstAxis", load: "FirstLoad | None") -> bool:
-    """Whether robust shapers were designed for an axis and written; otherwise says why not."""
+    """Design and write robust shapers for an axis; return whether it worked, else print why not."""
     name, lengths_m = axis.name, None
     if load and axis.swing:
         times_s = axis.swing.ten_swings_s, load.ten_swings_s[name]
@@ -205,7 +210,11 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
 
 
 def _write(file: Path, draft: Path, text: str) -> None:
-    """Write it when it is a good deployment: read like every other first. Else it stays a draft."""
+    """Write the text as a draft and load it; rename it to the file only if it is valid.
+
+    Raises:
+        UsageError: the draft is wrong; it is kept.
+    """
     from canshaper.machine.binding import load_deployment
 
     draft.write_text(text, encoding="utf-8")

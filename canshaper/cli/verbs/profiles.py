@@ -17,14 +17,16 @@ if TYPE_CHECKING:
 
 GROUP = "measure"
 
-_ALMOST = 0.95  # the response is taken to be over at 5 %
+_ALMOST = 0.95  # a response counts as over when 5 % are left
 
 
 def profiles(
     file: str = typer.Argument(
         "forwarder-load.yaml", help="Deployment file; by default a shipped one."
     ),
-    work: bool = typer.Option(True, "--work/--no-work", help="Seconds a move too: minutes."),
+    work: bool = typer.Option(
+        True, "--work/--no-work", help="Measure the seconds a move too; takes minutes."
+    ),
     seeds: int = typer.Option(6, "--seeds", min=2, help="Working cycles with each profile."),
     processes: int | None = PROCESSES,
     changes: list[str] | None = SET,
@@ -32,15 +34,16 @@ def profiles(
 ) -> None:
     """Measure what each profile of a deployment does, and which is the right one for a tolerance.
 
-    A full press of 3 s on the simulated crane, with the file's limits: how long the grapple swings
-    after release (until still_deg of the file), how long and far the axis runs on, the largest
-    swing, and what is left of it with the right pendulum length and with one that is 15 % longer or
-    shorter. "normal" is the axis' own filter, "off" anti-sway switched off.
+    The simulated crane gets a full deflection of 3 s, with the file's limits. The first table has:
+    how long the grapple swings after release (until still_deg of the file), how long and how far
+    the axis runs on, the largest swing, and the swing left with the right pendulum length and with
+    one that is 15 % longer or shorter. "normal" is the axis' own filter, "off" is anti-sway off.
 
-    Then the seconds a move, empty grapple / log, of the model operator of canshaper work: one who
-    waits at 30 cm and 2 degrees, one who catches the swing at 30 cm and 6 degrees, at 60 cm and 20
-    degrees, and where only the tip counts. Bold: what profiles of the names precise, loading (or
-    the own filter) and rough are for. Red: slower than off; a response shorter than half a swing.
+    The second table has the seconds a move, empty grapple / log, of the operators of canshaper
+    work: one who waits, at 30 cm and 2 degrees, and one who catches the swing, at 30 cm and 6
+    degrees, at 60 cm and 20 degrees, and where only the tip counts. Bold: the tasks for which the
+    profiles precise, loading (or the own filter) and rough are meant. Red: slower than off, or a
+    response shorter than half a swing.
 
     Examples:
 
@@ -93,7 +96,7 @@ def profiles(
 
 
 def _too_short(deployment: "Deployment") -> Iterator[str]:
-    """Yield what is wrong with filters that answer in less than half a swing: swing stays."""
+    """Yield a fault for each filter whose response is too short: less than half a swing."""
     from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
     from canshaper.machine.filters import every_filter
     from canshaper.shaping.registry import KINDS
@@ -116,7 +119,10 @@ def _too_short(deployment: "Deployment") -> Iterator[str]:
 def _work(
     deployment: "Deployment", changes: list[str], seeds: int, processes: int | None
 ) -> "tuple[dict[str, Any], Table, list[str], str]":
-    """Seconds a move by task and profile: data, table, what is slower than off, interrupted at."""
+    """Return the seconds a move by task and profile: data, table, faults, and where it was stopped.
+
+    A profile that is slower than off is a fault; "" says that Ctrl-C stopped nothing.
+    """
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp
     from canshaper.campaign.work_results import OFF, TASKS, as_data, at_work, choice

@@ -29,23 +29,26 @@ if TYPE_CHECKING:
 GROUP = "measure"
 
 EXIT_NOT_WRITTEN = 1
-LOGS = (".log", ".mcap", ".mf4")  # .mcap and .mf4 have signals and states besides the frames
+LOGS = (".log", ".mcap", ".mf4")  # .mcap and .mf4 also hold signals and states
 ASK_AGAIN_S = 0.2
 
 
 def record(
     file: str = FILE,
     seconds: float | None = typer.Option(
-        None, "--seconds", min=0.1, help="How long; by default until Ctrl-C."
+        None, "--seconds", min=0.1, help="How long to record; by default until Ctrl-C."
     ),
     out: Path | None = typer.Option(
-        None, "--out", metavar="FILE", help="A bundle (.zip), or the log alone (.log, .mcap, .mf4)."
+        None,
+        "--out",
+        metavar="FILE",
+        help="File to write: a bundle (.zip), or only the log (.log, .mcap, .mf4).",
     ),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
     last: bool = typer.Option(
-        False, "--last", help="The last minute instead: the running daemon writes its black box."
+        False, "--last", help="Let the running daemon write its black box: the last minute."
     ),
     control: Path | None = typer.Option(
         None, "--control", metavar="PATH", help="With --last: control socket instead of the file's."
@@ -53,14 +56,14 @@ def record(
 ) -> None:
     """Record every frame on the buses of a deployment; nothing is sent.
 
-    Makes a bundle for a bug report: the log, the deployment file with its DBC files, versions, and
-    what the status messages said. `canshaper replay BUNDLE` replays it.
+    It makes a bundle for a bug report: the log, the deployment file with its DBC files, versions,
+    and the content of the status messages. `canshaper replay BUNDLE` replays it.
 
-    What has just happened is in the black box of the daemon: with --last it writes the last minute
-    of it, tick by tick, as soon as every axis is neutral. After a trip it does so by itself.
+    With --last the running daemon writes its black box, the last minute tick by tick, as soon as
+    every axis is in neutral. After a trip the daemon does so by itself.
 
-    Ctrl-C or SIGTERM end it. Exit code 0, also when nothing was received, which it says; 1 when the
-    bundle or the log cannot be written, or no daemon answers; 2 when the deployment is wrong; 3
+    Ctrl-C or SIGTERM end it. Exit code 0, even when nothing was received, which it reports; 1 when
+    the bundle or the log cannot be written, or no daemon answers; 2 when the deployment is wrong; 3
     when a bus cannot be opened or read.
 
     Examples:
@@ -107,7 +110,7 @@ def record(
     except OSError as error:
         failure, code = UsageError(f"{log}: {error.strerror or error}"), EXIT_NOT_WRITTEN
     if out != log:
-        if recording.frames or failure is None:  # what there is is worth having, whatever came then
+        if recording.frames or failure is None:  # a partial log is useful even after an error
             _bundle(deployment, recording, log, out, failure)
         log.unlink()
     if failure is not None:
@@ -119,7 +122,7 @@ def record(
 
 
 def _last(file: str, control: Path | None) -> None:
-    """Let the daemon write what it has."""
+    """Let the running daemon write its black box."""
     from canshaper.commissioning.control_client import write_black_box
 
     try:
@@ -132,10 +135,12 @@ def _last(file: str, control: Path | None) -> None:
 
 
 def _log_of(out: Path) -> Path:
-    """A new log next to a bundle, such as drive.x2k9.log: drive.log may be another recording.
+    """Make an empty log next to a bundle, such as drive.x2k9.log, and return its path.
+
+    It is not drive.log, which may be another recording.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: the file cannot be made.
     """
     with tempfile.NamedTemporaryFile(
         dir=out.parent, prefix=f"{out.stem}.", suffix=".log", delete=False
@@ -150,7 +155,7 @@ def _bundle(
     out: Path,
     failure: CanshaperError | None,
 ) -> None:
-    """Put everything into one file."""
+    """Pack log, deployment and facts into the bundle; on failure keep the log and name it."""
     from canshaper.recording.record import pack
 
     facts = {

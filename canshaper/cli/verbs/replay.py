@@ -1,4 +1,4 @@
-"""``canshaper replay``: what would canshaper have done with this drive?"""
+"""``canshaper replay``: drive the controller again with the frames of a log."""
 
 import gc
 import json
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 GROUP = "measure"
 
 EXIT_DIFFERENT = 1
-# Lines on standard output; all of them are in the folder.
+# Events on the terminal; the folder has all of them.
 MOST_EVENTS = 12
 
 
@@ -47,19 +47,19 @@ def replay(
     log: Path = typer.Argument(..., help="A black box or another bundle (.zip);"
     " .log, .asc, .blf, .trc, .csv, .txt, .pcap, .db, .mcap, .mf4, see docs/replay.md."),
     configs: list[str] | None = typer.Option(
-        None, "--config", metavar="FILE", help="Deployment; twice for two side by side. Of a bundle"
-        " its own by default."
+        None, "--config", metavar="FILE", help="Deployment; twice for two side by side. A bundle"
+        " has its own."
     ),
     channel: list[str] | None = typer.Option(
-        None, "--channel", metavar="BUS=CHANNEL", help="Channel of the log that is a bus."
+        None, "--channel", metavar="BUS=CHANNEL", help="Which channel of the log is this bus."
     ),
-    out: Path = typer.Option(Path("out/replay"), "--out", help="Folder for what is made."),
+    out: Path = typer.Option(Path("out/replay"), "--out", help="Folder for the results."),
     export: Path | None = EXPORT,
     verify: bool = typer.Option(
-        False, "--verify", help="Of a black box: exit code 1 when a frame is not the same."
+        False, "--verify", help="With a black box: exit code 1 when a frame differs."
     ),
-    begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Table and picture from here."),
-    end_s: float | None = typer.Option(None, "--to", metavar="S", help="And up to here."),
+    begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Begin of table and picture."),
+    end_s: float | None = typer.Option(None, "--to", metavar="S", help="End of table and picture."),
     processes: int | None = PROCESSES,
     scheduler: str | None = SCHEDULER,
     picture: Path | None = PICTURE,
@@ -67,18 +67,18 @@ def replay(
 ) -> None:  # fmt: skip
     """Drive the controller with a black box or a log, at full speed.
 
-    Writes what would have been sent as a new log (candump), the events, a picture and all numbers;
-    prints a table. Nothing is sent on any bus.
+    It writes a log (candump) of the frames that the controller would have sent, the events, a
+    picture and all numbers, and prints a table. It sends nothing on any bus.
 
-    A black box has every tick of the daemon and all that it received: every frame that is computed
-    is compared with the one that was sent then. With other files (--config), and with any other
-    log, the joystick frames drive the controller at the ticks of a clock.
+    A black box has every tick of the daemon and all that it received: every computed frame is
+    compared with the frame that was sent. With other files (--config), and with any other log, the
+    joystick frames drive the controller at the ticks of a clock.
 
-    Of a folder every log in it and below is driven, and one table says it of all; a folder in it
-    is a machine.
+    Of a folder, it replays every log in it and below, and prints one table of all; each folder in
+    it is a machine.
 
-    Exit code 0; 1 when a log of a folder cannot be read, or with --verify when anything is
-    different; 2 when log or deployment are wrong.
+    Exit code 0; 1 when a log of a folder cannot be read, or with --verify when a frame differs; 2
+    when log or deployment are wrong.
 
     Examples:
 
@@ -110,7 +110,7 @@ def replay(
             inside = None
             if log.suffix.lower() == ".zip":
                 log, own = unpack(log, Path(folder))
-                if not configs:  # somebody else's, and so is what it says of files
+                if not configs:  # somebody else wrote its deployment: read no file outside
                     configs, inside = [str(own)], Path(folder)
             if not configs:
                 raise typer.BadParameter("--config is missing: which deployment?")
@@ -142,13 +142,15 @@ def _fleet(
     workers: tuple[int | None, str | None],
     results: "Results",
 ) -> None:
-    """Replay every log of a folder; one table of all."""
+    """Replay every log of a folder, and print one table of all."""
     from canshaper.cli.fleet import replayed, run_fleet, show_replays
 
     if not configs:
         raise typer.BadParameter("--config is missing: which deployment?")
     channels = channels_of(channel)
-    deployments = [loader(config)() for config in configs]  # a wrong one is reported once
+    deployments = [
+        loader(config)() for config in configs
+    ]  # here a fault is reported once, not for each log
     _check_buses(deployments, channels)
     results.deployment = deployments[0]
     work = partial(replayed, configs, channels)
@@ -164,7 +166,7 @@ def _run(
     inside: Path | None,
     export: Path | None = None,
 ) -> "list[Replayed]":
-    """Replay every deployment, one after the other."""
+    """Replay the log with every deployment, one after the other."""
     from canshaper.recording.replay import look
     from canshaper.recording.report import Replayed
     from canshaper.report.console import progress_bar
@@ -190,7 +192,7 @@ def _one(
     export: Path | None,
     on_progress: Callable[[float], None],
 ) -> "Replayed":
-    """Replay one deployment, and write its log and its events."""
+    """Replay the log with one deployment, and write its frames and its events."""
     from canshaper.recording.export import exporting
     from canshaper.recording.replay import Replay
     from canshaper.recording.report import Replayed, Trace
@@ -223,7 +225,7 @@ def _one(
 
 
 def _show(replays: "list[Replayed]", out: Path, results: "Results") -> bool:
-    """Print and write everything; whether anything was not the same as in the log."""
+    """Print and write the results; return whether a frame differs from the log."""
     from canshaper.recording.report import print_replays, verdict_lines
 
     first = replays[0]
@@ -274,7 +276,7 @@ def _check_buses(deployments: "list[Deployment]", channels: dict[str, str]) -> N
 
 @contextmanager
 def _without_collector() -> Iterator[None]:
-    """A replay makes no rings of objects; to look for them takes a tenth of the time."""
+    """Pause the garbage collector: a replay makes no reference cycles, and it costs a tenth."""
     gc.disable()
     try:
         yield

@@ -23,40 +23,40 @@ def run(
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
     listen_only: bool = typer.Option(
-        False, "--listen-only", help="Compute and send the status; send no valve frame."
+        False, "--listen-only", help="Compute, and send the status messages but no valve frame."
     ),
     simulated: bool = typer.Option(
-        False, "--simulated", help="Take valve curves of a simulated crane on a real bus too."
+        False, "--simulated", help="Accept valve curves of a simulated crane on a real bus."
     ),
     control: str | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
     priority: int = typer.Option(
-        0, "--priority", min=0, max=49, help="SCHED_FIFO with this priority, once the buses are"
-        " open; 0: as it was started.",
+        0, "--priority", min=0, max=49, help="Run with SCHED_FIFO at this priority once the buses"
+        " are open; 0: keep the scheduler.",
     ),
     black_box: Path | None = typer.Option(
-        None, "--black-box", metavar="FOLDER", help="Where black boxes are written; by default the"
-        " log directory that systemd gives the service, else nowhere."
+        None, "--black-box", metavar="FOLDER", help="Folder for black boxes; by default the log"
+        " directory that systemd gives the service. Without one no black box is written."
     ),
 ) -> None:  # fmt: skip
     """Shape the joystick commands of a deployment until SIGTERM or Ctrl-C.
 
-    SIGHUP reads the file again; it is applied when it is valid and every axis is in neutral. An
-    interface that goes away is used again when it is back.
+    SIGHUP reads the file again. The daemon applies it when it is valid and every axis is in
+    neutral. An interface that goes away is used again when it is back.
 
-    With --listen-only it can run next to the controller that drives the machine now: nothing is
-    sent but the status messages, which say what the valves would get.
+    With --listen-only the daemon can run next to the controller that drives the machine now: it
+    sends only the status messages, which say what the valves would get.
 
-    Limits that let an axis travel on for more than 2 m after release have to be meant: without a
-    stop_distance_m in the file it does not start, and a reload is refused.
+    If its limits let an axis travel on for more than 2 m after release, the file needs a
+    stop_distance_m. Without it the daemon does not start, and refuses a reload.
 
-    Nor does it with a valve curve that was measured on a simulated crane, on a bus that can be of
-    a machine: --simulated takes it as it is.
+    It does not start either with a valve curve that was measured on a simulated crane, if the bus
+    may be that of a machine. --simulated accepts such a curve.
 
-    A trip or a stop for a fault leaves a black box behind, with the last minute before it and five
-    seconds after it: what was received and sent, tick by tick. The newest 20 are kept; canshaper
-    replay plays them.
+    After a trip, or a stop because of a fault, the daemon writes a black box: all that it received
+    and sent, tick by tick, from one minute before to five seconds after. It keeps the newest 20.
+    canshaper replay plays them.
 
     Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened; as a service
     of systemd it waits for the bus instead.
@@ -97,7 +97,7 @@ def _import_can() -> None:
 
 
 def _log_folder() -> Path | None:
-    """Where systemd lets the service write its logs (systemd.exec(5), LogsDirectory=)."""
+    """Return the log folder that systemd gives the service (systemd.exec(5), LogsDirectory=)."""
     first = os.environ.get("LOGS_DIRECTORY", "").split(":")[0]
     return Path(first) if first else None
 
@@ -105,7 +105,7 @@ def _log_folder() -> Path | None:
 def _changed(
     load: "Callable[[], Deployment]", *, listen_only: bool, simulated: bool, control: str | None
 ) -> "Callable[[], Deployment]":
-    """Return a loader of the deployment with these options put in."""
+    """Return a loader that checks the deployment and applies these options to it."""
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError, Problem
     from canshaper.machine.stopping import rehearsed_valves, unstated

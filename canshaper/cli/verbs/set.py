@@ -18,21 +18,25 @@ GROUP = "drive"
 def set(
     file: str = FILE,
     changes: list[str] | None = typer.Argument(
-        None, metavar="[KEY=VALUE]...", help="What to change; without any, show what can be."
+        None,
+        metavar="[KEY=VALUE]...",
+        help="Numbers to change; without any, list those that may be.",
     ),
     control: Path | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
     write: bool = typer.Option(
-        False, "--write", help="Write the numbers into the file too, once the daemon has them."
+        False,
+        "--write",
+        help="Write the numbers into the file too, after the daemon has accepted them.",
     ),
     as_json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Show or change numbers of a running daemon, without a jump of any valve.
 
-    What may be changed, and how far, stands in the file's section "control". All numbers of one
-    call change together, or none does. They are lost when the daemon ends or reads its file again,
-    unless they are written. Limits of an axis change while it is in neutral.
+    The file's section "control" says which numbers may change, and how far. All numbers of one call
+    change together, or none does. Without --write they are lost when the daemon ends or reads its
+    file again. Limits of an axis change only while it is in neutral.
 
     Exit code 0 when it is done, 1 when the daemon refuses or does not answer, 2 when the file or
     the command line is wrong.
@@ -46,7 +50,7 @@ def set(
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
     from canshaper.commissioning import control_client as client
-    from canshaper.commissioning.assumed import write_numbers
+    from canshaper.commissioning.origins import write_numbers
     from canshaper.report.console import SafeConsole
 
     deployment = loader(file)()

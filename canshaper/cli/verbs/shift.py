@@ -25,28 +25,33 @@ def shift(
         ..., metavar="LOG...", help="Logs, black boxes, recordings, or folders of them."
     ),
     config: str | None = typer.Option(
-        None, "--config", metavar="FILE", help="Deployment; of a bundle its own by default."
+        None, "--config", metavar="FILE", help="Deployment; a bundle has its own."
     ),
     channel: list[str] | None = typer.Option(
-        None, "--channel", metavar="BUS=CHANNEL", help="Channel of the log that is a bus."
+        None, "--channel", metavar="BUS=CHANNEL", help="Which channel of the log is this bus."
     ),
-    by: Literal["gap", "day", "file"] = typer.Option("gap", "--by", help="What a shift is."),
+    by: Literal["gap", "day", "file"] = typer.Option(
+        "gap", "--by", help="What begins a new shift."
+    ),
     gap_h: float = typer.Option(
         1.0, "--gap", metavar="HOURS", min=0.01, help="Time without a frame that ends a shift."
     ),
     out: list[Path] | None = typer.Option(
-        None, "--out", metavar="FILE", help="Write the table here: .csv or .parquet; repeatable."
+        None,
+        "--out",
+        metavar="FILE",
+        help="Write the table to this file, .csv or .parquet; repeatable.",
     ),
     report: Path | None = REPORT,
 ) -> None:
     """Count the work of a crane by shift, by profile, and by anti-sway on or off.
 
-    Cycles, metres of the tip, time waited for the grapple to calm, taps, reversals, largest swing.
-    No sensor is needed: without one the swing is that of the model, and the table says so. Valve
-    frames in a log count, of any sender. docs/monitor.md says what each number is. Of a folder
-    every log in it and below counts; a folder in it is a machine.
+    It counts cycles, metres of the tip, time waited for the grapple to calm, taps, reversals and
+    the largest swing. It needs no sensor: without one the swing is that of the model, and the table
+    says so. Valve frames of any sender count. docs/monitor.md explains each number. Of a folder,
+    every log in it and below counts; each folder in it is a machine.
 
-    Exit code 0; 1 when one of several logs cannot be used; 2 when all, or the deployment, are
+    Exit code 0; 1 when one of several logs cannot be used; 2 when none can, or the deployment is
     wrong.
 
     Examples:

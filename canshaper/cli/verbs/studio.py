@@ -1,4 +1,4 @@
-"""``canshaper studio``: the live page."""
+"""``canshaper studio``: serve the page with the cranes."""
 
 import contextlib
 import secrets
@@ -48,29 +48,39 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 def studio(
     file: str = typer.Argument(
         DEFAULT,
-        help="Deployment file; by default a shipped one. Or a log, a black box, a recording.",
+        help="Deployment file, by default a shipped one; or a log, black box or recording.",
     ),
     sensor: bool = SENSOR,
     shadow: bool = typer.Option(
         False, "--shadow", help="Show a real machine: listen to the file's buses, never send."
     ),
     adjust: bool = typer.Option(
-        False, "--adjust", help="With --shadow: let the page change what `canshaper set` may."
+        False,
+        "--adjust",
+        help="With --shadow: let the page change numbers as `canshaper set` does.",
     ),
     control: Path | None = typer.Option(
-        None, "--control", metavar="PATH", help="Control socket for that, instead of the file's."
+        None,
+        "--control",
+        metavar="PATH",
+        help="Control socket for --adjust, instead of the file's.",
     ),
     others: list[str] | None = typer.Option(
-        None, "--with", metavar="FILE", help="Replay the log, or the drive, with this one too."
+        None, "--with", metavar="FILE", help="Replay the log or drive with this deployment too."
     ),
     seeds: list[int] | None = typer.Option(
-        None, "--seed", min=0, help="This drive of `canshaper campaign FILE`; several to choose."
+        None, "--seed", min=0, help="Show this drive of `canshaper campaign FILE`; repeatable."
     ),
     folder: Path | None = typer.Option(
-        None, "--campaign", metavar="FOLDER", help="The worst drives of the campaign in it."
+        None,
+        "--campaign",
+        metavar="FOLDER",
+        help="Offer the worst drives of the campaign in this folder.",
     ),
-    begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Show a log from here."),
-    end_s: float | None = typer.Option(None, "--to", metavar="S", help="And up to here."),
+    begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Show the log from this time."),
+    end_s: float | None = typer.Option(
+        None, "--to", metavar="S", help="Show the log up to this time."
+    ),
     host: str = typer.Option(
         "127.0.0.1", "--host", help="Address to serve at; others than loopback need a token."
     ),
@@ -82,18 +92,17 @@ def studio(
 ) -> None:
     """Serve a page with a crane to drive: raw and shaped side by side under one joystick.
 
-    Starts the daemon and the simulated crane twice, each pair on a bus of its own, and sends
-    nothing but joystick frames; everything shown is read from the buses. Without --channel the
-    buses are python-can's udp_multicast; with two of them (vcan0 and vcan1) SocketCAN, the first
-    for the shaped crane. With --shadow nothing is started and nothing is sent. On other systems
-    than Linux there are no buses, and a deployment with several has too few: both cranes and their
-    controllers run in this process.
+    It starts the daemon and the simulated crane twice, each pair on a bus of its own. It sends only
+    joystick frames; all that the page shows is read from the buses. Without --channel the buses are
+    python-can's udp_multicast; with two channels (vcan0 and vcan1) SocketCAN, the first for the
+    shaped crane. Outside Linux, and for a deployment with several buses, both cranes and their
+    controllers run in this process, without a bus.
 
-    With --adjust too the page changes numbers of the running daemon, on its PC, within the limits
-    of the file's section "control".
+    With --shadow it starts nothing and sends nothing. With --shadow --adjust the page may also
+    change numbers of the running daemon on the same PC, within the file's section "control".
 
-    A log, a black box or a recording is replayed, and a drive of a campaign driven; the page then
-    has a time bar. Of a log --channel is BUS=CHANNEL.
+    It replays a log, a black box or a recording, and drives again a drive of a campaign; the page
+    then has a time bar. For a log --channel is BUS=CHANNEL.
 
     Examples:
 
@@ -118,7 +127,7 @@ def studio(
     from canshaper.cli.playback import is_drive, opened_drives
     from canshaper_sim.parameters import changed_parameters
 
-    # As a service manager ends it; uvicorn raises the signal again when it is done.
+    # A service manager ends it with SIGTERM; uvicorn raises the signal again when it is done.
     signal.signal(signal.SIGTERM, interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
         file = sensed(file, sensor)
@@ -164,7 +173,10 @@ def studio(
 def _machine(
     file: str, interface: str | None, channel: list[str] | None, adjust: tuple[Path | None] | None
 ) -> "Stage":
-    """A machine to listen to; with ``adjust``, a control socket or the file's, to change."""
+    """Return a stage that listens to a machine; ``adjust`` lets the page change its numbers.
+
+    ``adjust`` holds the control socket; None in it means that of the file.
+    """
     from canshaper.studio.stage import Stage
 
     deployment = loader(file, interface, channel)()
@@ -183,7 +195,7 @@ def _cranes(
     changes: list[str],
     crane: str | None,
 ) -> "Stage":
-    """Simulated cranes to drive; of several the first one."""
+    """Return a stage with simulated cranes; of a file with several, the first crane is driven."""
     from canshaper.studio.crane import copied
     from canshaper.studio.stage import Stage
     from canshaper_sim.cranes import cranes
@@ -192,7 +204,7 @@ def _cranes(
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     transports = _transports(interface, channel) if LINUX else []
     _, deployment = copied(deployment_path(file), directory)
-    changed_parameters(changes, deployment)  # wrong ones are named before anything begins
+    changed_parameters(changes, deployment)  # a wrong one is reported before anything starts
     stage = Stage(deployment)
     crane = crane or next(iter(cranes(deployment)), None)
     if LINUX and len(deployment.config.buses) == 1 and not crane:
@@ -211,7 +223,7 @@ def serve(
     make: "Callable[[Access], ASGIApp]",
     stage: "Stage | None" = None,
 ) -> None:
-    """Serve a page until Ctrl-C; ``make`` gets who may see it."""
+    """Serve a page until Ctrl-C; ``make`` builds the page from the rules of access."""
     from canshaper.commissioning.doctor.processes import before_the_rest
     from canshaper.studio.access import Access, qr_code, reachable
     from canshaper.studio.server import address, listening, server
@@ -223,7 +235,7 @@ def serve(
         raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
     port = one.getsockname()[1]
     away = host not in LOOPBACK
-    # On loopback every user of the PC could open it, with the rights of this one.
+    # Without a token every user of the PC could open the page and act with the rights of this one.
     token = secrets.token_urlsafe(16) if away or (stage and stage.numbers) else None
     names = (host, socket.gethostname()) if away else ()
     web = server(make(Access(port, names, token)))
@@ -241,16 +253,16 @@ def serve(
     if away and sys.stdout.isatty():
         typer.echo(qr_code(url) or "with the package segno it stands here as a QR code, too")
     if stage:
-        # The threads hold each other up: one that waits for the processor has Python's lock.
+        # A thread that waits for the processor with Python's lock held would stop all others.
         before_the_rest()
     web.run(sockets=[one])
 
 
 def _transports(interface: str | None, channels: list[str]) -> list["Transport"]:
-    """Buses of the simulated cranes.
+    """Return the buses of the simulated cranes.
 
     Raises:
-        ValueError: a channel on which the joysticks might move a real machine.
+        UsageError: there is no such channel, or the joysticks might move a real machine on it.
     """
     from canshaper.commissioning.doctor.devices import read_link
     from canshaper.design.processes import Transport
@@ -271,5 +283,5 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
 
 
 def interrupt(_number: int, _frame: FrameType | None) -> None:
-    """End as by Ctrl-C."""
+    """Handle a signal as Ctrl-C."""
     raise KeyboardInterrupt

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 GROUP = "design"
 
 _RAW = "raw"
-# The grapple near the ground, in the middle of the reach.
+# At the start the grapple is near the ground, in the middle of the reach.
 _START = ("start_radius_m=5", "start_height_m=2.2")
-_REACH_M = 2.0, 8.0  # from there every target is in reach
-_LEAST = 3  # persons of a bootstrap
+_REACH_M = 2.0, 8.0  # radius at the start from which every target is in reach
+_LEAST = 3  # fewest persons for a bootstrap
 _CODE = re.compile(r"[A-Za-z0-9_-]{1,12}")
 
 
@@ -35,35 +35,43 @@ def study(
         "forwarder-robust.yaml", help="Deployment file; by default a shipped one."
     ),
     other: str = typer.Option(
-        "forwarder-gff.yaml", "--with", metavar="FILE", help="The third setting."
+        "forwarder-gff.yaml", "--with", metavar="FILE", help="Deployment of the third setting."
     ),
     person: str | None = typer.Option(
-        None, "--person", metavar="CODE", help="Who drives: letters and digits, no name."
+        None, "--person", metavar="CODE", help="Code of the person: letters and digits, no name."
     ),
-    folder: Path = typer.Option(Path("study"), "--folder", help="Of the study: key and tables."),
-    placements: int = typer.Option(18, "--placements", min=9, help="That count, of each setting."),
-    practice: int = typer.Option(9, "--practice", min=0, help="In front of them."),
-    pause_s: float = typer.Option(60.0, "--break", min=0.0, help="Between two settings, s."),
+    folder: Path = typer.Option(
+        Path("study"), "--folder", help="Folder of the study, with key and tables."
+    ),
+    placements: int = typer.Option(
+        18, "--placements", min=9, help="Placements of each setting that count."
+    ),
+    practice: int = typer.Option(9, "--practice", min=0, help="Practice placements before them."),
+    pause_s: float = typer.Option(60.0, "--break", min=0.0, help="Break between two settings, s."),
     bus: bool = typer.Option(
-        False, "--bus", help="The real joysticks of the file's buses, only listened to."
+        False, "--bus", help="Use the real joysticks on the file's buses; it only listens."
     ),
     grip: str | None = typer.Option(
-        None, "--grip", metavar="MESSAGE.SIGNAL", help="Their button that grips; else the page's."
+        None,
+        "--grip",
+        metavar="MESSAGE.SIGNAL",
+        help="Button of the joysticks that grips; else that of the page.",
     ),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
     port: int = typer.Option(8377, "--port", help="Port to serve at; 0 takes a free one."),
     unseal: bool = typer.Option(
-        False, "--unseal", help="Name the settings: after the last person."
+        False, "--unseal", help="Reveal which setting is which, after the last person."
     ),
     changes: list[str] | None = SET,
 ) -> None:
     """Let a person place the grapple of a simulated crane on targets, not knowing the setting.
 
-    Three settings: raw, the file, and another file; each in a part of its own, their order by a
-    Latin square over the persons. Each placement is a row of FOLDER/CODE.csv when it ends. A study
-    that was broken off goes on with the same command. Without --person it joins the persons who are
-    complete: changes in pairs by the bootstrap, and how many persons a change needs.
+    There are three settings: raw, the file, and another file. Each has a part of its own; a Latin
+    square over the persons orders them. Each finished placement is a row of FOLDER/CODE.csv. The
+    same command continues a study that was interrupted. Without --person it evaluates the persons
+    who are complete: changes between pairs of settings by the bootstrap, and the number of persons
+    that a change needs.
 
     Examples:
 
@@ -117,7 +125,7 @@ def study(
 
 
 def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
-    """The key of the study, made where it has none."""
+    """Return the key of the study; make it for a new study."""
     from canshaper.studio.study import KEY, Key
     from canshaper_sim.parameters import changed_parameters
 
@@ -138,7 +146,7 @@ def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
 
 
 def _settings(key: "Key", file: str, other: str, copies: Path) -> "dict[str, Deployment]":
-    """The deployment of each letter."""
+    """Return the deployment behind each letter."""
     from canshaper.studio.study_stage import setting
 
     by_name = {_RAW: setting(deployment_path(file), copies, raw=True)}
@@ -147,7 +155,7 @@ def _settings(key: "Key", file: str, other: str, copies: Path) -> "dict[str, Dep
 
 
 def _table(folder: Path, person: str, key: "Key") -> "Table":
-    """The table of a person, who has the next order where it is new."""
+    """Return the table of a person; a new person gets the next order of the settings."""
     from canshaper.studio.study import ORDERS, Table, rows_of
 
     table = Table(folder / f"{person}.csv", {"study": key.mark, "person": person})
@@ -159,7 +167,7 @@ def _table(folder: Path, person: str, key: "Key") -> "Table":
 
 
 def _join(folder: Path, unseal: bool) -> None:
-    """Join the persons of a study; of none, say how many it needs."""
+    """Print the results of all complete persons, and how many persons a change needs."""
     from canshaper.cli.results import Results
     from canshaper.studio import study_results as results
     from canshaper.studio.study import KEY, LETTERS, mark_of, read_key

@@ -1,4 +1,4 @@
-"""``canshaper tune``: the optimal filter of an axis, shown, drawn and written on request."""
+"""``canshaper tune``: design the G_FF filter of an axis."""
 
 import json
 from pathlib import Path
@@ -18,9 +18,11 @@ def tune(
     fleet: bool = typer.Option(
         False, "--fleet", help="Tune every swinging axis, for the drives of a campaign."
     ),
-    method: str = typer.Option("optimal", "--method", help="optimal, or the paper's manual rule."),
+    method: str = typer.Option(
+        "optimal", "--method", help="optimal, or manual: the rule of the paper."
+    ),
     preference: float | None = typer.Option(
-        None, "--preference", help="Instead of weights: 0 quickest to 1 calmest, with a table."
+        None, "--preference", help="Instead of weights: 0 quickest to 1 calmest; prints a table."
     ),
     q: str | None = typer.Option(
         None, "--q", help="Weight Q of swing angle and rate: Q, Q11,Q22, or rows of the matrix."
@@ -31,51 +33,57 @@ def tune(
     states: str | None = typer.Option(
         None, "--states", help="What Q weighs: sway (default), deviation, companion, none."
     ),
-    horizon_s: float | None = typer.Option(None, "--horizon", help="Seconds of a step (3)."),
+    horizon_s: float | None = typer.Option(
+        None, "--horizon", help="Seconds of the step response that count (3)."
+    ),
     pole_distance: str | None = typer.Option(
         None, "--pole-distance", help="Eq. 14e: text (at least 5 times), printed (at most), off."
     ),
     within_command: bool | None = typer.Option(
         None,
         "--within-command/--beyond-command",
-        help="Output never above the command. Default: as allow_faster of the axis says.",
+        help="Whether the output may exceed the command. Default: allow_faster of the axis.",
     ),
     max_jump: float | None = typer.Option(
-        None, "--max-jump", help="Largest part of a step that comes out at once."
+        None, "--max-jump", help="Largest part of a step that the output may jump at once."
     ),
     max_rate: float | None = typer.Option(
         None,
         "--max-rate",
-        help="Rate of the valve, full speeds/s, inf for none. Default: rise and fall of the axis.",
+        help="Rate of the valve, full speeds/s, inf: no limit. Default: the axis' rise and fall.",
     ),
     third_pole: bool | None = typer.Option(
-        None, "--third-pole/--two-poles", help="A third pole: no part of a step comes at once."
+        None, "--third-pole/--two-poles", help="Use a third pole: the output never jumps."
     ),
     max_run_on_s: float | None = typer.Option(
-        None, "--max-run-on", help="Seconds until a step has settled to 5 %."
+        None, "--max-run-on", help="Longest time until a step has settled to 5 %, s."
     ),
     length_range_pct: float | None = typer.Option(
         None,
         "--length-range",
-        help="Instead of Eq. 15: least worst swing for lengths of -X to +X %. Run-on: tail_s.",
+        help="Instead of Eq. 15: least worst swing for lengths of -X to +X %, within tail_s.",
     ),
-    starts: int = typer.Option(3, "--starts", help="Starts of the solver."),
+    starts: int = typer.Option(3, "--starts", help="Number of starts of the solver."),
     out: Path = typer.Option(Path("out/tune"), "--out", help="Directory for the picture."),
     write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
-    force: bool = typer.Option(False, "--force", help="Write what leaves half of the swing too."),
+    force: bool = typer.Option(
+        False, "--force", help="Write the filter even if it leaves more than half of the swing."
+    ),
     as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
     picture: Path | None = PICTURE,
     report: Path | None = REPORT,
 ) -> None:
     """Find the best poles of an axis' G_FF, show what they do, write them on request.
 
-    Prints the setting next to the one in the file, how much swing is left when the pendulum is up
-    to 30 % longer or shorter, what holds the optimum, and whether that is good; draws OUT/AXIS.png.
-    Options that are not given are those that the filter in the file was tuned with. Exit code 1
-    where more than half of the swing is left, 2 where nothing fits, with what conflicts.
+    It prints the new filter next to that of the file, the swing left when the pendulum is up to
+    30 % longer or shorter, the constraints that bound the optimum, and a verdict. It draws
+    OUT/AXIS.png. An option that is not given has the value with which the file's filter was tuned.
+    Exit code 1 when more than half of the swing is left; 2 when the options exclude each other: the
+    error names them.
 
-    With --fleet all swinging axes are tuned as canshaper robust --fleet designs them, within the
-    run-on of --max-run-on (2.25 s), and stand next to its robust shapers of that length.
+    With --fleet it tunes all swinging axes together, as canshaper robust --fleet designs them,
+    within the run-on of --max-run-on (2.25 s), and compares them with robust shapers of that
+    length.
 
     Examples:
 
@@ -95,7 +103,7 @@ def tune(
     """
     from canshaper.cli.results import Results
     from canshaper.cli.verbs.robust import for_fleet
-    from canshaper.commissioning.filter_file import refuse_scheduled, written_line
+    from canshaper.commissioning.origins import refuse_scheduled, written_line
     from canshaper.commissioning.tuned import (
         as_dict,
         design_tuned,
@@ -148,7 +156,7 @@ def tune(
 
 
 def _numbers(text: str | None) -> list[float] | None:
-    """Numbers of an option."""
+    """Parse the numbers of --q."""
     try:
         return None if text is None else [float(word) for word in text.split(",")]
     except ValueError:

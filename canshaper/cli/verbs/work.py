@@ -1,4 +1,4 @@
-"""``canshaper work``: seconds a move that anti-sway gains a model of an operator."""
+"""``canshaper work``: seconds a move that anti-sway saves a model operator."""
 
 import math
 from dataclasses import fields, replace
@@ -20,11 +20,16 @@ def work(
         "forwarder-robust.yaml", help="Deployment file; by default a shipped one."
     ),
     tolerance: tuple[float, float] = typer.Option(
-        (30.0, 6.0), "--tolerance", help="Tip from the target, cm; swing, degrees (90: any)."
+        (30.0, 6.0),
+        "--tolerance",
+        help="Distance of the tip from the target, cm, and swing, degrees (90: any).",
     ),
     seeds: int = typer.Option(12, "--seeds", min=2, help="Working cycles of each operator."),
     operators: list[str] | None = typer.Option(
-        None, "--operator", metavar="NAME=VALUE", help="Such as novice.reaction_s=0.4."
+        None,
+        "--operator",
+        metavar="NAME=VALUE",
+        help="Change an operator, such as novice.reaction_s=0.4.",
     ),
     processes: int | None = PROCESSES,
     changes: list[str] | None = SET,
@@ -33,10 +38,11 @@ def work(
 ) -> None:
     """Let model operators load logs, anti-sway off and on, and compare the seconds a move.
 
-    An operator swings the empty grapple out to the pile and a log back, ten moves, each until tip
-    and load are within the tolerance for 0.3 s. Three work: skilled, catching the swing; skilled,
-    waiting until it has decayed; novice. Each has practised with anti-sway off and on, and has the
-    technique that was the fastest. Both get the same seeds; bounds by the bootstrap. Takes minutes.
+    An operator moves the empty grapple out to the pile and a log back, ten moves in all. A move
+    ends when tip and load were within the tolerance for 0.3 s. There are three operators: a skilled
+    one who catches the swing, a skilled one who waits until it has decayed, and a novice. Each
+    practises with anti-sway off and on, and then works with its fastest technique. Off and on use
+    the same seeds; the bounds come from the bootstrap. It takes minutes.
 
     Examples:
 
@@ -62,7 +68,7 @@ def work(
             expected = f"expected {low:g} .. {high:g} {unit}"
             raise UsageError(f"--tolerance: {expected}, got {given:g}")
     deployment = loader(file)()
-    changed_parameters(changes or [], deployment)  # wrong ones are named before anything begins
+    changed_parameters(changes or [], deployment)  # a wrong one is reported before the work
     results = Results("Seconds a move", deployment, report, picture)
     source = Source.of(deployment, deployment.config.uncertainty, changes or [])
     within = tolerance[0] / 100.0, tolerance[1] if tolerance[1] < _DEG[1] else math.inf

@@ -14,7 +14,7 @@ from canshaper.codec.frame import Frame
 from canshaper.config.bus import REDUCED_PCT
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.rehearsal.fault import MS, Asked, Demands, Fault, S, no_more, takes_back
 from canshaper.daemon.rehearsal.faults import rehearsed_faults
 from canshaper.shaping.states import State
@@ -39,8 +39,8 @@ NOTHING = Fault("", "", (), 0)
 class Rehearsal(Recorder):
     """A recorder that alters received frames by at most one fault; arguments as ``Recorder``."""
 
-    def __init__(self, guarded: Guarded, controller: Controller, ring: Ring) -> None:
-        super().__init__(guarded, controller, ring)
+    def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
+        super().__init__(gated, controller, ring)
         deployment = controller.deployment
         self._demands, self._now_ns = Demands(deployment), 0
         self._valves = frozenset(axis.valve.message.key for axis in deployment.axes.values())
@@ -95,12 +95,12 @@ class Rehearsal(Recorder):
             raise ValueError(f"expected one of {', '.join(faults)}, got {name!r}")
         if self._phase != DONE:
             raise ValueError(f"expected one fault at a time, {self._fault.name} is not over")
-        for axis, runner in self._controller.axes.items():
-            if (fast := runner.bound.config.limits.max_pct) > REDUCED_PCT:
+        for axis, control in self._controller.axes.items():
+            if (fast := control.bound.config.limits.max_pct) > REDUCED_PCT:
                 text = f"expected max_pct up to {REDUCED_PCT:g}, got {fast:g}"
                 raise ValueError(f"axes.{axis}.limits: {text}: faults need reduced speed")
-            if not runner.axis.neutral:
-                state = runner.axis.state.name
+            if not control.axis.neutral:
+                state = control.axis.state.name
                 raise ValueError(f"expected every axis at rest, {axis} is {state}: let go first")
         self._begin(faults[name])
 
@@ -157,7 +157,9 @@ class Rehearsal(Recorder):
         """Return whether an axis, in a stop, runs out against the demand of a frame."""
         keys, axes = self._demands.keys, self._controller.axes
         stopping = {n: one.axis for n, one in axes.items() if one.axis.state is State.STOPPING}
-        return any(axis.raw * asked.get(keys[name], 0.0) < 0.0 for name, axis in stopping.items())
+        return any(
+            axis.output.steps * asked.get(keys[name], 0.0) < 0.0 for name, axis in stopping.items()
+        )
 
     def _altered(self, frame: Frame, asked: Asked) -> tuple[Frame, ...]:
         """Return the frames to receive instead of a frame; none demands more than it."""
@@ -215,7 +217,7 @@ class Rehearsal(Recorder):
     def _held(self, now_ns: int) -> bool:
         """Return whether to make the fault now: an axis of it has moved, or all are at rest."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
-        if not any(one.state is State.ACTIVE and abs(one.command) >= LEAST_DEMAND for one in axes):
+        if not any(one.state is State.ACTIVE and abs(one.demand) >= LEAST_DEMAND for one in axes):
             self._still_ns = now_ns
         return now_ns - self._still_ns >= HELD_NS if axes else self._controller.neutral
 
@@ -245,4 +247,4 @@ class Rehearsal(Recorder):
     def _neutral(self) -> bool:
         """Whether the valves of its axes are neutral and stay neutral."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
-        return all(one.neutral and not one.raw for one in axes)
+        return all(one.neutral and not one.output.steps for one in axes)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
-from canshaper.config.objective import PoleDistance, States, matrix, weights_fault
+from canshaper.config.desk import PoleDistance, States, matrix, weights_fault
 from canshaper.errors import DesignError
 from canshaper.shaping.sway import SwayMode
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from canshaper.commissioning.tuned import TunedDesign, design_tuned, write_tuned
+from canshaper.config.desk import Objective
 from canshaper.config.load import load_config
-from canshaper.config.objective import Objective
 from canshaper.design.tuning.formulation import Task, Weights
 from canshaper.design.tuning.optimal import tune
 from canshaper.errors import ConfigError, DesignError, UsageError

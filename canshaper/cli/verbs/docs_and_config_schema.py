@@ -1,26 +1,69 @@
-"""``canshaper config-schema``: the JSON schema of the deployment file, for editors."""
+"""``canshaper docs`` and ``config-schema``: the pages, and the JSON schema of the file."""
 
 import json
 from collections.abc import Iterable, Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import echo
+from canshaper.cli.common import echo, fail
 from canshaper.errors import UsageError
+from canshaper.shipped import data_directory, site_directory
 
 if TYPE_CHECKING:
     from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 
 GROUP = "look"
 
+EXIT_NO_ADDRESS = 1
+# A browser shows files of these suffixes instead of saving them.
+TEXTS = dict.fromkeys((".md", ".py", ".toml", ".yaml", "", ".link", ".network"), "text/plain")
+
+
+class _Pages(SimpleHTTPRequestHandler):
+    extensions_map = {**SimpleHTTPRequestHandler.extensions_map, **TEXTS}  # noqa: RUF012
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Log nothing of a request."""
+
+
+def docs(
+    port: int = typer.Option(8378, "--port", help="Port to serve at; 0 takes a free one."),
+) -> None:
+    """Serve the pages of this version to a browser on this machine, without a network.
+
+    They include search, all commands and the Python API. The files also open without a server.
+
+    Examples:
+
+      canshaper docs
+
+      canshaper docs --port 0
+    """
+    site = site_directory()
+    if site is None:
+        pages = data_directory() / "docs"
+        where = f"read {pages}, or run make docs" if pages.is_dir() else "install a release"
+        raise UsageError(f"the site is not in this installation: {where}")
+    try:
+        server = ThreadingHTTPServer(("127.0.0.1", port), partial(_Pages, directory=str(site)))
+    except OSError as error:
+        text = f"cannot serve at port {port}: {error.strerror or error}; try --port 0"
+        raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
+    with server:
+        echo(f"open http://127.0.0.1:{server.server_port}/ in a browser; Ctrl-C ends")
+        echo(f"the same as files: {site / 'index.html'}")
+        server.serve_forever()
+
 
 def config_schema(
     filters: bool = typer.Option(
-        False, "--filters", help="Instead the table of filters, as in docs/deployment.md."
+        False, "--filters", help="Print the table of filters instead, as in docs/deployment.md."
     ),
     checksums: bool = typer.Option(
-        False, "--checksums", help="Instead the table of checksums, as in docs/checksums.md."
+        False, "--checksums", help="Print the table of checksums instead, as in docs/checksums.md."
     ),
 ) -> None:
     """Print the JSON schema of the deployment file.
@@ -29,7 +72,7 @@ def config_schema(
 
       # yaml-language-server: $schema=deployment.schema.json
 
-    Filters and checksums of other packages that are installed are in the schema, and in the tables.
+    Schema and tables include the filters and checksums of other installed packages.
 
     Examples:
 
@@ -47,7 +90,7 @@ def config_schema(
     try:
         check_packages()
         table = [*checksum_table()] if checksums else []
-    except ValueError as error:  # of a package
+    except ValueError as error:  # an installed package is wrong
         raise UsageError(str(error)) from None
     if filters:
         table += filter_table(KINDS.values())
@@ -62,10 +105,10 @@ def config_schema(
 
 
 def checksum_table() -> Iterator[str]:
-    """The table of all kinds in Markdown, line by line.
+    """Yield the lines of the table of all checksum kinds, in Markdown.
 
     Raises:
-        ValueError: as ``known_checksum``.
+        ValueError: a package is wrong, see ``known_checksum``.
     """
     from canshaper.checksums.kinds import CHECKSUMS, checksum_names, known_checksum
 
@@ -77,7 +120,7 @@ def checksum_table() -> Iterator[str]:
 
 
 def filter_table(kinds: "Iterable[ShaperKind]") -> Iterator[str]:
-    """Lines of a Markdown table of filters."""
+    """Yield the lines of the table of filters, in Markdown."""
     yield "| `kind` | parameters | what it is | needs `sway` |"
     yield "|---|---|---|---|"
     for kind in kinds:
