@@ -97,17 +97,6 @@ def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
     assert line.unconfirmed() == 3
 
 
-def test_what_was_under_way_when_an_interface_went_is_not_waited_for(line: Line) -> None:
-    line.unconfirmed(most=2)
-    line.near[RECEIVED].fail = OSError(errno.ENODEV, "gone")
-    line.put(message(0x110))
-    line.received()
-    assert line.port.state is BusState.GONE
-    line.now_ns += REOPEN_NS
-    line.received()
-    assert line.unconfirmed() == 3
-
-
 @pytest.mark.parametrize("number", [RECEIVED, SENT_BACK, UNKNOWN])
 def test_a_socket_that_was_closed_under_the_port_is_replaced(line: Line, number: int) -> None:
     """The real thing: the kernel answers EBADF."""
