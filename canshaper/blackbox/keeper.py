@@ -45,21 +45,13 @@ NO_FOLDER = "no folder for black boxes: see canshaper run --black-box"
 
 
 class Kept(NamedTuple):
-    """Content of a file that is being written, or could not be written.
-
-    Attributes:
-        deployment: deployment that was running.
-        number: number of the file.
-        why: reason for the file.
-        segments: recorded segments, held until the file is written.
-        at_ns: time when they were put aside.
-    """
+    """Content of a file that is being written, or could not be written."""
 
     deployment: Deployment
     number: int
     why: str
-    segments: tuple[Segment, ...]
-    at_ns: int
+    segments: tuple[Segment, ...]  # held until the file is written
+    at_ns: int  # when the segments were put aside
 
 
 class BlackBox:
@@ -102,13 +94,7 @@ class BlackBox:
     def around(
         self, gated: GatedController, controller: Controller, kind: type[Recorder] = Recorder
     ) -> Recorder:
-        """Make a recorder for a controller; ``begin`` starts it.
-
-        Args:
-            gated: the controller behind its gate.
-            controller: the controller itself.
-            kind: class of the recorder.
-        """
+        """Make a recorder of a class for a controller behind its gate; ``begin`` starts it."""
         deployment = controller.deployment
         self._flush()
         self._ring.pause()
@@ -149,7 +135,9 @@ class BlackBox:
         if now_ns >= self._next_ns and (neutral or not self._short or self._ring.cut_off):
             self._keep_state(now_ns, follows=True)
         if self._writer:
-            self._look_after_writer(now_ns)
+            done, status = os.waitpid(self._writer, os.WNOHANG)
+            if done:
+                self._ended(status, now_ns)
         elif now_ns >= self._due_ns:
             self._start_writer(now_ns)
 
@@ -266,11 +254,6 @@ class BlackBox:
             status = self._write()
         finally:
             os._exit(status)
-
-    def _look_after_writer(self, now_ns: int) -> None:
-        done, status = os.waitpid(self._writer, os.WNOHANG)
-        if done:
-            self._ended(status, now_ns)
 
     def _ended(self, status: int, now_ns: int) -> None:
         assert self._kept is not None

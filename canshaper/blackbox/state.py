@@ -136,11 +136,7 @@ class States:
         return number
 
     def _find(self, module: str, name: str) -> Any:
-        """Return the class or function of a name.
-
-        Raises:
-            StateError: a state may not name it.
-        """
+        """Return the class or function of a name; refuse a name that no state may contain."""
         if name == _fixed.__name__ and module == __name__:
             return self._fixed.__getitem__
         value = getattr(sys.modules.get(module), name, None)

@@ -102,13 +102,7 @@ def open_port(
 
 
 def not_opened(name: str, config: Bus, error: Exception) -> BusError:
-    """Return the error that every verb reports for a bus that cannot be opened.
-
-    Args:
-        name: name of the bus in the deployment file.
-        config: section of the bus.
-        error: error of its interface.
-    """
+    """Return the error that every verb reports for a bus that ``error`` keeps from opening."""
     text = (error.strerror if isinstance(error, OSError) else None) or str(error)
     if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
         text = "this kernel has no CAN, or its module can_raw is not loaded"

@@ -84,10 +84,7 @@ logging.getLogger("can.interfaces.socketcand.socketcand").addFilter(Changed())
 
 
 class PythonCanPort:
-    """One open bus of python-can.
-
-    It uses no Notifier of python-can, because a single exception ends the Notifier's thread.
-    """
+    """One open bus of python-can, without its Notifier: one exception ends that thread for good."""
 
     def __init__(
         self,

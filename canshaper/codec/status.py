@@ -2,21 +2,21 @@
 
 A field is declared once, in a table below; a message carries those fields that its DBC has. To send
 another field, add a line to the table: it is then sent where a DBC has the signal, decoded by every
-reader of status messages, and required by none.
+reader of status messages, and required by none. A field of an axis reads an attribute of
+``AxisControl``, one of the aim an attribute of ``AimPoint``.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from operator import attrgetter, itemgetter
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from cantools.database.can import Message
 
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.message import SentMessage
 from canshaper.codec.signals import raw_limits
-from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.states import Reason, State, Trust
 
 DIGEST_BITS = 16
@@ -62,60 +62,16 @@ class _Code:
             return int(value)
 
 
-class ReportedAxis(Protocol):
-    """Axis whose status is sent."""
-
-    @property
-    def axis(self) -> ShapedAxis:
-        """The shaped axis: state, demand and applied command."""
-
-    @property
-    def reason(self) -> Reason:
-        """Why the axis is in its state, or what holds it back."""
-
-    @property
-    def sway_deg(self) -> float:
-        """Predicted swing of the load, degrees."""
-
-    @property
-    def active_set(self) -> int:
-        """Number of the selected parameter set; 0 where there is no choice."""
-
-    @property
-    def trust(self) -> Trust:
-        """Trust state of the sway sensor."""
-
-    @property
-    def swing_length_m(self) -> float:
-        """Pendulum length estimated from the sway sensor, m; 0 where it is not known."""
+def _command_pct(one: Any) -> float:
+    return 100.0 * float(one.axis.demand)
 
 
-class ReportedAim(Protocol):
-    """Where the tip comes to rest if the operator releases the joysticks now."""
-
-    @property
-    def slew_deg(self) -> float:
-        """Angle by which the crane still turns, degrees."""
-
-    @property
-    def radius_m(self) -> float:
-        """Distance by which the tip still moves out, m; negative inwards."""
-
-    @property
-    def known(self) -> bool:
-        """Whether angle and distance are known."""
-
-
-def _command_pct(one: ReportedAxis) -> float:
-    return 100.0 * one.axis.demand
-
-
-def _applied_pct(one: ReportedAxis) -> float:
-    return 100.0 * one.axis.output.setpoint
+def _applied_pct(one: Any) -> float:
+    return 100.0 * float(one.axis.output.setpoint)
 
 
 # Nothing here may be a lambda: a deployment is pickled by the process that has read it.
-AXIS_STATUS: list[StatusField[ReportedAxis]] = [
+AXIS_STATUS: list[StatusField[Any]] = [
     StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State)),
     StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason)),
     StatusField("RawCommand", _command_pct, required=True),
@@ -145,7 +101,7 @@ IDENTITY: list[StatusField[int]] = [
     StatusField("Digest", int, int, required=True, largest=(1 << DIGEST_BITS) - 1)
 ]
 """Digest of what runs."""
-AIM: list[StatusField[ReportedAim]] = [
+AIM: list[StatusField[Any]] = [
     StatusField("AimSlew", attrgetter("slew_deg"), required=True),
     StatusField("AimReach", attrgetter("radius_m"), required=True),
     StatusField("AimKnown", attrgetter("known"), bool, True, 1),

@@ -84,10 +84,7 @@ def open_control(
     black_box: BlackBox,
     reporter: Reporter,
 ) -> Control | None:
-    """Open the control socket of a deployment; log a failure and return None.
-
-    The machine works without a control socket.
-    """
+    """Open the control socket of a deployment; None if that fails: the machine works without it."""
     control = deployment.config.control
     assert control is not None  # called for such deployments only
     path = control.path(deployment.path)

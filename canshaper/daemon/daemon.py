@@ -16,7 +16,6 @@ from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
 from canshaper.controller.gated import GatedController
-from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
     close_ports,
@@ -38,6 +37,7 @@ from canshaper.machine.identity import program_sha256
 
 if TYPE_CHECKING:
     from canshaper.daemon.control import Control
+    from canshaper.daemon.follow import TickFollower
 
 log = logging.getLogger("canshaper")
 
@@ -130,11 +130,6 @@ class Daemon:
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
         """Receive all waiting frames, tick the axes and send, then do the housekeeping.
 
-        Args:
-            now_ns: time of the tick.
-            missed: deadlines missed since the last tick.
-            late_ns: lateness of the tick.
-
         Returns:
             Whether the loop continues; False ends it, for good or for a new deployment.
         """
@@ -207,7 +202,11 @@ class Daemon:
             parts = self._controller, self._recorder, self._black_box, self._reporter
             self._control = open_control(deployment, *parts)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        self._follower = tick_follower(deployment, self._controller)
+        self._follower: TickFollower | None = None
+        if deployment.config.tick:
+            from canshaper.daemon.follow import tick_follower
+
+            self._follower = tick_follower(deployment, self._controller)
 
     def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment if its buses can be opened.

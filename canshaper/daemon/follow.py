@@ -116,13 +116,12 @@ class TickFollower:
 
 
 def tick_follower(deployment: Deployment, controller: Controller) -> TickFollower | None:
-    """Make the follower of a joystick; None if the file has none, or the joystick has no times.
+    """Make the follower of a deployment with ``tick``; None if its joystick has no times.
 
     The command line may have put its bus on an interface that does not stamp frames.
     """
     tick = deployment.config.tick
-    if tick is None:
-        return None
+    assert tick is not None  # called for such deployments only
     if fault := follow_fault(deployment.config, deployment.joysticks[tick.follow]):
         log.warning("tick=plain %s of %s", fault, tick.follow)
         return None

@@ -157,16 +157,10 @@ class InlineGateway:
         ports: Mapping[str, Port],
         standstill: Standstill,
     ) -> None:
-        """Pass on incoming frames until a deadline; frames of the joysticks first.
+        """Pass on incoming frames until a deadline (in ``seconds``); frames of joysticks first.
 
         Frames that come later are left to the tick, which knows whether the loop stood still: such
         frames must not leave with the velocities of the last tick.
-
-        Args:
-            seconds: time until the deadline.
-            processor: receives the frames of the ports.
-            ports: ports by name of their bus.
-            standstill: clock of the loop, and time when the wait ends early.
         """
         clock = standstill.clock
         until_ns = clock() + round(seconds * 1e9)

@@ -50,7 +50,7 @@ class JournalHandler(logging.Handler):
 
     def flush(self) -> None:
         """Write lines while the descriptor takes them at once; if writing fails, drop all lines."""
-        while self._lines and self._writable():
+        while self._lines and any(events & select.POLLOUT for _, events in self._poll.poll(0)):
             line = self._lines[0]
             try:
                 written = os.write(self._fd, line)
@@ -77,9 +77,6 @@ class JournalHandler(logging.Handler):
         if self._journal:
             text = PRIORITY.get(level, "<3>") + text
         self._lines.append(text.encode(errors="replace")[: MOST_BYTES - 1] + b"\n")
-
-    def _writable(self) -> bool:
-        return any(events & select.POLLOUT for _, events in self._poll.poll(0))
 
 
 def _own_terminal(fd: int) -> int:

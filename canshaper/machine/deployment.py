@@ -10,7 +10,7 @@ from cantools.database.can import Message
 
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.message import SentMessage
-from canshaper.codec.status import AIM, ReportedAim, StatusCodec
+from canshaper.codec.status import AIM, StatusCodec
 from canshaper.config.crane import Motion, Radius, coordinates
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import OtherFlow
@@ -40,7 +40,7 @@ class BoundMotion:
 
     config: Motion
     radius: BoundValue[Radius] | None = None
-    aim: StatusCodec[ReportedAim] | None = None
+    aim: StatusCodec[Any] | None = None
     aim_ticks: int = 0
 
 

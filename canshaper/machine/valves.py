@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cantools.database.can import Message, Signal
 
@@ -18,7 +18,7 @@ from canshaper.codec.signals import (
     set_point_fault,
     symmetrical_range,
 )
-from canshaper.codec.status import ReportedAxis, StatusCodec
+from canshaper.codec.status import StatusCodec
 from canshaper.codec.velocity import Direction, DirectionCodec, FlagsCodec, ValveCodec
 from canshaper.config.enable import own_switch
 from canshaper.config.limits import Ends, RopeSection
@@ -281,7 +281,7 @@ class BoundAxis:
     valve: ValveCodec
     period_ticks: int
     timeout_ms: int
-    status: StatusCodec[ReportedAxis] | None
+    status: StatusCodec[Any] | None
     status_ticks: int
     feedback: BoundValue[FeedbackSection] | None = None
     status_word: Bound[StatusWord] | None = None

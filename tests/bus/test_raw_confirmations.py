@@ -52,17 +52,6 @@ def test_confirmed_frames_can_be_sent_for_ever(line: Line) -> None:
     assert line.faults == []
 
 
-def test_a_confirmation_may_come_two_ticks_late(line: Line) -> None:
-    for tick in range(500):
-        line.now_ns += TICK_NS
-        assert line.port.send(VALVE)
-        line.sent()
-        if tick >= 2:
-            line.confirm(VALVE)
-        assert line.received() == []
-    assert line.faults == []
-
-
 @pytest.mark.parametrize(("late", "waited"), [(1, 0), (2, 498)])
 def test_a_valves_frame_that_waits_for_longer_than_its_cycle_is_counted(
     line: Line, late: int, waited: int
@@ -99,13 +88,6 @@ def test_of_several_frames_under_way_a_confirmation_confirms_one(line: Line) -> 
     line.confirm(VALVE)
     line.received()
     assert line.unconfirmed() == 2
-
-
-def test_valve_frames_that_waited_for_longer_than_their_cycle_are_counted(line: Line) -> None:
-    for frame in (VALVE, STATUS):
-        for _ in range(3):
-            assert line.port.send(frame)
-    assert line.port.waited == 1
 
 
 def test_a_bus_that_takes_no_frames_gets_no_more(line: Line) -> None:

@@ -8,7 +8,6 @@ import pytest
 
 from canshaper.bus.interface import PROBE_NS, REOPEN_NS
 from canshaper.codec.frame import BusState, FrameFault
-from canshaper.config.bus import Match
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import (
@@ -95,17 +94,6 @@ def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
     assert line.opened_with == [IDS] * len(line.opened_with)
     line.put(message(0x110))
     assert len(line.received()) == 1
-    assert line.unconfirmed() == 3
-
-
-def test_what_was_under_way_when_an_interface_went_is_not_waited_for(line: Line) -> None:
-    line.unconfirmed(most=2)
-    line.near[RECEIVED].fail = OSError(errno.ENODEV, "gone")
-    line.put(message(0x110))
-    line.received()
-    assert line.port.state is BusState.GONE
-    line.now_ns += REOPEN_NS
-    line.received()
     assert line.unconfirmed() == 3
 
 
@@ -240,14 +228,6 @@ def test_a_try_that_fails_for_another_reason_waits_for_the_next(matched: Line) -
     later(matched)
     assert matched.received() == []
     assert len(matched.opened_with) == 2
-
-
-def test_a_wrong_device_at_the_start_is_no_port() -> None:
-    def refuse(_ids: BusRoutes | None) -> list[socket.socket]:
-        raise WRONG
-
-    with pytest.raises(WrongDeviceError, match="expected serial number 1"):
-        port_on(refuse, None, lambda _fault: None, match=Match(serial="1"))
 
 
 def test_a_closed_port_does_nothing_more(line: Line) -> None:

@@ -228,12 +228,6 @@ def test_an_interface_that_comes_back_as_another_kind_says_why(line: Line) -> No
     assert line.faults == [FrameFault.BUS_GONE, FrameFault.BUS_ERROR]
 
 
-def test_a_classical_bus_that_takes_no_frame_has_failed(line: Line) -> None:
-    line.near[SENT_BACK].fail = OSError(errno.EINVAL, "Invalid argument")
-    assert not line.port.send(VALVE)
-    assert line.port.state is BusState.FAILED
-
-
 # -- many error frames -----------------------------------------------------------------------------
 
 

@@ -3,7 +3,7 @@
 import can
 import pytest
 
-from canshaper.bus.python_can import MOST_FAILURES, receive, waiting
+from canshaper.bus.python_can import receive, waiting
 
 FRAME = can.Message(arbitration_id=0x110, data=b"\1")
 
@@ -34,11 +34,6 @@ def test_an_error_stands_in_the_place_of_a_frame_and_the_next_one_is_read() -> N
     interface = Interface(FRAME, lost, FRAME, None, FRAME)
     assert [*waiting(interface, 100)] == [FRAME, lost, FRAME, None]
     assert interface.given == [FRAME]
-
-
-def test_a_bus_that_is_gone_is_not_asked_for_ever() -> None:
-    interface = Interface(*[OSError("gone")] * (MOST_FAILURES + 1))
-    assert len([*waiting(interface, 100)]) == MOST_FAILURES
 
 
 def test_no_more_is_read_than_is_asked_for() -> None:

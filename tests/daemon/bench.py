@@ -96,6 +96,8 @@ class Bench:
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_ns = 10**12
         self.ports: list[FakePort] = []
+        self.faults: list[Callable[[FrameFault], None]] = []  # of each port, how it reports one
+        self.routes: list[BusRoutes] = []  # and what it was opened for
         self.sent: list[Frame] = []
         self.script: Callable[[int], None] = lambda number: None
         self.opening: Callable[[str], None] = lambda channel: None
@@ -138,9 +140,11 @@ class Bench:
         return scripted
 
     def _open(
-        self, name: str, bus: Bus, _fault: Callable[[FrameFault], None], _ids: BusRoutes
+        self, name: str, bus: Bus, fault: Callable[[FrameFault], None], ids: BusRoutes
     ) -> Port:
         self.opening(bus.channel)
+        self.faults.append(fault)
+        self.routes.append(ids)
         self.ports.append(FakePort(name, bus.channel, self))
         return self.ports[-1]
 

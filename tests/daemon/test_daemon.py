@@ -74,13 +74,16 @@ def test_a_reload_in_motion_waits_and_the_log_says_so_once(
         bench.joysticks(Slew=1000 if 5 <= number < 20 else 0)
         if number == 10:
             bench.reload()
+        if number == 15:
+            assert lines() == ["INFO reload=waiting until every axis is neutral"]
         if number == 200:
             bench.stop()
 
+    def lines() -> list[str]:
+        return [line for line in log() if "reload=" in line]
+
     bench.run(script)
-    lines = [line for line in log() if "reload=" in line]
-    assert lines[0] == "INFO reload=waiting until every axis is neutral"
-    assert [line.split()[1] for line in lines[1:]] == ["reload=applied"]
+    assert [line.split()[1] for line in lines()] == ["reload=waiting", "reload=applied"]
 
 
 def test_a_motion_that_begins_while_the_file_is_read_ends_before_it_is_in_force(

@@ -13,6 +13,7 @@ from canshaper.daemon.ports import seen_sent
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import BUS, Bench, FakePort, at
+from tests.daemon.diary import Diary
 
 
 def test_the_state_of_a_bus_is_logged_when_it_changes(
@@ -45,44 +46,26 @@ def test_we_are_on_a_bus_or_not_whatever_its_state() -> None:
     assert {*OFF, *ON} == {*BusState}
 
 
-@pytest.mark.parametrize("state", OFF)
-def test_of_a_bus_that_we_are_not_on_the_controller_knows(
+@pytest.mark.parametrize("state", OFF + ON)
+def test_the_controller_knows_of_a_bus_that_we_are_not_on(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
 ) -> None:
     off: list[str] = []
     monkeypatch.setattr(module.Controller, "on_bus_off", lambda _, bus: off.append(bus))
     at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
-    assert set(off) == {"crane"}
-
-
-@pytest.mark.parametrize("state", ON)
-def test_a_bus_that_only_has_trouble_is_one_that_we_are_on(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
-) -> None:
-    off: list[str] = []
-    monkeypatch.setattr(module.Controller, "on_bus_off", lambda _, bus: off.append(bus))
-    at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
-    assert off == []
+    assert set(off) == ({"crane"} if state in OFF else set())
 
 
 def test_a_fault_of_a_bus_is_counted(bench: Bench, log: Callable[[], list[str]]) -> None:
-    faults: list[Callable[[FrameFault], None]] = []
-    opened = bench._open
-
-    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
-        faults.append(fault)
-        return opened(name, bus, fault, ids)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("canshaper.daemon.ports.open_port", opens)
-        at(bench, {5: lambda: faults[0](FrameFault.ERROR_FRAME)})
+    at(bench, {5: lambda: bench.faults[0](FrameFault.ERROR_FRAME)})
     assert any("fault=ERROR_FRAME" in line and "'ErrorFrames': 1" in line for line in log())
 
 
-def test_who_only_listens_says_so(bench: Bench, log: Callable[[], list[str]]) -> None:
+def test_who_only_listens_says_so(bench: Bench, diary: Diary, log: Callable[[], list[str]]) -> None:
     bench.script = lambda number: bench.stop() if number == 3 else None
     Daemon(lambda: replace(load_deployment(bench.file), listen_only=True)).run()
-    lines = log()
+    lines, (status,) = log(), diary.statuses()
+    assert status[1].startswith("listen-only, slew ")
     assert "WARNING listen-only=yes valves=none: nothing is sent but status" in lines
     assert lines[-1] == "INFO stopped valves=not-sent"
     assert not any(frame.can_id in range(0x200, 0x203) for frame in bench.sent)

@@ -11,15 +11,6 @@ from tests.daemon.pipes import Pipe, log
 pytestmark = [pytest.mark.processes, pytest.mark.usefixtures("never_wait")]
 
 
-def test_a_full_pipe_is_not_waited_for(pipe: Pipe) -> None:
-    handler = JournalHandler(pipe.writer, journal=True)
-    for number in range(5000):
-        log(handler, f"{number:4} " + "x" * 100)
-    lines = pipe.lines()
-    assert 0 < len(lines) < 5000
-    assert [line[3:8] for line in lines] == [f"{n:4} " for n in range(len(lines))]
-
-
 def test_some_lines_are_kept_the_others_are_counted_and_reported(pipe: Pipe) -> None:
     """Every line is either there, in order, or in the count."""
     handler = JournalHandler(pipe.writer, journal=True)

@@ -8,7 +8,7 @@ from canshaper.codec.frame import Frame
 from canshaper.daemon import daemon as module
 from canshaper.daemon import ports as service_ports
 from canshaper.errors import BusError
-from tests.daemon.bench import BUS, FOREIGN, SECOND, Bench
+from tests.daemon.bench import BUS, FOREIGN, SECOND, Bench, at
 from tests.rigs.forwarder import TICK_NS
 
 
@@ -72,15 +72,7 @@ def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
 
 def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -> None:
     """What was sent from the old port comes to the new one, some of it after it was opened."""
-
-    def script(tick: int) -> None:
-        bench.joysticks()
-        if tick == 9:
-            bench.reload("bitrate: 250000", "bitrate: 500000")
-        if tick == 100:
-            bench.stop()
-
-    bench.run(script)
+    at(bench, {9: lambda: bench.reload("bitrate: 250000", "bitrate: 500000")}, last=100)
     assert [(port.channel, port.closed) for port in bench.ports] == [("vcan0", True)] * 2
     assert bench.reported() == ("READY", "JOYSTICK_NEUTRAL")
 

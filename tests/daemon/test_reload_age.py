@@ -57,17 +57,17 @@ def test_a_reload_that_takes_long_is_a_standstill(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No bus is opened, yet what comes meanwhile has waited when the next tick reads it."""
-    follower = module.tick_follower
+    gated = module.GatedController
 
     def slow(*arguments: Any) -> Any:
         for _ in range(20 * (len(slept) > 0)):
             bench.joysticks()
             bench.sleep(0.02)
         slept.append(1)
-        return follower(*arguments)
+        return gated(*arguments)
 
     slept: list[int] = []
-    monkeypatch.setattr(module, "tick_follower", slow)
+    monkeypatch.setattr(module, "GatedController", slow)
     states: list[tuple[str, str]] = []
 
     def script(number: int) -> None:

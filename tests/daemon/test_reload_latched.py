@@ -11,7 +11,7 @@ from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason, State
-from tests.daemon.bench import FOREIGN, Bench
+from tests.daemon.bench import FOREIGN, Bench, at
 from tests.rigs.files import ROOT
 from tests.rigs.forwarder import Rig
 
@@ -97,15 +97,7 @@ def test_a_reload_after_a_fault_warns_of_no_fault(
     bench: Bench, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Its counters begin again without one; a fault that comes then is one to warn of."""
-
-    def script(number: int) -> None:
-        if number in (5, 200):
-            bench.put(Frame("crane", 0x110, False, b""))
-        if number == 100:
-            bench.reload()
-        if number == 300:
-            bench.stop()
-
-    bench.run(script)
+    short = lambda: bench.put(Frame("crane", 0x110, False, b""))  # noqa: E731
+    at(bench, {5: short, 100: bench.reload, 200: short}, last=300)
     warned = [text.split()[0] for text in caplog.messages if text.startswith("fault=")]
     assert warned == ["fault=WRONG_LENGTH", "fault=WRONG_LENGTH"]

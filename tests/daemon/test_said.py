@@ -2,15 +2,12 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import daemon as module
-from canshaper.daemon.daemon import Daemon
-from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench
 from tests.daemon.diary import SECOND_TICKS, VALVES, Diary
 from tests.rigs.forwarder import TICK_NS
@@ -81,13 +78,6 @@ def test_valve_frames_that_waited_are_in_the_log_once_a_second(
     assert log("waited=") == ["WARNING bus=crane waited=4: valve frames, in a queue"]
 
 
-def test_who_only_listens_says_so_first(bench: Bench, diary: Diary) -> None:
-    bench.script = lambda number: bench.stop() if number == 3 else None
-    Daemon(lambda: replace(load_deployment(bench.file), listen_only=True)).run()
-    (status,) = diary.statuses()
-    assert status[1].startswith("listen-only, slew ")
-
-
 def test_once_a_second_the_log_is_flushed(diary: Diary) -> None:
     """A reader that was slow may be back."""
 
@@ -113,24 +103,16 @@ def test_once_a_second_the_log_is_flushed(diary: Diary) -> None:
 
 
 def test_faults_in_turn_are_logged_once_a_second(
-    bench: Bench, diary: Diary, log: Callable[[str], list[str]], monkeypatch: pytest.MonkeyPatch
+    bench: Bench, diary: Diary, log: Callable[[str], list[str]]
 ) -> None:
     """A fault that is another one in every tick must not flood the log."""
-    faults: list[Callable[[FrameFault], None]] = []
-    opened = bench._open
-
-    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
-        faults.append(fault)
-        return opened(name, bus, fault, ids)
-
-    monkeypatch.setattr("canshaper.daemon.ports.open_port", opens)
     kinds = (FrameFault.ERROR_FRAME, FrameFault.SEND_FAILED, FrameFault.WRONG_LENGTH)
     ticks: list[int] = []
 
     def fault(number: int) -> Callable[[], None]:
         def acts() -> None:
             ticks.extend([number - 1] * (len(log("fault=")) - len(ticks)))
-            faults[0](kinds[number % 3])
+            bench.faults[0](kinds[number % 3])
 
         return acts
 

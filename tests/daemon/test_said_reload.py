@@ -14,7 +14,7 @@ from canshaper.daemon.ports import open_ports
 from canshaper.daemon.reloads import Reloads
 from canshaper.errors import BusError
 from canshaper.machine.binding import load_deployment
-from tests.daemon.bench import BUS, SECOND, Bench, FakePort
+from tests.daemon.bench import BUS, SECOND, Bench, FakePort, at
 from tests.daemon.diary import SECOND_TICKS, VALVES, Diary
 from tests.rigs.forwarder import TICK_NS
 
@@ -52,24 +52,6 @@ def test_a_reload_that_is_refused_changes_nothing_and_people_can_read_why(
     assert diary.starts == [n * TICK_NS for n in range(81)]
 
 
-def test_a_reload_in_motion_is_logged_as_waiting_while_it_waits(
-    bench: Bench, log: Callable[[str], list[str]]
-) -> None:
-    seen: list[list[str]] = []
-
-    def script(number: int) -> None:
-        bench.joysticks(Slew=1000 if 5 <= number < 20 else 0)
-        if number == 10:
-            bench.reload()
-        if number == 15:
-            seen.append(log("reload="))
-        if number == 200:
-            bench.stop()
-
-    bench.run(script)
-    assert seen == [["INFO reload=waiting until every axis is neutral"]]
-
-
 # -- buses of a reload -----------------------------------------------------------------------------
 
 
@@ -78,15 +60,7 @@ def test_a_port_that_stays_open_gets_what_it_is_for_now(
 ) -> None:
     watched: list[Any] = []
     monkeypatch.setattr(FakePort, "watch", lambda _, name, ids: watched.append((name, ids)))
-
-    def script(number: int) -> None:
-        bench.joysticks()
-        if number == 9:
-            bench.reload("timeout_ms: 100 #", "timeout_ms: 120 #")
-        if number == 40:
-            bench.stop()
-
-    bench.run(script)
+    at(bench, {9: lambda: bench.reload("timeout_ms: 100 #", "timeout_ms: 120 #")}, last=40)
     ((name, ids),) = watched
     routes = load_deployment(bench.file).routing.buses["crane"]
     assert (name, ids.sent, ids.claims) == ("crane", routes.sent, routes.claims)
@@ -102,48 +76,27 @@ def test_of_buses_that_do_not_all_open_none_stays_open_that_was_not(
         if channel == "vcan2":
             raise BusError("bus three: cannot open")
 
-    def script(number: int) -> None:
-        if number == 9:
-            bench.reload(BUS, three)
-        if number == 30:
-            closed.extend((port.channel, port.closed) for port in bench.ports)
-            bench.stop()
-
     bench.opening = opening
-    closed: list[tuple[str, bool]] = []
     if at_start:
         bench.file.write_text(bench.text.replace(BUS, three, 1), encoding="utf-8")
         with pytest.raises(BusError, match="bus three"):
             Daemon(lambda: load_deployment(bench.file))
         assert [port.closed for port in bench.ports] == [True, True]
     else:
-        bench.run(script)
+        closed: list[tuple[str, bool]] = []
+        see = lambda: closed.extend((port.channel, port.closed) for port in bench.ports)  # noqa: E731
+        at(bench, {9: lambda: bench.reload(BUS, three), 30: see}, last=30)
         assert closed == [("vcan0", False), ("vcan1", True)]
 
 
 def test_a_fault_of_a_bus_that_a_reload_opened_is_counted(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[str], list[str]]
+    bench: Bench, log: Callable[[str], list[str]]
 ) -> None:
-    faults: list[Callable[[FrameFault], None]] = []
-    opened = bench._open
-
-    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
-        assert ids.sent == load_deployment(bench.file).routing.buses[name].sent
-        faults.append(fault)
-        return opened(name, bus, fault, ids)
-
-    monkeypatch.setattr("canshaper.daemon.ports.open_port", opens)
-
-    def script(number: int) -> None:
-        if number == 9:
-            bench.reload(BUS, SECOND)
-        if number == 30:
-            faults[1](FrameFault.ERROR_FRAME)
-        if number == 40:
-            bench.stop()
-
-    bench.run(script)
+    fails = lambda: bench.faults[1](FrameFault.ERROR_FRAME)  # noqa: E731
+    at(bench, {9: lambda: bench.reload(BUS, SECOND), 30: fails}, last=40)
     assert log("fault=ERROR_FRAME")
+    routes = load_deployment(bench.file).routing.buses
+    assert [ids.sent for ids in bench.routes[1:]] == [routes["two"].sent]
 
 
 def test_who_takes_part_has_the_port_itself_and_who_listens_one_around_it(bench: Bench) -> None:

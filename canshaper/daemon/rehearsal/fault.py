@@ -187,9 +187,9 @@ class Demands:
 
 
 def tick_ns(deployment: Deployment, ticks: int = 2) -> int:
-    """Return the longest time in which so many ticks of every axis pass, ns.
+    """Return the time (ns) of so many ticks and one period of the slowest valve.
 
-    An axis computes its command only in the ticks of its valve, so the slowest valve counts.
+    An axis acts on an input only in the ticks of its valve.
     """
     slowest = max(axis.period_ticks for axis in deployment.axes.values())
     return (ticks + slowest) * deployment.config.tick_ms * MS

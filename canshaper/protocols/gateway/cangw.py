@@ -79,7 +79,7 @@ def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], 
 def load_module() -> None:
     """Load the module can-gw, if it is neither built into the kernel nor loaded."""
     if not Path("/sys/module/can_gw").exists():
-        subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # add() says why
+        subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # _change says why
 
 
 def rules() -> list[Rule]:
@@ -97,25 +97,12 @@ def rules() -> list[Rule]:
     return rules
 
 
-def add(rule: Rule) -> None:
-    """Add a rule.
-
-    Raises:
-        GatewayError: the kernel refuses.
-    """
-    _change(NEW, rule)
-
-
-def remove(rule: Rule) -> None:
-    """Remove a rule.
-
-    Raises:
-        GatewayError: the kernel refuses, or has no such rule.
-    """
-    _change(DELETE, rule)
-
-
 def _change(kind: int, rule: Rule) -> None:
+    """Add (NEW) or remove (DELETE) a rule.
+
+    Raises:
+        GatewayError: the kernel refuses, or has no such rule to remove.
+    """
     try:
         ends = [socket.if_nametoindex(n) for n in (rule.source, rule.destination)]
         for _ in request(kind, ACKNOWLEDGE, _message(rule, *ends)):
@@ -172,9 +159,9 @@ def make(interfaces: Iterable[str], expected: Iterable[Rule]) -> tuple[list[Rule
     """
     more, missing = difference(between(interfaces, rules()), expected)
     for rule in more:
-        remove(rule)
+        _change(DELETE, rule)
     for rule in missing:
-        add(rule)
+        _change(NEW, rule)
     return more, missing
 
 

@@ -3,7 +3,7 @@
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import J1939, J1939Name
 from canshaper.protocols.j1939.claim import ClaimState, Node
-from tests.rigs.j1939 import CLAIM, DM1, NACK, OTHER, OWN, WHO_HAS_IT, request
+from tests.rigs.j1939 import CLAIM, DM1, OWN, WHO_HAS_IT, request
 
 MS = 1_000_000
 WAIT_NS = 250 * MS
@@ -23,12 +23,6 @@ def claimed() -> Node:
     assert list(node.frames([], 0)) == [OURS]
     assert list(node.frames([], WAIT_NS)) == [NO_FAULT]
     return node
-
-
-def test_a_node_is_no_guest_unless_told() -> None:
-    node = Node("crane", CONFIG)
-    assert list(node.frames([], 0)) == [OURS]
-    assert list(node.frames([], WAIT_NS)) == [NO_FAULT]
 
 
 def test_a_guest_asks_and_claims_and_sends_no_faults() -> None:
@@ -57,15 +51,6 @@ def test_dm1_is_sent_at_once_on_request_and_is_not_refused() -> None:
         node.receive(request(DM1_GROUP, to=to), now_ns)
         assert list(node.frames([], now_ns)) == [NO_FAULT]
         assert list(node.frames([], now_ns + 20 * MS)) == []
-
-
-def test_a_cyclic_group_is_not_refused_and_an_unknown_one_is() -> None:
-    node = claimed()
-    node.receive(request(COMMAND_GROUP, to=OWN), 300 * MS)
-    assert list(node.frames([], 300 * MS)) == []
-    node.receive(request(UNKNOWN, to=OWN), 320 * MS)
-    refusal = bytes((1, 0xFF, 0xFF, 0xFF, OTHER, 0xE5, 0xFE, 0))
-    assert list(node.frames([], 320 * MS)) == [Frame("crane", NACK, True, refusal)]
 
 
 def test_only_the_claim_that_takes_our_address_is_a_fault() -> None:
