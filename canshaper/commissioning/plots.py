@@ -24,12 +24,12 @@ _DATA = "#8A8A8A"
 
 
 def in_file(limits: OutputLimits, commands_pct: Sequence[float]) -> list[float]:
-    """Speed in % of full that the file expects at commands in %."""
+    """Return the speeds in % of full that the file expects at commands in %."""
     return [100.0 * limits.velocity(c / 100.0) for c in commands_pct]
 
 
 def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: float) -> Figure:
-    """Speed over command.
+    """Draw speed over command of a valve: by the file, and as measured.
 
     Args:
         axis: its name.
@@ -90,7 +90,7 @@ def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: fl
 
 
 def of_runs(runs: Mapping[str, Run], tick_ms: float) -> Figure:
-    """Share of the ticks by their lateness, a bar for each run, and the limit of one tick.
+    """Draw the share of ticks by their lateness, a bar for each run, and the limit of a tick.
 
     Args:
         runs: by their names.
@@ -135,7 +135,7 @@ def _time(us: int) -> str:
 
 
 def of_sensors(findings: Sequence[SensorFinding]) -> Figure:
-    """Measured over model, a row a finding with a fit."""
+    """Draw measurements and model over time, a row for each finding with a fit."""
     rows = [finding for finding in findings if finding.fit]
     height = _TOP_PX + _ROW_PX * len(rows) + _FOOT_PX
     fig = style.print_figure(height)

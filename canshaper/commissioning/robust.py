@@ -56,7 +56,7 @@ class RobustDesign:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether it damps over its range, and otherwise a longer one that does."""
+        """Verdict on the shaper over its lengths; it names a longer one that is good."""
         task, shaper = self.task, self.shaper
         setup = task.mode, task.tick_s, task.in_file(shaper), task.machine_of(shaper)
         verdict = judge(*setup, task.range_pct)

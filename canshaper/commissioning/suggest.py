@@ -48,7 +48,7 @@ def velocities(message: Message) -> list[Signal]:
 
 
 def two_sided(signal: Signal) -> bool:
-    """Whether a signal may be a velocity that goes both ways."""
+    """Return whether a signal may be a velocity that goes both ways."""
     if not signal.scale:
         return False
     low, high = reach(signal)
@@ -252,7 +252,7 @@ def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Mess
 
 
 def is_status(message: Message) -> bool:
-    """Whether a message carries the status of an axis, or the aim point of a crane."""
+    """Return whether a message carries the status of an axis, or the aim point of a crane."""
     names = {signal.name for signal in message.signals}
     return names >= required_names(AXIS_STATUS) or names >= required_names(AIM)
 

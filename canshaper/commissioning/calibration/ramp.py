@@ -47,12 +47,12 @@ class Ramp:
 
     @property
     def up_s(self) -> float:
-        """Time of the way up, or down."""
+        """Time in which the command rises to the top, or falls from it."""
         return self.top / self.rate_per_s
 
     @property
     def duration_s(self) -> float:
-        """Time of all of it."""
+        """Time of the whole ramp, both directions and three rests."""
         return 2.0 * self.half_s + self.rest_s
 
     @property
@@ -188,7 +188,7 @@ class SpeedFeedback:
 
     @property
     def value(self) -> float:
-        """The last speed that counted, in the unit of the DBC."""
+        """The last valid speed, in the unit of the DBC."""
         return self._input.value
 
     def valid(self, now_ns: int) -> bool:

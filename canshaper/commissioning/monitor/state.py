@@ -58,7 +58,7 @@ class MessageRate:
             self.times.popleft()
 
     def per_s(self, now_ns: int) -> float:
-        """Frames a second."""
+        """Return the frames a second within the window."""
         self.invalidate(now_ns)
         return len(self.times) * 1e9 / WINDOW_NS
 

@@ -57,7 +57,7 @@ class AxisTraffic:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Least and most of its joystick."""
+        """Least and largest demand of its joystick."""
         return min(self.joystick.value, default=0.0), max(self.joystick.value, default=0.0)
 
 

@@ -62,23 +62,23 @@ class SensorFinding(AxisFinding):
 
     @property
     def unit(self) -> str:
-        """Unit for people."""
+        """Unit of swing and noise, for people."""
         return "degrees/s" if self.series.unit.kind is Kind.RATE else "degrees"
 
     @property
     def invert(self) -> bool:
-        """Whether it is negative where the tip speeds up in positive direction."""
+        """Whether the signal has the opposite sign of the model's swing."""
         return self.fit is not None and self.fit.gain < 0.0
 
     @property
     def delay_s(self) -> Value:
-        """Age of a measurement."""
+        """Age of a measurement when it is received, s."""
         assert self.fit
         return Value(self.fit.delay_s, math.hypot(SIGMAS * self.fit.deviations[0], MODEL_DELAY_S))
 
     @property
     def offset(self) -> Value:
-        """Degrees, or degrees per second, with the sign of its signal."""
+        """Offset in ``unit``, with the sign of the signal."""
         assert self.fit
         offsets = np.degrees(self.fit.offsets)
         spread = float(offsets.std(ddof=1)) if len(offsets) > 1 else 0.0
@@ -87,14 +87,14 @@ class SensorFinding(AxisFinding):
 
     @property
     def period_s(self) -> Value:
-        """Period of the damped swing."""
+        """Period of the damped swing, s."""
         assert self.fit
         period = 2.0 * math.pi / self.fit.omega
         return Value(period, SIGMAS * period * self.fit.deviations[1] / self.fit.omega)
 
     @property
     def size_m_s(self) -> Value:
-        """Full speed of the tip that makes as much swing as was measured."""
+        """Full speed of the tip that makes as much swing as was measured, m/s."""
         assert self.fit
         size = abs(self.fit.gain)
         return Value(size, SIGMAS * size * self.fit.deviations[3])
