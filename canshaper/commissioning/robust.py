@@ -9,11 +9,7 @@ from canshaper.commissioning.robust_task import RobustTask, between, following, 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.limits import Sway
 from canshaper.design.profiles import swinging_axis
-from canshaper.design.tuning.evaluate import (
-    LENGTHS_PCT,
-    Evaluation,
-    evaluate,
-)
+from canshaper.design.tuning.evaluate import LENGTHS_PCT, Evaluation, evaluate
 from canshaper.design.tuning.formulation import check_swing
 from canshaper.design.tuning.robust import LEAST_TAP, RobustShaper, least_residual, shortest
 from canshaper.design.tuning.verdict import GOOD, Verdict, judge

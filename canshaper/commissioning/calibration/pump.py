@@ -228,19 +228,10 @@ def drives_in(
     speeds: Mapping[str, str],
     channel: str | None,
 ) -> Drives:
-    """Return demands and speeds of two axes out of logs.
-
-    Args:
-        deployment: the machine.
-        logs: of drives of each axis alone, and of both at once.
-        axes: names of the two.
-        speeds: MESSAGE.SIGNAL of their speeds, of those whose speed the file does not name.
-        channel: bus of the logs that is read; None for all.
+    """Return demands and speeds of two axes out of logs; see ``read_can`` and ``speed_signal``.
 
     Raises:
         IdentificationError: commands or speeds of an axis are not in a log.
-        LogError: a log cannot be read.
-        UsageError: no signal of a speed is named, and none is known.
     """
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
     drives = []

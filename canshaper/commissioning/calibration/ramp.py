@@ -220,9 +220,8 @@ def _find(deployment: Deployment, message: str, signal: str, *, fd: bool) -> tup
     definition = find_signal(match[1], signal)
     if definition is None:
         names = ", ".join(s.name for s in match[1].signals)
-        raise _problem(
-            deployment, f"expected a signal of {message}, got {signal!r}; there are {names}"
-        )
+        text = f"expected a signal of {message}, got {signal!r}; there are {names}"
+        raise _problem(deployment, text)
     if match[1].is_multiplexed():
         raise _problem(deployment, f"{message} is multiplexed; nothing can be read from it")
     lengths = FD_LENGTHS if fd else range(CLASSICAL_BYTES + 1)

@@ -33,8 +33,8 @@ MOST_GAIN = 3.0
 MODEL_DELAY_S = 0.01
 # Measurements so close to each other differ by noise, s: the swing hardly moves meanwhile.
 NOISE_S = 0.1
-# A pendulum whose length differs by more than this part is reported.
-SAME_LENGTH = 0.15
+# A pendulum whose length differs by more is reported, %.
+SAME_LENGTH_PCT = 15.0
 # An offset above this part of offset_max_deg raises that to so many times the offset.
 NEAR_OFFSET, MORE_OFFSET = 0.8, 1.5
 SIGMAS = 2.0  # of 95 %
@@ -119,7 +119,13 @@ def examine(axis: BoundAxis, series: Series) -> SensorFinding:
     finding.fit = fit_sensor(finding.data, mode, config.valve_lag_ms / 1000.0)
     finding.noise = math.degrees(_noise(finding.data, finding.fit.fitted))
     finding.problems += _faults(axis, finding)
-    finding.notes += _notes(axis, finding)
+    longer_pct = 100.0 * ((finding.period_s.value / mode.period_s) ** 2 - 1.0)
+    if abs(longer_pct) > SAME_LENGTH_PCT:
+        finding.notes.append(
+            f"it swings like a pendulum {abs(longer_pct):.0f} %"
+            f" {'longer' if longer_pct > 0 else 'shorter'} than the file says; canshaper identify"
+            " finds what it is"
+        )
     return finding
 
 
@@ -205,20 +211,6 @@ def _faults(axis: BoundAxis, finding: SensorFinding) -> list[str]:
             f" {1000 * finding.delay_s.value:.0f} ms: take a quicker sensor, or cycle"
         )
     return faults
-
-
-def _notes(axis: BoundAxis, finding: SensorFinding) -> list[str]:
-    """Return further notes for the person."""
-    assert finding.fit and axis.config.sway
-    notes, period_s = [], axis.config.sway.mode().period_s
-    longer = (finding.period_s.value / period_s) ** 2 - 1.0
-    if abs(longer) > SAME_LENGTH:
-        notes.append(
-            f"it swings like a pendulum {abs(100 * longer):.0f} %"
-            f" {'longer' if longer > 0 else 'shorter'} than the file says; canshaper identify finds"
-            " what it is"
-        )
-    return notes
 
 
 def changes(axis: BoundAxis, finding: SensorFinding) -> dict[str, FileValue]:
