@@ -45,7 +45,7 @@ Mean = tuple[float, float]
 """A value and half the width of its interval of 95 %."""
 
 
-class Direction(NamedTuple):
+class PumpFlow(NamedTuple):
     """Both axes at once, each in one direction.
 
     Attributes:
@@ -66,7 +66,7 @@ Bins = list[tuple[float, float]]
 Seen = Mapping[tuple[int, ...], tuple[Bins, Bins]]
 
 
-def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[Direction]:
+def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[PumpFlow]:
     """Measure the flow of the pump for each pair of directions, sorted by flow, least first.
 
     Args:
@@ -91,7 +91,7 @@ def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -
 
 def _direction(
     axes: Sequence[str], ways: tuple[int, int], seen: Seen, shares: Mapping[str, float]
-) -> Direction:
+) -> PumpFlow:
     kept, asked, rises = [], [], True
     for i, (name, way) in enumerate(zip(axes, ways, strict=True)):
         alone = [seen[(s * way, 0) if i == 0 else (0, s * way)][i] for s in (AT_MOST, UP, DOWN)]
@@ -118,7 +118,7 @@ def _direction(
         text = f"flow at most {flow:.2f}, what one axis takes, which may lack oil alone too"
         cure = "drive each alone slowly up to its largest command and back, as calibrate does"
         raise CalibrationError(f"{text}; {cure}")
-    return Direction(ways, kept, sum(asked), (flow, half))
+    return PumpFlow(ways, kept, sum(asked), (flow, half))
 
 
 def _gain(bins: Bins, zero: float) -> Mean:
