@@ -14,15 +14,7 @@ from canshaper.config.load import load_config
 from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.section import Origin, Section, sections
 from canshaper.config.source import Place
-from canshaper.edit.edit import (
-    Change,
-    FileValue,
-    change,
-    note,
-    of_limits,
-    sections_of,
-    written_by,
-)
+from canshaper.edit.edit import Change, FileValue, change, note, of_limits, sections_of, written_by
 from canshaper.errors import CutOffError, UsageError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
