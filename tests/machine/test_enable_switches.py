@@ -146,13 +146,6 @@ def test_switches_that_cannot_be(switched: Machine, old: str, new: str, says: st
     assert any(says in problem for problem in switched.problems()), switched.problems()
 
 
-def test_a_message_without_a_cycle_is_no_switch(switched: Machine) -> None:
-    switched.in_dbc('BA_ "GenMsgCycleTime" BO_ 288 20;\n', "")
-    line = switched.in_dbc("BO_ 288", "BO_ 288")
-    says = f"machine.dbc:{line}: Seat: has no GenMsgCycleTime; cycle_ms may say it"
-    assert says in switched.problems()
-
-
 def test_the_way_to_stop_counts_the_slowest_switch(switched: Machine) -> None:
     shortest_m = 4.8 * (0.2 + 0.04 + 0.1)  # timeout, two periods, the fall
     switched.in_yaml("stop_distance_m: 200", f"stop_distance_m: {shortest_m + 0.01:.2f}")

@@ -79,7 +79,6 @@ def test_outside_of_j1939_every_bit_of_an_id_counts(machine: Machine) -> None:
         ),
         (
             CANOPEN,
-            [("    node: right\n", "    node: wright\n")],
             "joysticks.right.node: expected a node of bus crane, got 'wright'; there are left,"
             " right, slew, near_far, lift",
         ),
