@@ -10,7 +10,7 @@ from canshaper.config.filters import filter_of
 from canshaper.config.limits import Sway
 from canshaper.errors import DesignError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 from canshaper.shaping.sway import GRAVITY_M_S2
 
 ROBUST, GFF = "robust", "gff"

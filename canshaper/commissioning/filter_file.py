@@ -8,7 +8,7 @@ from canshaper.config.source import Place
 from canshaper.edit.edit import Change, FileValue, change, note, of_limits, written_by
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 
 
 def write_filters(

@@ -10,7 +10,7 @@ from canshaper.config.schema import AxisSection
 from canshaper.controller.controller import Controller
 from canshaper.controller.runner import AxisControl
 from canshaper.machine.filters import filter_fault
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 
 # In one request: each axis that changes costs the loop some 40 us.
 MOST_NUMBERS = 16

@@ -10,7 +10,7 @@ from canshaper.machine.filters import check_filters
 from canshaper.machine.identity import bind_status
 from canshaper.machine.inputs import bind_ends, bind_feedback, bind_rope, bind_status_word
 from canshaper.machine.lookup import Lookup
-from canshaper.machine.stopping import stated_fault
+from canshaper.machine.stop_distance import stated_fault
 from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 

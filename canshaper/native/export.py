@@ -8,7 +8,7 @@ from pathlib import Path
 from canshaper.errors import ConfigError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
-from canshaper.machine.stopping import rehearsed_valves, unstated
+from canshaper.machine.stop_distance import rehearsed_valves, unstated
 from canshaper.native.golden import EVERY, TICKS, Golden, golden_drive, golden_source, in_float
 from canshaper.native.library import C_FILES
 from canshaper.native.source import sizes_source, tables_source

@@ -13,7 +13,7 @@ from canshaper.config.limits import Sway
 from canshaper.edit.edit import Change, FileValue, change, note
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 from canshaper.report.console import axis_title
 
 # Difference of pendulum lengths, +- %, up to which one value in the middle is what we recommend
