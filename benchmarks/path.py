@@ -26,7 +26,7 @@ from canshaper.bus.packet import CAN_FRAME
 from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
@@ -67,7 +67,7 @@ class Traced(RawPort):
         return sent
 
 
-def count(*, guarded: bool = False) -> Counted:
+def count(*, gated: bool = False) -> Counted:
     """Drive the axis; count the last tick, without the gate or with it."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
     with tempfile.TemporaryDirectory() as name:
@@ -82,7 +82,7 @@ def count(*, guarded: bool = False) -> Counted:
         open_sockets=lambda _bus, _ids: [near],
         has_echo=bool,
     )
-    processor = Guarded(controller) if guarded else controller
+    processor = GatedController(controller) if gated else controller
     standstill = Standstill(deployment)
     standstill.clock = lambda: 0
     for tick in range(TICKS):
@@ -118,7 +118,7 @@ def main() -> None:
     rows.append(Row("all", [str(sum(counted.calls.values())), str(whole), "100"]))
     print(f"one tick, {platform.python_implementation()} {platform.python_version()}")
     print_table(["calls", "bytecodes", "%"], rows)
-    with_gate = count(guarded=True)
+    with_gate = count(gated=True)
     print(f"without the gate: {_size(counted)}")
     print(f"with it:          {_size(with_gate)}")
 

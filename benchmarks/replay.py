@@ -26,7 +26,7 @@ from canshaper.cli.common import loader
 from canshaper.cli.verbs.replay import _without_collector
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.recording.log import LogFile
 from canshaper.recording.replay import Replay, look
 from canshaper_sim.joysticks import JoystickNode
@@ -45,9 +45,9 @@ def write_drive(path: Path, box: Path, seconds: float, config: str) -> int:
     load = loader(config)
     deployment = load()
     controller, ring = Controller(deployment), Ring(most_blocks=10_000)
-    guarded = Guarded(controller)
-    state = States(guarded, controller).save()
-    recorder = Recorder(guarded, controller, ring)
+    gated = GatedController(controller)
+    state = States(gated, controller).save()
+    recorder = Recorder(gated, controller, ring)
     ring.begin(state, 0, follows=False)
     plant = PlantNode(load())
     lines = 0

@@ -31,7 +31,7 @@ from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shipped import data_directory
@@ -103,7 +103,7 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
 
 def daemon(controller: Controller, port: Port, *, gated: bool) -> Callable[[int], None]:
     """Work of the daemon in a tick."""
-    driven = Guarded(controller) if gated else controller
+    driven = GatedController(controller) if gated else controller
 
     def body(now_ns: int) -> None:
         for frame in port.frames():
@@ -118,7 +118,7 @@ def daemon(controller: Controller, port: Port, *, gated: bool) -> Callable[[int]
 def black_box(one: Deployment, other: Deployment, ticks: int) -> tuple[float, float]:
     """Median tick with the black box and without, us; print what it costs behind the tick."""
     controllers = Controller(one), Controller(other)
-    guarded, inner = (Guarded(controller) for controller in controllers)
+    guarded, inner = (GatedController(controller) for controller in controllers)
     ring, states = Ring(), States(inner, controllers[1])
     ring.begin(states.save(), 0, follows=False)
     recorder = Recorder(inner, controllers[1], ring)
@@ -185,7 +185,7 @@ def ticks_of_both(
     joysticks = JoystickNode(deployment, Script("both", tuple(strokes), ticks * 0.02 + 8.0))
     plant = PlantNode(deployment)
     spent: tuple[list[float], list[float]] = [], []
-    both = tuple(zip(map(Guarded, controllers), spent, strict=True))
+    both = tuple(zip(map(GatedController, controllers), spent, strict=True))
     measured: list[Frame] = []
     gc.collect()
     for i in range(ticks):

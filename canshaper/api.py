@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller as _Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import Event
@@ -74,7 +74,7 @@ class Controller:
     def __init__(self, machine: Deployment) -> None:
         self.machine = machine
         self._inner = _Controller(machine)
-        self._guarded = Guarded(self._inner)
+        self._gated = GatedController(self._inner)
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Pass a received frame to the controller.
@@ -86,7 +86,7 @@ class Controller:
         Returns:
             On a gateway the frame to send at once to the other bus; else None.
         """
-        return self._guarded.receive(frame, arrived_ns)
+        return self._gated.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
         """Compute the frames of one tick.
@@ -98,20 +98,23 @@ class Controller:
         Returns:
             The frames to send now, in this order.
         """
-        return list(self._guarded.tick(now_ns, missed))
+        return list(self._gated.tick(now_ns, missed))
 
     def send_failed(self, frame: Frame) -> None:
         """Report that a frame of ``tick`` was not sent."""
-        self._guarded.send_failed(frame)
+        self._gated.send_failed(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve: the last frames before the program ends."""
-        return self._guarded.neutral_frames()
+        return self._gated.neutral_frames()
 
     def axes(self) -> dict[str, AxisState]:
         """Return the state of each axis by name."""
-        runners = self._inner.axes.items()
-        return {name: AxisState(one.axis.state, one.reason, one.axis.sent) for name, one in runners}
+        controls = self._inner.axes.items()
+        return {
+            name: AxisState(one.axis.state, one.reason, one.axis.output.setpoint)
+            for name, one in controls
+        }
 
     def events(self) -> list[Event]:
         """Return the events since the last call: changes of axis states, valves and other nodes.

@@ -18,7 +18,15 @@ from scipy.linalg import expm
 
 from canshaper.campaign import fleet
 from canshaper.campaign.draw import Setting
-from canshaper.campaign.fleet_filters import ROBUST, Candidate, FleetFilter, designed, fitted
+from canshaper.campaign.fleet_candidates import (
+    JUDGING,
+    ROBUST,
+    Candidate,
+    Driven,
+    FleetFilter,
+    designed,
+    fitted,
+)
 from canshaper.campaign.native import NativeCrane
 from canshaper.campaign.run import Source
 from canshaper.campaign.statistics import quantile
@@ -96,7 +104,7 @@ def least(tapped: Floats, begun: Floats) -> tuple[float, list[Floats]]:
 
 def show(name: str, left: list[float]) -> None:
     """Print what drives leave."""
-    worst = fleet.Driven(None, (), left).worst_deg
+    worst = Driven(None, (), left).worst_deg
     print(f"{name:32} worst twentieth {worst:5.2f}  p99 {quantile(left, 0.99).value:5.2f} deg")
 
 
@@ -115,7 +123,7 @@ def main() -> None:
     """Print what box, design and the best taps leave."""
     deployment = load_deployment(FILE)
     source = Source.of(deployment, deployment.config.uncertainty)
-    drives = fleet._drives(source.path, source.files, fleet.JUDGING)
+    drives = fleet._drives(source.path, source.files, JUDGING)
     pairs = [[plane(one, axis) for axis in AXES] for one in drives]
     tapped = np.array([[of[0] for of in pair] for pair in pairs])
     begun = np.array([[of[1] for of in pair] for pair in pairs])

@@ -1,8 +1,9 @@
-"""Faults of frames and buses in words: for docs/states.md."""
+"""Faults of frames and buses, and trust in a sensor, in words: for states.md and sensor.md."""
 
 from collections.abc import Mapping
 
 from canshaper.codec.frame import FrameFault
+from canshaper.shaping.states import Trust
 
 FAULT_TEXTS: Mapping[FrameFault, str] = {
     FrameFault.NONE: "none so far",
@@ -49,3 +50,18 @@ FAULT_TEXTS: Mapping[FrameFault, str] = {
     ),
 }
 """What each fault of the status message means."""
+
+_PROVED = "received, proved"
+TRUST_TEXTS: Mapping[Trust, tuple[str, str]] = {
+    Trust.NO_DATA: ("no message yet", _PROVED),
+    Trust.UNPROVED: ("no motion has proved it yet", "proved"),
+    Trust.TRUSTED: ("motion has proved it", ""),
+    Trust.LOST: ("no message within `timeout_ms`", _PROVED),
+    Trust.STUCK: ("the same value while the grapple swings", "proved"),
+    Trust.JUMP: ("further than a grapple can jump", "at rest, proved"),
+    Trust.WRONG_SIGN: ("it contradicts motion", "proved"),
+    Trust.OFFSET: ("its offset is above `offset_max_deg`", "within it again"),
+    Trust.CONTACT: ("it shows nothing of motion: the grapple leans on something", "proved"),
+    Trust.RESTLESS: ("the command goes to and fro far more than the joystick", "at rest, proved"),
+}
+"""Why a sway sensor is in each state of trust, and what ends it."""

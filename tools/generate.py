@@ -28,7 +28,7 @@ from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools.architecture import ring_rows
-from tools.frame_faults import FAULT_TEXTS
+from tools.frame_faults import FAULT_TEXTS, TRUST_TEXTS
 from tools.marks import marked, with_sections
 from tools.reactions import reaction_rows
 
@@ -102,6 +102,25 @@ def fault_rows() -> Iterator[str]:
         yield f"| {int(fault)} | {fault.name} | {Counters.SIGNAL_OF.get(fault, '')} | {text} |"
 
 
+def trust_rows() -> Iterator[str]:
+    """Table of the states of trust in a sway sensor."""
+    yield "| no. | state | why | back |"
+    yield "|---|---|---|---|"
+    for trust, (why, back) in TRUST_TEXTS.items():
+        yield f"| {int(trust)} | {trust.name} | {why} | {back} |"
+
+
+def shipped_rows() -> Iterator[str]:
+    """Table of the shipped deployments, each with the first sentence of its file."""
+    yield "| deployment | what |"
+    yield "|---|---|"
+    for path in sorted((ROOT / "config").glob("*.yaml")):
+        comment = re.match(r"(?:# ?.*\n)+", path.read_text(encoding="utf-8"))
+        text = " ".join(line.strip("# ") for line in comment[0].splitlines()) if comment else ""
+        first = re.split(r"[.] (?=[A-Z])", text)[0].rstrip(".")
+        yield f"| [{path.stem}](../config/{path.name}) | {first} |"
+
+
 def _names(reasons: frozenset[Reason]) -> str:
     """Reasons by name; most of a kind as that kind, with those that are missing."""
     words = []
@@ -161,6 +180,8 @@ def _default(value: Any) -> str:
     """Default of an optional key, in words of YAML."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list) and value:
+        return f"[{value[0]:g}, {value[1]:g}]"
     return f"{value}".removesuffix(".0") if isinstance(value, int | float | str) else "optional"
 
 
@@ -230,6 +251,8 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "figures": lambda: column_rows(FIGURES),
     "steps": step_rows,
     "rings": ring_rows,
+    "trust": trust_rows,
+    "shipped": shipped_rows,
 }
 
 

@@ -161,7 +161,7 @@ ROWS = (
         TRIP,
     ),
     Row("OUTPUT_REFUSED", "the gate refuses", "promises/test_5::neutral_leaves", "at once"),
-    Row("DECODERS_DISAGREE", "gate and codec", "gate/test_guarded::disagree", "at once", TRIP),
+    Row("DECODERS_DISAGREE", "gate and codec", "gate/test_gated::disagree", "at once", TRIP),
     Row(
         "OUTPUT_INVALID",
         "filter error, no number, a setpoint that no frame carries",

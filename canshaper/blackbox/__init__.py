@@ -1,1 +1,1 @@
-"""The black box: what the daemon received, did and sent in the last minute, exactly."""
+"""The black box: exactly what the daemon received, computed and sent in the last minute."""

@@ -1,4 +1,4 @@
-"""The file of a black box: one line that says what it is, one of JSON, then the segments."""
+"""The file of a black box: a line that names the format, a header in JSON, then the segments."""
 
 import json
 import struct
@@ -13,7 +13,8 @@ from canshaper.errors import BoxError
 
 SUFFIX = ".blackbox"
 MAGIC = b"canshaper black box 1\n"
-# begin in ns, follows on the one before, bytes of the state, bytes of the records, CRC-32 of both
+# begin in ns, whether it follows the previous segment without a gap, bytes of the state, bytes of
+# the records, CRC-32 of both
 HEAD = struct.Struct("<q?III")
 MOST_HEADER = 100_000
 MOST_STATE = 10_000_000
@@ -25,10 +26,10 @@ class BoxSegment(NamedTuple):
     """A part of a black box without gaps.
 
     Attributes:
-        begin_ns: by the clock of the daemon, which counts from the start of its PC.
-        follows: whether nothing is missing between the one before and this one.
-        state: of the controller at its begin.
-        records: what happened then, see ``canshaper.blackbox.ring``.
+        begin_ns: its begin by ``boottime_ns`` of the daemon's PC.
+        follows: whether no record is missing between the previous segment and this one.
+        state: saved state of the controller at the begin.
+        records: packed records from then on, see ``canshaper.blackbox.ring``.
     """
 
     begin_ns: int
@@ -42,10 +43,10 @@ class Box:
     """Content of a black box.
 
     Attributes:
-        path: the file.
-        header: what is said of it, see ``canshaper.blackbox.keeper.header_of``.
-        segments: the oldest first; at least one.
-        cut_off: where and why the file ends in the middle; empty where it does not.
+        path: path of the file.
+        header: see ``canshaper.blackbox.write.header_of``.
+        segments: at least one, the oldest first.
+        cut_off: where and why the file ends too early; empty for a whole file.
     """
 
     path: Path
@@ -55,7 +56,7 @@ class Box:
 
 
 def chunks(header: dict[str, Any], segments: Iterable[Segment]) -> Iterator[bytes]:
-    """A black box as bytes, piece by piece."""
+    """Yield the bytes of the file of a black box, piece by piece."""
     yield MAGIC + json.dumps(header).encode() + b"\n"
     for one in segments:
         data = one.data()
@@ -69,8 +70,8 @@ def read_box(path: Path) -> Box:
     """Read a black box.
 
     Raises:
-        BoxError: it is none, or has not even one segment that is whole.
-        OSError: it cannot be read.
+        BoxError: the file is no black box, or has no whole segment.
+        OSError: the file cannot be read.
     """
     with path.open("rb") as file:
         if file.readline(len(MAGIC)) != MAGIC:
@@ -96,12 +97,12 @@ def read_box(path: Path) -> Box:
 
 
 def _checked(header: dict[str, Any]) -> dict[str, Any]:
-    """The header with what a reader needs, each of its kind.
+    """Return the entries of a header that a reader needs, converted to their types.
 
     Raises:
-        ValueError, KeyError, TypeError: it is not.
+        ValueError, KeyError, TypeError: an entry is missing or of another type.
     """
-    header.setdefault("carried", [])  # of an older program
+    header.setdefault("carried", [])  # older programs wrote none
     names = {key: [str(one) for one in header[key]] for key in ("buses", "identity", "carried")}
     numbers = {key: int(header[key]) for key in ("time_ns", "clock_ns")}
     listens = bool(header["listen_only"])
@@ -109,10 +110,10 @@ def _checked(header: dict[str, Any]) -> dict[str, Any]:
 
 
 def _segment(read: Any, head: bytes) -> BoxSegment:
-    """Read the rest of the segment that begins with this head.
+    """Read the rest of a segment after its head.
 
     Raises:
-        ValueError: it is cut off, or its lengths or its checksum are wrong.
+        ValueError: the segment is cut off, or its lengths or its checksum are wrong.
     """
     if len(head) < HEAD.size:
         raise ValueError("the file is cut off")

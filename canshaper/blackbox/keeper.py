@@ -1,8 +1,8 @@
-"""Keeps the black box of a daemon, and writes it to a file after a trip or when it is asked for.
+"""Keeps the black box of a daemon, and writes it to a file after a trip or on request.
 
-The file is written by a process of its own: that costs the loop about a millisecond, and the disk
-costs it nothing. It is written at once, then again with what came after the trip; until then the
-first one stays, whatever becomes of the daemon.
+A forked process writes the file: the fork costs the loop about a millisecond, and a slow disk costs
+it no time. The file is written at once, and a second time with the records that follow the trip.
+The first file stays until the second one is complete, even if the daemon is killed.
 """
 
 import errno
@@ -19,7 +19,7 @@ from canshaper.blackbox.ring import Ring, Segment
 from canshaper.blackbox.state import States
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import StateError
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
@@ -27,16 +27,17 @@ from canshaper.shaping.states import State
 log = logging.getLogger("canshaper")
 
 # Time between two saved states of the controller; a replay can begin at each. To save one takes a
-# millisecond after the tick: with a tick shorter than this it is done only while nothing moves.
+# millisecond after the tick. With a tick shorter than SHORT_TICK_MS it is saved only while no axis
+# moves.
 STATE_NS = 10_000_000_000
 SHORT_TICK_MS = 5
-# How long after a trip the recording goes on.
+# Time after a trip until the second file is written.
 AFTER_NS = 5_000_000_000
-# A machine that trips again and again has one file for so long, with all of them in it, and begins
-# to write it no more often than that.
+# Trips within BETWEEN_NS go into one file. LEAST_NS is the least time between two begins of writing
+# it.
 BETWEEN_NS = 30_000_000_000
 LEAST_NS = 250_000_000
-# How often a file that could not be written is tried again.
+# Time until a file that could not be written is tried again.
 RETRY_NS = 5_000_000_000
 NEVER_NS = 1 << 63
 STOPPED = frozenset((State.TRIPPED, State.STOPPING))
@@ -44,7 +45,15 @@ NO_FOLDER = "no folder for black boxes: see canshaper run --black-box"
 
 
 class Kept(NamedTuple):
-    """Content of one file."""
+    """Content of a file that is being written, or could not be written.
+
+    Attributes:
+        deployment: deployment that was running.
+        number: number of the file.
+        why: reason for the file.
+        segments: recorded segments, held until the file is written.
+        at_ns: time when they were put aside.
+    """
 
     deployment: Deployment
     number: int
@@ -57,10 +66,10 @@ class BlackBox:
     """The black box of a daemon.
 
     Args:
-        folder: where files are written, made where it is not there; None for nowhere.
+        folder: folder for the files, created if it is missing; None writes no files.
 
     Attributes:
-        fault: why the last file could not be written, until it is.
+        fault: why the last file could not be written; empty once a file is written.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -73,15 +82,15 @@ class BlackBox:
         self._next_ns = 0  # when the next state is due
         self._now_ns = 0
         self._number = 0  # of the newest file
-        self._begun_ns = 0  # what is in it as the first
-        self._why = ""  # what happened, and is to be written
-        self._due_ns = NEVER_NS  # when the file is written next
-        self._last_ns = 0  # and for the last time
-        self._least_ns = 0  # not before that
-        self._kept: Kept | None = None  # what is written now, or could not be
-        self._writer = 0  # process
+        self._begun_ns = 0  # time of the first trip or request in it
+        self._why = ""  # reason for the file
+        self._due_ns = NEVER_NS  # when to write the file next
+        self._last_ns = 0  # when to write it for the last time
+        self._least_ns = 0  # earliest time to begin
+        self._kept: Kept | None = None  # content that is being written, or could not be
+        self._writer = 0  # process id of the writer; 0 without one
         self._done, self.fault = 0, ""
-        self._logged = 0  # number
+        self._logged = 0  # number of the file that was logged last
         if folder:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
@@ -91,40 +100,46 @@ class BlackBox:
                 self._log_fault(error.errno or 1)
 
     def around(
-        self, guarded: Guarded, controller: Controller, kind: type[Recorder] = Recorder
+        self, gated: GatedController, controller: Controller, kind: type[Recorder] = Recorder
     ) -> Recorder:
-        """Return a recorder of all calls to a controller and their results; ``begin`` starts it."""
+        """Make a recorder for a controller; ``begin`` starts it.
+
+        Args:
+            gated: the controller behind its gate.
+            controller: the controller itself.
+            kind: class of the recorder.
+        """
         deployment = controller.deployment
         self._flush()
         self._ring.pause()
         if self._deployment and self._deployment.identity != deployment.identity:
             self._finish()
-            self._ring.clear()  # its frames would be read with the wrong files
+            self._ring.clear()  # a reader would decode its frames with the wrong files
         self._deployment, self._states = deployment, None
         self._short = deployment.config.tick_ms < SHORT_TICK_MS
         try:
-            self._states = States(guarded, controller)
-        except StateError as error:  # of a filter of another package
+            self._states = States(gated, controller)
+        except StateError as error:  # a filter of another package cannot be saved
             log.warning("black-box=none %s", error)
         if self._folder:
             from canshaper.blackbox.write import last_number
 
             self._number = max(self._number, last_number(self._folder, deployment.path.stem))
-        self._recorder = kind(guarded, controller, self._ring)
+        self._recorder = kind(gated, controller, self._ring)
         return self._recorder
 
     def begin(self, now_ns: int) -> None:
-        """Record everything from here on."""
-        self._flush()  # what was before is not
+        """Begin to record."""
+        self._flush()  # empties the notes of earlier calls
         self._keep_state(now_ns, follows=False)
 
     def after_tick(self, now_ns: int, events: Iterable[object], *, neutral: bool) -> None:
-        """Do what can wait until the frames are out.
+        """Do the work of a tick that can wait until its frames are sent.
 
         Args:
             now_ns: time of the tick.
-            events: what changed in it.
-            neutral: whether every axis is.
+            events: events of the tick.
+            neutral: whether every axis is neutral.
         """
         self._flush()
         self._now_ns = now_ns
@@ -139,7 +154,7 @@ class BlackBox:
             self._start_writer(now_ns)
 
     def _happened(self, why: str, last_ns: int) -> None:
-        """Have a file written now, and again at a later time."""
+        """Schedule a file now, and the same file again at ``last_ns``."""
         if not self._folder or not self._ring.segments:
             return
         now_ns = self._now_ns
@@ -147,36 +162,36 @@ class BlackBox:
             self._number += 1
             self._why, self._begun_ns = why, now_ns
         self._last_ns = last_ns
-        if not (self.fault and self._kept):  # which comes first
+        if not (self.fault and self._kept):  # a file that failed is retried first
             self._due_ns = min(self._due_ns, max(now_ns, self._least_ns))
 
     def request(self) -> None:
-        """Have a file written.
+        """Schedule a file on request of a client.
 
         Raises:
-            ValueError: there is nowhere to write one.
+            ValueError: the daemon has no folder for files.
         """
         if self._folder is None:
             raise ValueError(NO_FOLDER)
         self._happened("requested", self._last_ns)
 
     def report(self) -> dict[str, object]:
-        """How many files were tried to be written, and what was wrong with the last one."""
+        """Return the number of attempts, the last fault, the folder, and whether a file is due."""
         waits = bool(self._writer or self._due_ns != NEVER_NS)
         return {"tried": self._done, "fault": self.fault, "folder": str(self._folder or ""),
                 "waits": waits}  # fmt: skip
 
     def failed(self, why: str) -> None:
-        """Note a failure of the program: what is recorded so far is written at the end."""
+        """Schedule a file after a failure of the program; ``close`` writes it."""
         self._happened(why, 0)
 
     def close(self) -> None:
-        """End with the daemon: write now what is to be written; every valve is neutral."""
+        """Write a file that is due, and end; every valve is neutral by now."""
         self._flush()
         self._finish()
 
     def _finish(self) -> None:
-        """Write to the end what is to be written, of a machine in neutral."""
+        """Wait for the writer, and write a file that is due; the loop is not running."""
         if self._writer:
             self._ended(os.waitpid(self._writer, 0)[1], NEVER_NS)
         if self._due_ns != NEVER_NS:
@@ -203,11 +218,11 @@ class BlackBox:
         self._ring.begin(state, now_ns, follows=follows)
 
     def _keep(self) -> None:
-        """Put aside what there is, where nothing else waits to be written."""
+        """Put the recorded segments aside for the writer, unless older ones still wait."""
         segments = self._ring.segments
         if self._kept is None:
             assert self._deployment is not None
-            if segments[0].begin_ns > self._begun_ns:  # the file has more than there is now
+            if segments[0].begin_ns > self._begun_ns:  # the ring has lost what the file contains
                 self._number += 1
                 self._begun_ns = self._now_ns
             self._kept = Kept(self._deployment, self._number, self._why, segments, self._now_ns)
@@ -217,7 +232,7 @@ class BlackBox:
     # -- the writer ----------------------------------------------------------------------------
 
     def _write(self) -> int:
-        """Write what was put aside; an error number, 0 for none."""
+        """Write what was put aside; return an error number, or 0."""
         assert self._folder is not None
         assert self._kept is not None
         from canshaper.blackbox.write import write_box
@@ -245,8 +260,8 @@ class BlackBox:
         status = 1
         try:
             for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-                signal.signal(number, signal.SIG_IGN)  # they are the daemon's
-            with suppress(OSError):  # with the loop's priority it could keep it from the processor
+                signal.signal(number, signal.SIG_IGN)  # the daemon handles them
+            with suppress(OSError):  # at the priority of the loop, it could hold up the loop
                 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
             status = self._write()
         finally:
@@ -267,7 +282,7 @@ class BlackBox:
             return
         for segment in self._kept.segments:
             segment.held = False
-        if self.fault:  # what came meanwhile is next, and what came after it while it is there
+        if self.fault:  # write again at once, if there were trips meanwhile or the ring has more
             newer = self._last_ns - AFTER_NS > self._kept.at_ns
             there = any(one.begin_ns <= self._begun_ns for one in self._ring.segments)
             self._due_ns = min(self._due_ns, now_ns) if newer or there else NEVER_NS
@@ -277,7 +292,7 @@ class BlackBox:
         self._kept, self.fault = None, ""
 
     def _log_fault(self, number: int) -> None:
-        """Log why a file cannot be written, once."""
+        """Log why a file cannot be written, unless the last fault was the same."""
         fault = os.strerror(number) if number > 0 else "killed"
         if fault != self.fault:
             log.error("black-box=not-written folder=%s %s", self._folder, fault)

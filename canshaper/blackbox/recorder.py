@@ -1,4 +1,4 @@
-"""Recorder around the controller: writes down every call and every result."""
+"""Recorder around the controller: it records every call and every result."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -7,9 +7,9 @@ from typing import Any
 from canshaper.blackbox.ring import CHUNK, Kind, Ring
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 
-# Members of an enumeration cost a look-up each.
+# Plain numbers: each use of a member of an enumeration costs a look-up.
 TICK, RX, TX = int(Kind.TICK), int(Kind.RX), int(Kind.TX)
 
 # kind, frame, number, time in ns; see canshaper.blackbox.ring
@@ -17,69 +17,70 @@ Call = tuple[int, Frame | None, int, int]
 
 
 class Recorder:
-    """A controller behind its gate, every call of which is recorded.
+    """A controller behind its gate whose calls are all recorded.
 
-    While the valves wait a call is only noted; ``flush`` packs the notes, behind the tick.
+    During a tick a call is only noted, because the valves wait for their frames. ``flush`` packs
+    the notes into the ring after the tick.
 
     Args:
-        guarded: who does the work.
-        controller: the controller in it.
-        ring: where to record.
+        gated: controller behind its gate, which executes the calls.
+        controller: the controller itself.
+        ring: ring for the records.
     """
 
-    def __init__(self, guarded: Guarded, controller: Controller, ring: Ring) -> None:
-        self._guarded, self._controller = guarded, controller
+    def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
+        self._gated, self._controller = gated, controller
         self._put = ring.put
         self._calls: list[Call] = []
         self._note = self._calls.append
         self._bus = {name: i for i, name in enumerate(controller.deployment.config.buses)}
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Take a frame from a bus, see ``Guarded``."""
+        """Receive a frame; return the frame for the other bus of a gateway, or None."""
         self._note((RX, frame, 0, now_ns))
-        passed = self._guarded.receive(frame, now_ns)
+        passed = self._gated.receive(frame, now_ns)
         if passed is not None:
             self._note((TX, passed, 0, 0))
         return passed
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last may move a valve."""
+        """Whether the frame that was yielded or returned last may move a valve."""
         return self._controller.moves
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run one tick, and yield the frames to send now."""
         note = self._note
         note((TICK, None, missed, now_ns))
-        for frame in self._guarded.tick(now_ns, missed):
+        for frame in self._gated.tick(now_ns, missed):
             yield frame
             note((TX, frame, 0, 0))
 
     def stalled(self) -> None:
-        """Take note that the loop stood still for too long."""
+        """Take note that the loop stood still: frames up to the next tick have waited."""
         self._note((Kind.STALLED, None, 0, 0))
-        self._guarded.stalled()
+        self._gated.stalled()
 
     def send_failed(self, frame: Frame) -> None:
         """Take note that a frame did not reach its bus."""
         self._note((Kind.FAILED, frame, 0, 0))
-        self._guarded.send_failed(frame)
+        self._gated.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
+        """Return whether a late valve frame moves a valve, and so must not leave."""
         self._note((Kind.WITHHELD, frame, 0, 0))
-        return self._guarded.withhold(frame)
+        return self._gated.withhold(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve."""
         self._note((Kind.NEUTRAL, None, 0, 0))
-        frames = self._guarded.neutral_frames()
+        frames = self._gated.neutral_frames()
         for frame in frames:
             self._note((TX, frame, 0, 0))
         return frames
 
     def on_bus_off(self, bus: str) -> None:
-        """Take note that we are not on a bus now."""
+        """Take note that our CAN controller is off a bus."""
         self._note((Kind.OFF_BUS, None, self._bus[bus], 0))
         self._controller.on_bus_off(bus)
 
@@ -89,8 +90,8 @@ class Recorder:
         self._controller.counters.add(fault)
 
     def set(self, values: Mapping[str, object]) -> None:
-        """Take note that numbers have been changed by hand."""
-        self._guarded.set(values)
+        """Take note that an operator changed numbers of the file; key to value."""
+        self._gated.set(values)
         self.flush()
         text = json.dumps(values).encode()
         for at in range(0, len(text), CHUNK):
@@ -98,18 +99,18 @@ class Recorder:
             self._put(Kind.SET, 0, len(part), False, len(text) - at, 0, part)
 
     def rehearse(self, what: object, who: str) -> Mapping[str, Any]:
-        """Make a fault of an input, see ``Rehearsal``.
+        """Refuse to rehearse a fault; ``Rehearsal`` can.
 
         Raises:
-            ValueError: this file does not allow it.
+            ValueError: always; the deployment file does not allow it.
         """
         raise ValueError("faults are rehearsed where the file has control.rehearse_faults")
 
     def reloads(self) -> None:
-        """Take note that another controller follows."""
+        """Take note that a reload replaces the controller."""
 
     def flush(self) -> None:
-        """Write down what was noted."""
+        """Pack the notes into the ring."""
         put, buses = self._put, self._bus
         for kind, frame, number, time_ns in self._calls:
             if frame is None:

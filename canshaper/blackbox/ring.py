@@ -1,6 +1,6 @@
 """A bounded ring in memory: segments of records, each with the controller's state at its begin.
 
-Nothing is allocated in a steady tick: records are packed into blocks that are used again.
+A steady tick allocates no memory: records are packed into blocks that are used again.
 """
 
 import struct
@@ -16,30 +16,30 @@ CHUNK = 8  # bytes of a text in one record
 
 
 class Kind(IntEnum):
-    """Kind of a record. The numbers stand in files."""
+    """Kind of a record. Files contain these numbers, so none may change."""
 
     TICK = 1
     """A tick begins; ``number`` deadlines were missed before it."""
     RX = 2
     """A frame was read; ``time_ns`` is its arrival."""
     TX = 3
-    """The controller has computed a frame; ``FAILED`` or ``WITHHELD`` before it say it stayed."""
+    """The controller computed a frame; if it did not leave, ``FAILED`` or ``WITHHELD`` precedes."""
     FAILED = 4
     """A frame did not reach its bus."""
     WITHHELD = 5
-    """A valve frame came too late to leave, if it moves one."""
+    """A valve frame was late; it did not leave if it moves a valve."""
     STALLED = 6
     """The loop stood still for too long."""
     NEUTRAL = 7
     """Neutral frames were computed outside of a tick."""
     OFF_BUS = 8
-    """We are not on bus ``number`` now."""
+    """Our CAN controller is off bus ``number``."""
     FAULT = 9
-    """A bus has a fault: ``number`` is that of the fault."""
+    """A bus has the fault ``number``."""
     SET = 10
-    """Numbers were changed by hand: a part of their JSON; ``number`` bytes are left with it."""
+    """An operator changed numbers: a part of their JSON, of which ``number`` bytes are left."""
     BEFORE = 11
-    """8 bytes of the frame of the next record, in front of its data: CAN FD has up to 64."""
+    """8 bytes that precede the data of the next record: a CAN FD frame has up to 64."""
 
 
 class Record(NamedTuple):
@@ -55,12 +55,12 @@ class Record(NamedTuple):
 
     @property
     def payload(self) -> bytes:
-        """Data of its frame; of one that is too long for CAN, and so refused, the length counts."""
+        """Data of its frame, padded with 0 to the length of a frame too long for CAN."""
         return self.data[: self.length].ljust(self.length, b"\0")
 
 
 def records(data: bytes | memoryview) -> Iterator[Record]:
-    """Every record of a segment, in the order in which things happened, each with all its data."""
+    """Yield every record of a segment in order of time, each with all its data."""
     before = b""
     for record in map(Record._make, RECORD.iter_unpack(data)):
         if record.kind == Kind.BEFORE:
@@ -73,8 +73,8 @@ def records(data: bytes | memoryview) -> Iterator[Record]:
 
 
 BLOCK = 2048 * SIZE
-# 8 MB: a minute of 5000 records a second, which is two full buses at 500 kbit/s. With more the ring
-# reaches less far back. Memory is taken when it is needed first.
+# 8 MB: a minute of 5000 records a second, which is two full buses at 500 kbit/s. With more records
+# the ring reaches less far back. A block is allocated when it is first needed.
 MOST_BLOCKS = 170
 KEPT_NS = 60_000_000_000
 
@@ -83,13 +83,13 @@ class Segment:
     """Records from one saved state of the controller on.
 
     Attributes:
-        state: of the controller when it begins, see ``canshaper.blackbox.state``.
-        begin_ns: when that is, by ``boottime_ns``.
-        follows: whether nothing is missing between the segment before and this one.
-        blocks: its records.
-        used: bytes of the last block.
-        held: whether somebody still reads it: its blocks must not be used again.
-        cut_off: whether there was no room for its last records.
+        state: saved state of the controller at the begin, see ``canshaper.blackbox.state``.
+        begin_ns: time of the begin, by ``boottime_ns``.
+        follows: whether no record is missing between the previous segment and this one.
+        blocks: packed records.
+        used: bytes used in the last block.
+        held: whether a file still needs its blocks, so that they must not be used again.
+        cut_off: whether its last records are missing because the ring was full.
     """
 
     __slots__ = ("begin_ns", "blocks", "cut_off", "follows", "held", "state", "used")
@@ -103,7 +103,7 @@ class Segment:
         self.held = self.cut_off = False
 
     def data(self) -> bytes:
-        """All its records."""
+        """Return its packed records."""
         return b"".join([*self.blocks[:-1], *(block[: self.used] for block in self.blocks[-1:])])
 
 
@@ -111,7 +111,7 @@ class Ring:
     """The last minute, in segments.
 
     Args:
-        most_blocks: memory that it may take.
+        most_blocks: most blocks that it may allocate.
     """
 
     def __init__(self, most_blocks: int = MOST_BLOCKS) -> None:
@@ -119,22 +119,22 @@ class Ring:
         self._left = most_blocks
         self._segments: deque[Segment] = deque()
         self._open: Segment | None = None
-        self._block = self._nowhere = bytearray(BLOCK)  # what is put there is lost
+        self._block = self._nowhere = bytearray(BLOCK)  # never read
         self._at = 0
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """The oldest first; the last one may still be written to."""
+        """Segments, the oldest first; the last one may still grow."""
         if self._open is not None and self._open.blocks:
             self._open.used = self._at
         return tuple(self._segments)
 
     @property
     def cut_off(self) -> bool:
-        """Whether there was no room for all of the newest segment."""
+        """Whether the newest segment lacks records because the ring was full."""
         return bool(self._segments) and self._segments[-1].cut_off
 
-    def put(  # noqa: PLR0917  (names would cost as much as the rest of it)
+    def put(  # noqa: PLR0917  (names of arguments would double the time of a call)
         self,
         kind: int,
         bus: int,
@@ -152,7 +152,7 @@ class Ring:
         self._at = at + SIZE
 
     def begin(self, state: bytes, now_ns: int, *, follows: bool) -> None:
-        """Begin a segment; what is older than it has to be is dropped."""
+        """Begin a segment, and drop segments that are no longer needed for the last minute."""
         self.pause()
         segments = self._segments
         follows = follows and bool(segments) and not self.cut_off
@@ -163,13 +163,13 @@ class Ring:
         self._at = BLOCK
 
     def pause(self) -> None:
-        """End the segment; nothing is kept until the next one begins."""
+        """End the segment; records are lost until the next segment begins."""
         _ = self.segments
         self._open = None
         self._block, self._at = self._nowhere, 0
 
     def clear(self) -> None:
-        """Drop everything."""
+        """Drop all segments."""
         self.pause()
         while self._segments:
             self._drop()
@@ -182,10 +182,10 @@ class Ring:
             self._free += segment.blocks
 
     def _next_block(self) -> int:
-        """Find a block for what follows; where in it that is put."""
+        """Choose the block for the next record; return the offset in it."""
         segment = self._open
         if segment is None:
-            return 0  # nowhere, again
+            return 0  # between segments: the record is lost
         if not self._free and not self._left and len(self._segments) > 1:
             self._drop()
         if self._free:

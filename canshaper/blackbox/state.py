@@ -1,12 +1,12 @@
-"""The state of a controller as bytes, and back: what a replay has to begin with.
+"""The state of a controller as bytes, and back: a replay begins with it.
 
-Everything that the controller refers to is kept by value, with ``pickle``, but for what never
-changes: configuration, messages of the DBC files and their layouts, functions. Those are kept by
-number, and are those of the deployment that the replay has loaded.
+``pickle`` saves by value every object that the controller refers to, except for objects that never
+change: configuration, messages of the DBC files and their layouts, functions. The state contains a
+number for each of these, and the replay takes the object of that number from its own deployment.
 
-A black box may come from anybody, and a pickle can call whatever it names. Here it can name only
-classes of the packages that a controller is made of, none of which touches a file or a process, and
-only the opcodes are allowed that are needed.
+Anybody may have made a black box, and a pickle can call any function that it names. This loader
+accepts only classes of the packages that a controller consists of, none of which touches a file or
+a process, and only the opcodes that they need.
 """
 
 import io
@@ -28,11 +28,11 @@ from canshaper.codec.message import FieldSet
 from canshaper.codec.velocity import FlaggedVelocity
 from canshaper.config.source import Source
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import StateError
 from canshaper.machine.database import Messages
 
-# What a deployment and its DBC files say.
+# Classes whose objects never change: the content of a deployment file and its DBC files.
 FIXED = (
     BaseModel,
     Message,
@@ -55,16 +55,16 @@ OPCODES = frozenset(
     " EMPTY_TUPLE TUPLE TUPLE1 TUPLE2 TUPLE3 EMPTY_LIST APPEND APPENDS EMPTY_DICT SETITEM SETITEMS"
     " EMPTY_SET ADDITEMS FROZENSET STACK_GLOBAL NEWOBJ REDUCE BUILD".split()
 )
-Root = tuple[Guarded, Controller]
+Root = tuple[GatedController, Controller]
 
 
 def _fixed(number: int) -> Any:
-    """Stand in a pickle for an object that never changes, by its number."""
-    raise NotImplementedError  # its name only is used
+    """Represent in a pickle an object that never changes, by its number."""
+    raise NotImplementedError  # only its name is used
 
 
 def _method(one: Any, name: str) -> Any:
-    """Stand in a pickle for a method of one of our objects."""
+    """Represent in a pickle a method of one of our objects; loading it returns the method."""
     if type(one).__module__ == "builtins" or name.startswith("__"):
         raise StateError(
             f"expected a method of an object of ours, got {name} of {type(one).__name__}"
@@ -73,20 +73,20 @@ def _method(one: Any, name: str) -> Any:
 
 
 class States:
-    """Keeps the state of a controller, and makes controllers from it.
+    """Saves the state of a controller, and makes controllers from saved states.
 
     Args:
-        guarded: a controller behind its gate, as it is made.
+        gated: a new controller behind its gate.
         controller: that controller.
 
     Raises:
-        StateError: something in it cannot be kept.
+        StateError: an object in it cannot be saved.
     """
 
-    def __init__(self, guarded: Guarded, controller: Controller) -> None:
-        self._root: Root = (guarded, controller)
+    def __init__(self, gated: GatedController, controller: Controller) -> None:
+        self._root: Root = (gated, controller)
         self._numbers: dict[int, int] = {}
-        self._fixed: list[Any] = []  # alive, so that no other object gets their ids
+        self._fixed: list[Any] = []  # kept alive, so that no other object gets their ids
         self._classes: set[type] = set()
         self._numbering = True
         self.save()
@@ -95,10 +95,10 @@ class States:
         self._packages = {name for name in packages if name.startswith("canshaper.")}
 
     def save(self) -> bytes:
-        """Return what the controller knows now.
+        """Return the present state of the controller.
 
         Raises:
-            StateError: something in it cannot be kept.
+            StateError: an object in it cannot be saved.
         """
         file = io.BytesIO()
         try:
@@ -108,41 +108,45 @@ class States:
         return file.getvalue()
 
     def load(self, state: bytes) -> Root:
-        """A controller that knows what another one knew.
+        """Return a controller in a saved state, behind its gate.
 
         Raises:
-            StateError: that was not one of this deployment and program, or this is no state.
+            StateError: the state is damaged, or is of another deployment or program.
         """
         try:
             for opcode, _, _ in pickletools.genops(state):
                 if opcode.name not in OPCODES:
                     raise StateError(f"expected an opcode that is needed, got {opcode.name}")
-            guarded, controller = _Unpickler(io.BytesIO(state), self._find).load()
+            gated, controller = _Unpickler(io.BytesIO(state), self._find).load()
         except StateError:
             raise
-        except Exception as error:  # of many kinds, where it is damaged or of another version
+        except Exception as error:  # of many classes: damaged, or of another version
             raise StateError(f"{type(error).__name__}: {error}") from None
-        if type(guarded) is not type(self._root[0]) or type(controller) is not type(self._root[1]):
+        if type(gated) is not type(self._root[0]) or type(controller) is not type(self._root[1]):
             raise StateError("expected a controller, got another object")
-        return guarded, controller
+        return gated, controller
 
     def _number(self, one: Any) -> int | None:
-        """Number of what never changes; None for what is kept by value."""
+        """Return the number of an object that never changes; None for one saved by value."""
         number = self._numbers.get(id(one))
         if number is None and self._numbering:
             number = self._numbers[id(one)] = len(self._fixed)
             self._fixed.append(one)
-            self._classes.add(type(one))  # changed numbers of a configuration are kept by value
+            self._classes.add(type(one))  # changed sections are saved by value
         return number
 
     def _find(self, module: str, name: str) -> Any:
-        """Return the class or function of a name; a state may name only some."""
+        """Return the class or function of a name.
+
+        Raises:
+            StateError: a state may not name it.
+        """
         if name == _fixed.__name__ and module == __name__:
             return self._fixed.__getitem__
         value = getattr(sys.modules.get(module), name, None)
         if value is _method or value in self._classes:
             return value
-        # A filter or an event of another kind than at the start.
+        # A class of a filter or an event that the new controller did not contain.
         package = module.rpartition(".")[0]
         ours = isinstance(value, type) and value.__module__ == module
         if ours and package in self._packages:
@@ -151,10 +155,10 @@ class States:
 
 
 def attributes(kind: Any) -> tuple[str, ...]:
-    """Names of attributes that an instance of a class may have; none where ``pickle`` knows better.
+    """Return the attributes that an instance of a class may have; none if ``pickle`` saves it.
 
-    By what the code of its methods stores. ``pickle`` asks for ``__dict__`` instead, and from then
-    on CPython 3.11 looks every attribute up in a dictionary: a tick takes a fifth longer.
+    They are the names that the code of its methods stores. ``pickle`` would read ``__dict__``, and
+    from then on CPython 3.11 looks up every attribute in a dictionary: a tick takes a fifth longer.
     """
     own = {"__reduce__", "__reduce_ex__", "__getstate__", "__getnewargs__", "__getnewargs_ex__"}
     if not kind.__dictoffset__ or issubclass(kind, FIXED):
@@ -170,7 +174,7 @@ def attributes(kind: Any) -> tuple[str, ...]:
 
 
 def _stored(code: CodeType) -> Iterator[str]:
-    """Names of attributes that a function stores, of whatever object."""
+    """Yield the names of the attributes that a function stores, in any object."""
     operations, arguments = code.co_code[::2], code.co_code[1::2]
     at = operations.find(STORE_ATTR)
     while at >= 0:

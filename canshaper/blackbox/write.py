@@ -1,4 +1,4 @@
-"""Writes a black box as a bundle: with the deployment file and its DBC files."""
+"""Writes a black box into a bundle with the deployment file and its DBC files."""
 
 import errno
 import json
@@ -21,13 +21,13 @@ from canshaper.machine.deployment import Deployment
 
 ABOUT, FOLDER, OUTSIDE = "about.json", "deployment", "outside"
 BOX = f"recording{SUFFIX}"
-# Files in the folder of one deployment; the oldest go. Each has 0.1 to 3 MB.
+# Most files of one deployment; older ones are removed. Each has 0.1 to 3 MB.
 MOST_FILES = 20
 PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpack", "crccheck")
 
 
 def last_number(folder: Path, stem: str) -> int:
-    """Number of the newest black box of a deployment in a folder; 0 where there is none."""
+    """Return the number of the newest black box of a deployment in a folder; 0 without one."""
     try:
         return max(_numbered(folder, stem), default=0)
     except OSError:
@@ -42,25 +42,25 @@ def _numbered(folder: Path, stem: str) -> dict[int, Path]:
 def write_box(
     folder: Path, deployment: Deployment, segments: Iterable[Segment], why: str, number: int
 ) -> Path:
-    """Write a black box into a folder, and remove the oldest where there are too many.
+    """Write a black box into a folder, and remove the oldest files beyond ``MOST_FILES``.
 
-    It is on the disk when this returns: who turns the key off next does not lose it. Until then a
-    file with its number stays. On a full disk the oldest ones make room.
+    The file is on the disk when this returns, so it survives a power cut. Until then an older file
+    with the same number stays. If the disk is full, the oldest files are removed.
 
     Args:
-        folder: made where it is not there.
-        deployment: whose black box it is.
-        segments: what there is.
-        why: it is written.
-        number: of the file.
+        folder: folder, created if it is missing.
+        deployment: deployment that was running.
+        segments: recorded segments.
+        why: reason for the file.
+        number: number of the file.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     stem = deployment.path.stem
     path = folder / f"{stem}-{number:04d}.zip"
-    for part in folder.glob(f"{stem}-*.zip.part"):  # of a process that was killed
+    for part in folder.glob(f"{stem}-*.zip.part"):  # left by a killed process
         part.unlink(missing_ok=True)
     there = _numbered(folder, stem)
     old = sorted(there.keys() - {number})
@@ -79,7 +79,7 @@ def write_box(
 
 
 def _write(path: Path, deployment: Deployment, segments: list[Segment], why: str) -> None:
-    import zipfile  # noqa: PLC0415  (the daemon has no need of it, the process that writes has)
+    import zipfile  # noqa: PLC0415  (only the process that writes needs it, not the daemon)
 
     part = path.with_name(path.name + ".part")
     inside, files = carried(deployment)
@@ -103,13 +103,13 @@ def _write(path: Path, deployment: Deployment, segments: list[Segment], why: str
 
 
 def header_of(deployment: Deployment, why: str) -> dict[str, Any]:
-    """Return the header, which a replay needs before it begins.
+    """Return the header, which a replay reads first.
 
     Returns:
-        ``buses``: their names by the numbers in the records; ``listen_only``; ``identity`` of
-        deployment and program; ``carried``: hashes of the files as they are in the bundle; ``why``
-        it was written; ``clock_ns`` and ``time_ns``: now, by the clock of the records and since
-        1970.
+        ``buses``: names of the buses, at the index that records use; ``listen_only``;
+        ``identity``: lines on deployment and program; ``carried``: SHA-256 of the files in the
+        bundle; ``why``: reason for the file; ``clock_ns`` and ``time_ns``: present time by the
+        clock of the records and since 1970.
     """
     return {
         "buses": list(deployment.config.buses),
@@ -126,7 +126,7 @@ def header_of(deployment: Deployment, why: str) -> dict[str, Any]:
 
 
 def carried(deployment: Deployment) -> tuple[str, dict[str, bytes]]:
-    """The files of a deployment, as they were loaded, so that their paths hold in a bundle.
+    """Return the files of a deployment as they were loaded, with paths that hold in a bundle.
 
     Returns:
         (name of the deployment file in the bundle, content of every file by its name there).
@@ -138,7 +138,7 @@ def carried(deployment: Deployment) -> tuple[str, dict[str, bytes]]:
 
 
 def _text(deployment: Deployment) -> tuple[list[str], str]:
-    """Names in a bundle of the deployment file and its DBC files, and the text of the first."""
+    """Return (names of the deployment file and its DBC files in a bundle, text of the first)."""
     file = deployment.path.resolve()
     text = deployment.source.content.decode("utf-8")
     sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
@@ -158,9 +158,9 @@ def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
     """Return the content of ``about.json`` of a bundle.
 
     Args:
-        deployment: whose bundle it is.
-        inside: name of the deployment file in it.
-        log: name of the log in it.
+        deployment: deployment that was running.
+        inside: name of the deployment file in the bundle.
+        log: name of the log in the bundle.
     """
     return {
         "deployment": inside,

@@ -1,8 +1,8 @@
-"""A bus of python-can whose calls may block, kept apart from the loop by two threads.
+"""Two threads that call a blocking bus of python-can, so that the control loop never waits for it.
 
-The ``send`` of a serial line or of a TCP connection waits until the line takes the bytes, for ever
-where it takes none, and ``recv(0)`` of a serial line waits as long as the line's own timeout. What
-waits here is one frame of each id, and none for longer than ``LEAVE_NS``.
+``send`` on a serial line or a TCP connection blocks until the line takes the bytes; if the line
+takes none, it blocks for ever. ``recv(0)`` on a serial line blocks for the line's own timeout. At
+most one frame of each id waits here to be sent, for ``LEAVE_NS`` at most.
 """
 
 import array
@@ -21,35 +21,35 @@ import can
 from canshaper.bus.python_can import receive
 from canshaper.gate.cycle import boottime_ns
 
-# A frame may leave so late after it was given to an adapter, and an adapter may take so long for
-# one: half a tick of the slowest loop, ten frames on a serial line of 115200 baud.
+# Longest time from ``send`` until a frame leaves, and longest time that an adapter may take for one
+# frame: half a tick of the slowest loop, ten frames on a serial line of 115200 baud.
 LEAVE_NS = 20_000_000
 LEAVE_S = LEAVE_NS / 1e9
-# How often an adapter that took no frames is tried again, with one frame, neutral by then.
+# Time between two attempts to send one frame (neutral by then) to an adapter that takes none.
 PROBE_NS = 500_000_000
-# How long a read waits before the bus counts as seen empty again: a frame looks so much older.
+# Time that a read waits before the bus counts as empty again. A frame looks older by that time.
 LOOK_S = 0.005
 # Polling period of an adapter with nothing to wait on.
 POLL_S = 0.002
-# Room for the backlog of a long stall.
+# Frames that may wait to be read: the backlog of a long stall.
 MOST_RECEIVED = 20_000
-# Longest wait of a close for the last frames and for the goodbye of the interface.
+# Longest time that a close waits for the last frames and for the interface to shut down.
 CLOSE_S = 0.2
-# linux/sockios.h and asm/ioctls.h: bytes that TCP has not sent yet, and those that a tty has not.
+# linux/sockios.h and asm/ioctls.h: bytes that a TCP connection or a tty has not sent yet.
 SIOCOUTQNSD, TIOCOUTQ = 0x894B, 0x5411
 
 
 class BusApart:
-    """The methods of ``can.BusABC`` that a port uses, of a bus whose calls may block.
+    """A bus of python-can whose methods never block; it has those that a port uses.
 
     Args:
-        bus: the bus; nothing else may call it any more.
+        bus: the bus that may block; nothing else may call it from now on.
 
     Attributes:
-        since_ns: when the bus was seen empty before the frame that ``recv`` has just returned, by
-            ``boottime_ns``: the frame arrived after that.
+        since_ns: time by ``boottime_ns`` when the bus was last seen empty before the frame that
+            ``recv`` has just returned. The frame arrived after that time.
         took: whether the interface took the last frame in time.
-        lost: frames that were dropped because too many waited to be read.
+        lost: number of frames dropped because too many waited to be read.
     """
 
     def __init__(self, bus: can.BusABC) -> None:
@@ -60,9 +60,9 @@ class BusApart:
         self._descriptor = descriptor(bus)
         self._changed = threading.Condition()
         self._waiting: dict[tuple[int, bool], tuple[can.Message, int]] = {}
-        self._began_ns = 0  # when the call began that sends now; 0 where there is none
-        self._unsent_ns = 0  # since when bytes have been seen in the kernel; 0 where there are none
-        self._late = False  # the last frame was
+        self._began_ns = 0  # when the present call of ``send`` began; 0 without one
+        self._unsent_ns = 0  # since when the kernel holds unsent bytes; 0 without any
+        self._late = False  # the last frame left too late
         self._not_before_ns = 0
         self._failure: Exception | None = None
         self._closing = False
@@ -79,14 +79,14 @@ class BusApart:
         thread.start()
         return thread
 
-    # -- called by the loop: nothing of this waits ---------------------------------------------
+    # -- called by the loop: none of these blocks ----------------------------------------------
 
     def send(self, message: can.Message) -> None:
-        """Leave a frame to the thread that sends, in place of one with its id that still waits.
+        """Hand a frame to the sending thread; it replaces a waiting frame with the same id.
 
         Raises:
-            can.CanTimeoutError: the adapter takes no frames; this one is dropped.
-            Exception: what the interface raised for a frame before; this one is dropped.
+            can.CanTimeoutError: the adapter takes no frames; this frame is dropped.
+            Exception: the error of the interface for an earlier frame; this frame is dropped.
         """
         now_ns = boottime_ns()
         with self._changed:
@@ -104,16 +104,16 @@ class BusApart:
             self._changed.notify()
 
     def recv(self, _timeout_s: float) -> can.Message | None:
-        """The next frame that waits, or None.
+        """Return the next received frame, or None.
 
         Raises:
-            Exception: what the interface raised in its place.
+            Exception: the interface raised it when the frame was read.
         """
         received = self._received
         if not received:
             with suppress(BlockingIOError):
                 self._wake_reader.recv(4096)
-            if not received:  # else one came before its descriptor was read empty
+            if not received:  # a frame may have come before the descriptor was emptied
                 return None
         message, self.since_ns = received.popleft()
         if isinstance(message, Exception):
@@ -121,23 +121,23 @@ class BusApart:
         return message
 
     def fileno(self) -> int:
-        """Descriptor that is readable when a frame waits."""
+        """Return a file descriptor that is readable while a received frame waits."""
         return self._wake_reader.fileno()
 
     def shutdown(self) -> None:
-        """Close the bus once what waits is sent; one that is blocked is left behind."""
+        """Close the bus after the waiting frames are sent; abandon it if it is blocked."""
         with self._changed:
             self._closing = True
             self._changed.notify()
         self._sender.join(CLOSE_S)
         if self._sender.is_alive():
-            # Else the kernel holds the process at its end until the line took it all.
+            # Otherwise the kernel lets the process exit only after the line has taken every byte.
             discard_unsent(self._descriptor)
         self._wake_reader.close()
         self._wake_writer.close()
 
     def _blocked(self, now_ns: int) -> bool:
-        """Whether a frame was or is under way for too long, in the interface or in the kernel."""
+        """Return whether a frame took or takes too long, in the interface or in the kernel."""
         if not unsent(self._descriptor):
             self._unsent_ns = 0
         elif not self._unsent_ns:
@@ -151,13 +151,13 @@ class BusApart:
         while message := self._next():
             failure = None
             try:
-                self._bus.send(message, LEAVE_S)  # most do not look at it
-            except Exception as error:  # each interface raises its own kinds
+                self._bus.send(message, LEAVE_S)  # most interfaces ignore the timeout
+            except Exception as error:  # each interface raises its own classes
                 failure = error
             with self._changed:
                 self._late = boottime_ns() - self._began_ns > LEAVE_NS
                 self.took = not (failure or self._late)
-                # Of a frame before too, until it is reported: the next one may well have left.
+                # Keep an earlier failure until it is reported, although this frame may have left.
                 self._failure = None if self._late else failure or self._failure
                 self._began_ns = 0
         self._receiver.join(CLOSE_S)
@@ -165,7 +165,7 @@ class BusApart:
             self._bus.shutdown()
 
     def _next(self) -> can.Message | None:
-        """The next frame that is not too old; None at the end."""
+        """Wait for a frame that is not too old, and return it; None when the bus closes."""
         with self._changed:
             while True:
                 while not self._waiting:
@@ -185,25 +185,26 @@ class BusApart:
             result: can.Message | Exception | None
             try:
                 result = receive(self._bus)
-            except Exception as error:  # as above
+            except Exception as error:  # each interface raises its own classes
                 result = error
             if result is None and readable and ended(self._descriptor):
                 result = can.CanOperationError("the connection was closed at its other end")
             if result is not None:
-                # One too many where the loop reads one meanwhile: bad news too early is no harm.
+                # If the loop reads a frame meanwhile, this counts one too many, which is safe.
                 self.lost += len(self._received) == MOST_RECEIVED
                 self._received.append((result, empty_ns))
-                with suppress(OSError):  # it is full, which says as much; or closed
+                with suppress(OSError):  # full: the reader wakes anyway; or closed
                     self._wake_writer.send(b"\0")
             if isinstance(result, Exception):
-                time.sleep(POLL_S)  # it may fail at every call
+                time.sleep(POLL_S)  # every call may fail
             elif result is None and not readable:
-                # Else it read bytes that are no frame, and a frame may wait behind them.
+                # If the line was readable, ``receive`` took bytes that are no frame, and a frame
+                # may wait behind them.
                 empty_ns = polled_ns
                 self._readable(LOOK_S)
 
     def _readable(self, timeout_s: float) -> bool:
-        """Whether the line has something to read, or will have within a time."""
+        """Return whether the line has bytes to read, after waiting ``timeout_s`` at most."""
         if self._descriptor >= 0:
             with suppress(OSError, ValueError):  # closed meanwhile
                 return bool(select([self._descriptor], [], [], timeout_s)[0])
@@ -212,17 +213,17 @@ class BusApart:
 
 
 def descriptor(bus: can.BusABC) -> int:
-    """File descriptor of the line behind a bus; -1 where there is none."""
-    # python-can has no other way to the connection of socketcand.
+    """Return the file descriptor of the line behind a bus; -1 if it has none."""
+    # python-can offers no public access to the connection of socketcand.
     line = getattr(bus, "_SocketCanDaemonBus__socket", bus)
     try:
         return int(line.fileno())
-    except Exception:  # most have none and say so in their own way
+    except Exception:  # most have none, and each raises its own class
         return -1
 
 
 def unsent(fileno: int) -> int:
-    """Bytes that the kernel has queued for a line and not sent; 0 where it does not say."""
+    """Return the number of bytes that the kernel has yet to send on a line; 0 if unknown."""
     count = array.array("i", [0])
     for request in (SIOCOUTQNSD, TIOCOUTQ):
         with suppress(OSError, ValueError):
@@ -232,10 +233,10 @@ def unsent(fileno: int) -> int:
 
 
 def ended(fileno: int) -> bool:
-    """Whether a line is a connection that its other end has closed."""
+    """Return whether a line is a connection that the other end has closed."""
     try:
         connection = socket.socket(fileno=fileno)
-    except OSError:  # it is none
+    except OSError:  # no socket
         return False
     try:
         return not connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
@@ -246,6 +247,6 @@ def ended(fileno: int) -> bool:
 
 
 def discard_unsent(fileno: int) -> None:
-    """Drop what the kernel has queued for a serial line and not sent; TCP keeps its queue."""
+    """Drop the bytes that the kernel has yet to send on a serial line; TCP keeps its queue."""
     with suppress(ValueError, termios.error):
         termios.tcflush(fileno, termios.TCOFLUSH)

@@ -1,8 +1,7 @@
-"""The device behind a CAN interface: names change hands, a serial number and a place do not.
+"""The device behind a CAN interface, known by serial number or port: an interface name can change.
 
-Where the facts come from: /sys/class/net for serial number, place, channel and driver of hardware;
-rtnetlink (linux/if_link.h, linux/can/netlink.h) for the bit rate, and for the kind of an interface
-without hardware.
+Serial number, port, channel and driver of hardware come from /sys/class/net. The bit rate, and the
+kind of an interface without hardware, come from rtnetlink (linux/if_link.h, linux/can/netlink.h).
 """
 
 import errno
@@ -18,10 +17,10 @@ from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
 
 ROOT = Path("/")
-IFF_ECHO = 1 << 18  # linux/if.h: the driver hands a frame back once it is on the bus
+IFF_ECHO = 1 << 18  # linux/if.h: the driver returns a frame once it is on the bus
 FD_MTU = 72  # linux/can.h, CANFD_MTU
-# What two places in the tree of devices are called, and which of their parents they stand for; as
-# the builtin path_id of udev makes ID_PATH.
+# Directory names of a USB device and of an SPI device below /sys/devices, from which ID_PATH is
+# made as the builtin path_id of udev makes it.
 _USB_PORT = re.compile(r"\d+-(.+)")
 _CHIP_SELECT = re.compile(r"spi\d+\.(\d+)")
 
@@ -33,14 +32,14 @@ class Device:
     """Device behind an interface; None for each property that it does not have.
 
     Attributes:
-        name: of the interface.
+        name: name of the interface.
         serial: serial number of a USB adapter.
-        path: where it is plugged in, as udev's ID_PATH.
+        path: port that the adapter is plugged into, as udev's ID_PATH.
         port: channel of an adapter, from 0.
-        driver: of the kernel; the kind of an interface without hardware, such as vcan.
+        driver: driver of the kernel; without hardware the kind of the interface, such as vcan.
         bitrate: bit/s.
-        channels: interfaces of the same adapter.
-        data_bitrate: bit/s of the data of CAN FD.
+        channels: number of interfaces of the same adapter.
+        data_bitrate: bit/s in the data phase of CAN FD.
     """
 
     name: str
@@ -56,16 +55,16 @@ class Device:
 def read_device(
     name: str, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates
 ) -> Device:
-    """The device behind an interface.
+    """Return the device behind an interface.
 
     Args:
-        name: of the interface.
-        root: of the file system.
-        query_kernel: for kind and bit rates of the interface with an index.
+        name: name of the interface.
+        root: root of the file system.
+        query_kernel: returns kind and bit rates of the interface with an index.
 
     Raises:
-        OSError: ENODEV where there is no such interface, or the name changed hands meanwhile;
-            others where the kernel cannot be asked.
+        OSError: ENODEV if there is no such interface, or if another interface took the name
+            meanwhile; other codes if the kernel cannot be asked.
     """
     directory = root / "sys/class/net" / name
     index = _number(directory / "ifindex")
@@ -85,18 +84,18 @@ def read_device(
         max(len(list((hardware / "net").glob("*"))), 1),
         data_bitrate,
     )
-    if _number(directory / "ifindex") != index:  # what was read may be of two devices
+    if _number(directory / "ifindex") != index:  # the values may be of two devices
         raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
     return device
 
 
 def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
-    """Compare the device that bound sockets are on with the one of the deployment.
+    """Compare the device behind bound sockets with the device in the deployment file.
 
-    By what they are bound to: the name may have changed hands since it was looked up.
+    The sockets say which interface they are bound to: another interface may have the name by now.
 
     Raises:
-        WrongDeviceError: it is another one, or what it is cannot be known.
+        WrongDeviceError: it is another device, or the device cannot be read.
         OSError: the interface is gone.
     """
     if bus.match is None:
@@ -108,7 +107,7 @@ def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
         if error.errno == errno.ENODEV:
             raise
         raise WrongDeviceError(f"{bus.channel} cannot be looked at: {error.strerror}") from error
-    # Each socket was bound by the name, and the kernel returns the name that its device has now.
+    # Each socket was bound by name; the kernel returns the name that its interface has now.
     if {*names, *(one.getsockname()[0] for one in sockets)} != {device.name}:
         raise WrongDeviceError(f"the name {bus.channel} changed hands while it was opened")
     if fault := device_fault(bus, device):
@@ -116,7 +115,7 @@ def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
 
 
 def check_mtu(bus: Bus, root: Path = ROOT) -> None:
-    """Whether the interface of a bus of CAN FD is set up for it.
+    """Check that the interface of a CAN FD bus is set up for CAN FD.
 
     Raises:
         OSError: it is not.
@@ -128,10 +127,11 @@ def check_mtu(bus: Bus, root: Path = ROOT) -> None:
 
 
 def has_echo(name: str, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates) -> bool:
-    """Whether a frame of ours that comes back from an interface is on the bus.
+    """Return whether a frame that an interface echoes has been on the bus.
 
-    Without an echo of the driver (slcan) the kernel hands it back as soon as it takes it, also in
-    bus-off. On a virtual bus both are the same. Where the kernel cannot be asked: no.
+    If the driver has no echo (slcan), the kernel returns the frame as soon as it accepts it, even
+    in bus-off. A virtual bus has no such difference. The answer is False if the kernel cannot be
+    asked.
     """
     directory = root / "sys/class/net" / name
     if (_number(directory / "flags") or 0) & IFF_ECHO:
@@ -143,12 +143,12 @@ def has_echo(name: str, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bi
 
 
 def interface_index(name: str, root: Path = ROOT) -> int | None:
-    """Number of the interface that has a name now; None where none has it."""
+    """Return the index of the interface with this name now; None without one."""
     return _number(root / "sys/class/net" / name / "ifindex")
 
 
 def device_fault(bus: Bus, device: Device) -> str | None:
-    """Why a device is not the one of a bus; None where it is, or the bus names none."""
+    """Return why a device is not the one of a bus; None if it is, or if the bus names none."""
     values = expected(bus, device)
     wrong = [key for key, value in values.items() if getattr(device, key) != value]
     if not wrong:
@@ -159,9 +159,9 @@ def device_fault(bus: Bus, device: Device) -> str | None:
 
 
 def expected(bus: Bus, device: Device) -> dict[str, str | int]:
-    """Return the values that a device has to have, by its fields.
+    """Return the values that the device of a bus must have, by field of ``Device``.
 
-    The bit rates of the bus count too, for an interface that has them.
+    The bit rates of the bus are among them if the interface reports bit rates.
     """
     if bus.match is None:
         return {}
@@ -173,7 +173,7 @@ def expected(bus: Bus, device: Device) -> dict[str, str | int]:
 
 
 def match_fault(bus: Bus) -> str | None:
-    """Why the interface of a bus is not its device now; None where it is.
+    """Return why the interface of a bus is now another device; None if it is the right one.
 
     Raises:
         OSError: there is no such interface, or the kernel cannot be asked.
@@ -183,9 +183,10 @@ def match_fault(bus: Bus) -> str | None:
 
 
 def whereabouts(bus: Bus, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates) -> str:
-    """Which interface is the device of a bus now, behind a message; empty where none is named.
+    """Return the end of a message that names the interface where the device of a bus is now.
 
-    It is only reported, never used by itself: which bus is driven stands in the file.
+    It is empty if the bus names no device. The interface is only reported, never driven: the file
+    decides which interface is driven.
     """
     match = bus.match
     if match is None or (match.serial is None and match.path is None):
@@ -195,7 +196,7 @@ def whereabouts(bus: Bus, root: Path = ROOT, query_kernel: LinkQuery = kind_and_
     for directory in sorted((root / "sys/class/net").glob("*")):
         try:
             device = read_device(directory.name, root, query_kernel)
-        except OSError:  # it went away, or is no interface
+        except OSError:  # it is gone, or is no interface
             continue
         if all(getattr(device, key) == value for key, value in values.items()):
             names.append(device.name)
@@ -222,7 +223,7 @@ def _text(key: str, value: str | int | None) -> str:
 
 
 def _upwards(place: Path, root: Path) -> Iterator[Path]:
-    """A device and those that it is plugged into, up to /sys/devices."""
+    """Yield a device and the devices that it is plugged into, up to /sys/devices."""
     top = (root / "sys/devices").resolve()
     while place != top and top in place.parents:
         yield place
@@ -230,7 +231,7 @@ def _upwards(place: Path, root: Path) -> Iterator[Path]:
 
 
 def _serial(places: Iterable[Path]) -> str | None:
-    """Serial number of the USB device that a place belongs to; not that of the hub above it."""
+    """Return the serial number of the nearest USB device, not that of the hub above it."""
     for place in places:
         if (place / "idVendor").exists():
             return _content(place / "serial")
@@ -238,10 +239,10 @@ def _serial(places: Iterable[Path]) -> str | None:
 
 
 def _path(places: Iterable[Path]) -> str | None:
-    """As udev's ID_PATH: the same in every boot, whatever else is plugged in.
+    """Return udev's ID_PATH, which stays the same in every boot, whatever else is plugged in.
 
-    Of neighbours of one subsystem, such as the hubs of an adapter, the one next to the device
-    says it all.
+    Of successive places of one subsystem, such as a chain of hubs, the one nearest to the device
+    contains the names of the others.
     """
     parts: list[str] = []
     before = None
@@ -265,7 +266,7 @@ def _part(subsystem: str | None, name: str) -> str | None:
 
 
 def _linked(file: Path) -> str | None:
-    """Last part of where a link leads."""
+    """Return the last part of the target of a link; None if it is no link."""
     try:
         return file.readlink().name
     except OSError:

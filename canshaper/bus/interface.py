@@ -1,7 +1,7 @@
-"""The interface under a port on raw sockets: its state, and its sockets while it has any.
+"""The SocketCAN interface under a raw port: its state, and its sockets while they are open.
 
-An adapter is pulled out, an interface is set down, a bus takes no frames. Each is a state that an
-error of a socket, an error frame, a missing confirmation or the carrier shows; each is left by
+Someone pulls out an adapter or sets an interface down, or a bus takes no frames. Each is a state.
+A socket error, an error frame, a missing confirmation or the carrier shows it, and it ends by
 itself once the interface works again.
 """
 
@@ -34,36 +34,36 @@ from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
-# With so many error frames in one tick, the kernel keeps those without a state to itself for a
-# while; so their count is a minimum.
+# After so many error frames in one tick, the kernel filters out those without a state for a while.
+# Their count is therefore a lower bound.
 MOST_ERRORS = 50
 QUIET_NS = 1_000_000_000
-# How often a bus that took no frames is tried again, with one frame, neutral by then.
+# Time between two attempts to send one frame (neutral by then) on a bus that takes none.
 PROBE_NS = 500_000_000
-# How often an interface that has gone is looked for; it shall work again within a second.
+# Time between two attempts to reopen an interface; it must work within a second of its return.
 REOPEN_NS = 200_000_000
-# The device is gone; the socket would have to be bound to a new one.
+# Errors of a socket whose device is gone: a socket for its successor has to be bound again.
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
-# States in which the sockets are closed, to be opened again.
+# States in which the sockets are closed until they can be opened again.
 AWAY = frozenset((BusState.GONE, BusState.DOWN, BusState.WRONG_DEVICE, BusState.UNFIT))
-# Sending or opening failed for what the interface of that name is.
+# Errors of an interface that exists but does not suit the bus.
 NOT_FIT = frozenset((errno.EINVAL, errno.EOPNOTSUPP))
 NO_FD = f"expected an interface with CAN FD, which has the MTU {FD_MTU}, got one without"
-# Frames of one id under way, and for how long, until that is a fault: one waits, one is being sent,
-# one more for a confirmation just after the tick. A slow bus with a fast loop is no fault, so time
-# has to pass as well: 30 frames at 250 kbit/s.
+# Unconfirmed frames of one id that are a fault once they have waited for UNCONFIRMED_NS: one waits,
+# one is being sent, and the confirmation of one may come just after the tick. A fast loop on a slow
+# bus is no fault, so the time counts as well: 30 frames at 250 kbit/s.
 MOST_UNCONFIRMED = 3
 UNCONFIRMED_NS = 20_000_000
-# Claims: on a bus that takes none one is sent now and then, until its queue is full.
+# Claims under way: on a bus that takes no frames one is sent now and then, until the queue is full.
 MOST_CLAIMS = 32
 
 
 class UnderWay:
-    """Counts of our frames under way by id, and since when there is more than one.
+    """Our frames that were sent and not yet confirmed.
 
     Attributes:
-        counts: number of frames, by the kernel's id.
-        claims: address claims; they come back to the socket of the inputs.
+        counts: number of frames by kernel id.
+        claims: address claims, unpacked; the socket of the inputs receives them back.
     """
 
     def __init__(self) -> None:
@@ -72,14 +72,14 @@ class UnderWay:
         self._since_ns: dict[int, int] = {}
 
     def waited_ns(self, word: int, now_ns: int) -> int:
-        """How long frames of an id have been under way; 0 where that is no fault yet."""
+        """Return how long frames of an id have been unconfirmed, ns; 0 while that is no fault."""
         waited_ns = now_ns - self._since_ns.setdefault(word, now_ns)
         if self.counts[word] < MOST_UNCONFIRMED or waited_ns < UNCONFIRMED_NS:
             return 0
         return waited_ns
 
     def confirmed(self, word: int) -> None:
-        """One of them is on the bus."""
+        """Take note that one frame of an id is on the bus."""
         self.counts[word] = max(0, self.counts.get(word, 0) - 1)
         self._since_ns.pop(word, None)
 
@@ -89,7 +89,7 @@ class UnderWay:
         del self._since_ns[word]
 
     def clear(self) -> None:
-        """Count all of them from 0; of claims it is known which they are."""
+        """Count the frames of every id from 0; ``claims`` lists its frames one by one and stays."""
         self.counts.clear()
         self._since_ns.clear()
 
@@ -98,17 +98,17 @@ class Interface:
     """State and sockets of one interface.
 
     Args:
-        config: its section.
+        config: section of the bus in the deployment file.
         on_fault: called with every fault of the bus.
-        ids: the messages that matter; None for all of them, of which none is confirmed.
-        open_sockets: opens, non-blocking, a socket for the messages that are received and perhaps
-            two for what else is to be seen, see ``socketcan.open_sockets``; called again after
-            the interface was gone.
-        has_echo: asks of the interface just opened whether our frames come back from the bus.
+        ids: messages to receive and to send; None for all messages, of which none is confirmed.
+        open_sockets: opens the non-blocking sockets as ``socketcan.open_sockets`` does: one for
+            received messages, and two more unless ``ids`` is None; called again after the interface
+            was gone.
+        has_echo: returns whether an interface returns our frames from the bus.
 
     Attributes:
-        state: of the bus, as far as seen.
-        why: cause of a state that does not say it; empty for the others.
+        state: last known state of the bus.
+        why: cause of a state whose name does not say it; empty for the others.
 
     Raises:
         OSError: the sockets cannot be opened.
@@ -132,8 +132,8 @@ class Interface:
         self.state = self._good
 
     def _use(self) -> None:
-        """Begin with new sockets, of which nothing is known yet."""
-        arrivals = Arrivals()  # before a frame can arrive
+        """Open the sockets, and begin without knowledge of the bus."""
+        arrivals = Arrivals()  # before the sockets can receive a frame
         self._sockets = sockets = self._open(self._config, self._ids)
         own = self._ids is not None
         self._confirms = own and self._has_echo(self._config.channel)
@@ -151,7 +151,7 @@ class Interface:
         self._not_before_ns = 0
 
     def _reopened(self) -> bool:
-        """Look for an interface that has gone, was down, or was another device."""
+        """Open the sockets again when it is time; return whether they are open."""
         if self.state not in AWAY or time.monotonic_ns() < self._not_before_ns:
             return False
         try:
@@ -167,7 +167,7 @@ class Interface:
             self._not_before_ns = time.monotonic_ns() + REOPEN_NS
             return False
         self.why = ""
-        if self.state is not BusState.DOWN:  # which is over with the first frame
+        if self.state is not BusState.DOWN:  # the first frame ends DOWN
             self.state = self._good
         return True
 
@@ -176,26 +176,26 @@ class Interface:
         self._not_before_ns = 0
 
     def _failed(self, error: OSError) -> None:
-        """Take the state from an error of a socket."""
+        """Set the state that an error of a socket shows."""
         if error.errno in GONE:
             self._away(BusState.GONE, FrameFault.BUS_GONE)
         elif error.errno == errno.ENETDOWN:
-            if self._config.match:  # name and bit rate may be others when it is back
+            if self._config.match:  # name and bit rate may differ when it is up again
                 self._away(BusState.DOWN, FrameFault.BUS_DOWN)
                 return
             if self.state is not BusState.DOWN:
                 self._on_fault(FrameFault.BUS_DOWN)
             self.state = BusState.DOWN
-            self._under_way.clear()  # the queue is emptied with the interface
+            self._under_way.clear()  # an interface that goes down empties its queue
             self._under_way.claims.clear()
         elif error.errno == errno.EINVAL and self._config.fd:
             self._away(BusState.UNFIT, FrameFault.BUS_ERROR, NO_FD)
-        elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: the send has failed
+        elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: only this send failed
             self.state = BusState.FAILED
             self._on_fault(FrameFault.BUS_ERROR)
 
     def _away(self, state: BusState, fault: FrameFault, why: str = "") -> None:
-        """Stop sending and receiving until the interface is opened again; report a fault once."""
+        """Close the sockets until the interface can be opened again; report the fault once."""
         self.close()
         self._not_before_ns = time.monotonic_ns() + REOPEN_NS
         if self.state is not state:
@@ -203,7 +203,7 @@ class Interface:
             self._on_fault(fault)
 
     def _no_frame(self, data: bytes) -> None:
-        """Take the state of the bus from an error frame; anything else is of wrong length."""
+        """Set the state that an error frame shows; report any other packet as of wrong length."""
         word, _length, payload = CAN_FRAME.unpack(data) if len(data) == SIZE else (0, 0, b"")
         if not word & ERR_FLAG:
             self._on_fault(FrameFault.WRONG_LENGTH)
@@ -213,7 +213,8 @@ class Interface:
             self._no_carrier = False
             self._block(state)
         elif state is BusState.UP:
-            # Without an echo nothing else says so, and what is sent before that is dropped.
+            # Without an echo nothing else shows the end of bus-off, and a frame sent before that
+            # end is dropped.
             if self._confirms or self.state is not BusState.BUS_OFF or word & CLASS_RESTARTED:
                 self._up()
         elif state is not None and self.state is self._good:
@@ -224,37 +225,37 @@ class Interface:
             self._receive_errors(STATE_CLASSES, time.monotonic_ns() + QUIET_NS)
 
     def _receive_errors(self, classes: int, until_ns: int) -> None:
-        """Let the kernel hand out error frames of these classes; others wait until a time."""
+        """Receive error frames of these classes only, until a time."""
         self._quiet_until_ns = until_ns
-        with suppress(OSError, IndexError):  # it is gone, and opened again with all of them
+        with suppress(OSError, IndexError):  # gone: it is opened again with all classes
             receive_errors(self._sockets[min(1, len(self._sockets) - 1)], classes)
 
     def _block(self, state: BusState) -> None:
-        """Queue nothing more for a while."""
+        """Set a state in which no frame is queued until the next attempt."""
         self.state = state
         self._not_before_ns = time.monotonic_ns() + PROBE_NS
         self._under_way.clear()
 
     def _blocked(self) -> bool:
-        """Whether this frame must wait; one at a time may try whether it gets through."""
+        """Return whether a frame must not be queued now; a single frame may try now and then."""
         now_ns = time.monotonic_ns()
         if now_ns < self._not_before_ns:
             return True
         if self.state is BusState.BUS_OFF and not self._confirms:
-            return True  # what is sent now looks as if it had left
+            return True  # the kernel would drop it and report no error
         self._not_before_ns = now_ns + PROBE_NS
         self._under_way.clear()
         return False
 
     def look(self) -> str:
-        """Look after carrier and name of the interface, now and then; what to say of its name."""
+        """Check carrier and name of the interface; return a line for the log if it was renamed."""
         if not self._sockets:
             return ""
         one = self._sockets[0]
         try:
             has_carrier = carrier(one)
             text = renamed(one, self._config.channel)
-        except OSError:  # it goes: seen by the next frame
+        except OSError:  # it is going; the next frame shows that
             return ""
         if not self._confirms and has_carrier is not None:
             if has_carrier and self._no_carrier:
@@ -267,7 +268,7 @@ class Interface:
         return text if text != before else ""
 
     def fileno(self) -> int:
-        """File descriptor to wait on; -1 while the interface is gone."""
+        """Return the file descriptor to wait on; -1 while the interface is gone."""
         return self._sockets[0].fileno() if self._sockets else -1
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
-"""python-can's ``udp_multicast`` kept on this machine.
+"""python-can's ``udp_multicast`` restricted to this computer.
 
-python-can itself joins the group on the network card, sends there and takes what comes from there:
-the frames of a bench would reach every computer of the network, and any of them could add some.
+python-can itself joins the group on the network card, and sends and receives there. So every
+computer of the network would receive the frames of a bench, and could send frames to it.
 """
 
 import os
@@ -14,7 +14,7 @@ from can.interfaces.udp_multicast.bus import GeneralPurposeUdpMulticastBus, UdpM
 from canshaper.bus.packet import SO_TIMESTAMPNS
 
 LOOPBACK = "lo"
-PORT = 43113  # that of python-can
+PORT = 43113  # as in python-can
 # linux/in.h, linux/in6.h; Python has no names for these.
 IP_MULTICAST_ALL, IPV6_MULTICAST_ALL = 49, 29
 # struct ip_mreqn: group, address of an interface, its index
@@ -22,13 +22,13 @@ _MEMBERSHIP = struct.Struct("@4s4si")
 
 
 class LocalMulticastBus(UdpMulticastBus):
-    """``udp_multicast`` over the loopback interface: nothing leaves, nothing comes in.
+    """``udp_multicast`` over the loopback interface: no frame leaves or enters this computer.
 
     Args:
-        channel: an IPv4 group, such as 239.1.2.3; every program of this machine may join it.
+        channel: an IPv4 group such as 239.1.2.3; every program on this computer may join it.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the channel is no such group.
         can.CanInitializationError: the loopback interface is down.
     """
 
@@ -37,13 +37,13 @@ class LocalMulticastBus(UdpMulticastBus):
             text = f"expected a group of IPv4 such as 239.1.2.3 or network: true, got {channel}"
             raise ValueError(text)
         self._multicast = _LocalSocket(channel, PORT, hop_limit=0)
-        # Not that of UdpMulticastBus, which joins the group on the network card.
+        # Not the constructor of UdpMulticastBus, which joins the group on the network card.
         can.BusABC.__init__(self, channel)
         self._can_protocol = can.CanProtocol.CAN_FD
 
 
 class _LocalSocket(GeneralPurposeUdpMulticastBus):
-    """Its socket: bound to the group, joined on the loopback interface alone, TTL 0."""
+    """Socket bound to the group and joined on the loopback interface alone, with TTL 0."""
 
     def _create_socket(self, address_family: socket.AddressFamily) -> socket.socket:
         one = socket.socket(address_family, socket.SOCK_DGRAM)
@@ -55,9 +55,9 @@ class _LocalSocket(GeneralPurposeUdpMulticastBus):
             one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
             one.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, membership)
             one.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self.hop_limit)
-            # Only of what this socket has joined, on the interface where it has.
+            # Receive only the group that this socket joined, on the interface where it did.
             one.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
-            one.bind((self.group, self.port))  # nothing that is sent to this machine by its address
+            one.bind((self.group, self.port))  # no datagrams to an address of this computer
             one.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
         except OSError:
             one.close()
@@ -76,8 +76,8 @@ def _is_group(channel: str) -> bool:
 def receive_one_group(fileno: int) -> None:
     """Let a multicast socket receive the frames of its own group only.
 
-    Linux hands it the frames of every group that any program of this machine has joined at the
-    same port, so that two buses would be one.
+    Otherwise Linux delivers the frames of every group that any program on this computer has joined
+    at the same port, so that two buses would be one.
     """
     with socket.socket(fileno=os.dup(fileno)) as one:
         if one.family == socket.AF_INET6:

@@ -1,4 +1,4 @@
-"""Questions to the kernel over rtnetlink; formats of linux/netlink.h and linux/rtnetlink.h."""
+"""Requests to the kernel over rtnetlink; formats of linux/netlink.h and linux/rtnetlink.h."""
 
 import os
 import socket
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 REQUEST, ACKNOWLEDGE, DUMP, ERROR, DONE = 0x1, 0x4, 0x300, 2, 3
 _HEADER = struct.Struct("=IHHII")  # nlmsghdr
 _ATTRIBUTE = struct.Struct("=HH")  # rtattr
-TYPE_MASK = 0x3FFF  # NLA_TYPE_MASK: without the flags for nested and for the byte order
+TYPE_MASK = 0x3FFF  # NLA_TYPE_MASK: a type without its flags for nesting and byte order
 ROOM = 1 << 16
 # linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
 GET_LINK = 18
@@ -19,13 +19,13 @@ KindAndBitrates = tuple[str | None, int | None, int | None]
 
 
 def attribute(kind: int, payload: bytes) -> bytes:
-    """One attribute of a message, filled up to whole words."""
+    """Return one attribute of a message, padded to a multiple of 4 bytes."""
     part = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(payload), kind) + payload
     return part + bytes(-len(part) % 4)
 
 
 def attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """(kind, payload) of each attribute; one that is cut short ends them."""
+    """Yield (kind, payload) of each attribute; end at one with an impossible length."""
     at = 0
     while at + _ATTRIBUTE.size <= len(data):
         length, kind = _ATTRIBUTE.unpack_from(data, at)
@@ -36,12 +36,12 @@ def attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def request(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
-    """Send one request; yield the bodies of the answers.
+    """Send one request, and yield the bodies of the answers.
 
     Args:
         kind: type of the message.
         flags: ACKNOWLEDGE or DUMP, so that the kernel marks the end of its answers.
-        body: behind the header.
+        body: content of the request after its header.
 
     Raises:
         OSError: the kernel refuses, or this process may not open such a socket.
@@ -65,7 +65,7 @@ def request(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
 
 
 def kind_and_bitrates(index: int) -> KindAndBitrates:
-    """Ask the kernel for kind, bit rate and that of the data of an interface.
+    """Ask the kernel for (kind, bit rate, bit rate of the data phase) of an interface.
 
     Raises:
         OSError: there is no such interface, or netlink is not permitted.

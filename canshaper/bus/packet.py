@@ -1,10 +1,9 @@
-"""Received packet: its frame, its arrival, errors that it reports."""
+"""Packets of a SocketCAN socket: the frame in one, its arrival, the bus error that it reports."""
 
 import socket
 import struct
 import time
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Self
 
 from canshaper.codec.frame import (
     EFF_FLAG,
@@ -24,66 +23,51 @@ SIZE = CAN_FRAME.size
 FD_FRAME = struct.Struct("=IBB2x64s")
 FD_SIZE = FD_FRAME.size
 WORD = struct.Struct("=I")
-"""The first member of both: the id with its flags."""
+"""The first member of both structures: the id with its flags."""
 BRS, FDF = 0x01, 0x04
-"""Flags of a frame of CAN FD: its data have a bit rate of their own; it is one of CAN FD."""
+"""Flags of a CAN FD frame: bit rate switch for its data; the frame is CAN FD."""
 
 
-class Packet(NamedTuple):
-    """Unpacked packet of a SocketCAN socket.
+def unpack(packet: bytes) -> tuple[int, bytes, int | None] | None:
+    """Return (id with its flags, data, flags of CAN FD or None) of a packet of a socket.
 
-    Attributes:
-        word: id with its flags.
-        data: up to 8 bytes, of CAN FD up to 64.
-        flags: those of a frame of CAN FD; None of a classical one.
+    A packet without the size of a frame, or with less data than its length says, is None.
     """
-
-    word: int
-    data: bytes
-    flags: int | None = None
-
-    @classmethod
-    def unpack(cls, packet: bytes) -> Self:
-        """Unpack the bytes of the socket, ``FD_SIZE`` at most.
-
-        Raises:
-            struct.error: it has not the size of a frame.
-        """
-        if len(packet) == FD_SIZE:
-            word, length, flags, data = FD_FRAME.unpack(packet)
-            return cls(word, data[:length], flags)
+    flags = None
+    if len(packet) == SIZE:
         word, length, data = CAN_FRAME.unpack(packet)
-        return cls(word, data[:length])
+    elif len(packet) == FD_SIZE:
+        word, length, flags, data = FD_FRAME.unpack(packet)
+    else:
+        return None
+    return (word, data[:length], flags) if length <= len(data) else None
 
-    def pack(self) -> bytes:
-        """Return the bytes for a socket."""
-        if self.flags is None:
-            return CAN_FRAME.pack(self.word, len(self.data), self.data)
-        return FD_FRAME.pack(self.word, len(self.data), self.flags, self.data)
+
+def pack(word: int, data: bytes, flags: int | None = None) -> bytes:
+    """Return the packet of a frame; arguments as ``unpack`` returns them."""
+    if flags is None:
+        return CAN_FRAME.pack(word, len(data), data)
+    return FD_FRAME.pack(word, len(data), flags, data)
 
 
 def frame_of(bus: str, packet: bytes) -> Frame | None:
-    """The data frame in the bytes of a socket; None where there is none in them.
+    """Return the data frame in a packet; None for any other packet.
 
     Args:
         bus: name of the bus in the deployment file.
-        packet: the bytes.
+        packet: bytes that the socket returned.
     """
-    if len(packet) == SIZE:
-        word, length, payload = CAN_FRAME.unpack(packet)
-        if word <= SFF_MASK and length <= 8:  # the most frequent kind first
-            return new_frame(Frame, (bus, word, False, payload[:length]))
-    elif len(packet) == FD_SIZE:
-        word, length, _flags, payload = FD_FRAME.unpack(packet)
-    else:
+    parts = unpack(packet)
+    if parts is None:
         return None
-    if word & (ERR_FLAG | RTR_FLAG) or length > len(payload):
-        return None
-    return Frame(bus, *id_of(word), payload[:length])
+    word, data, _flags = parts
+    if word <= SFF_MASK:  # the most frequent kind first
+        return new_frame(Frame, (bus, word, False, data))
+    return None if word & (ERR_FLAG | RTR_FLAG) else Frame(bus, *id_of(word), data)
 
 
 def kernel_ids(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
-    """The kernel's ids of messages: id, and whether it has 29 bits."""
+    """Return the kernel ids of messages, each given as its id and whether that has 29 bits."""
     return frozenset(i | EFF_FLAG if extended else i for i, extended in messages)
 
 
@@ -93,10 +77,10 @@ ANCILLARY_BYTES = 64  # room for one stamp with its header: CMSG_SPACE, which on
 
 
 def stamp_ns(ancillary: Iterable[tuple[int, int, bytes]]) -> int | None:
-    """Arrival of a frame by the wall clock, ns; None where the kernel gave none.
+    """Return the arrival of a frame by the wall clock, ns; None without a time stamp.
 
     Args:
-        ancillary: what ``recvmsg`` returned, of a socket with SO_TIMESTAMPNS.
+        ancillary: ancillary data that ``recvmsg`` returned from a socket with SO_TIMESTAMPNS.
     """
     for level, kind, value in ancillary:
         if kind == SO_TIMESTAMPNS and level == socket.SOL_SOCKET and len(value) == _STAMP.size:
@@ -106,11 +90,11 @@ def stamp_ns(ancillary: Iterable[tuple[int, int, bytes]]) -> int | None:
 
 
 class Arrivals:
-    """Arrivals of the frames of one port, ns by ``boottime_ns``; never younger than they are.
+    """Arrival times of the frames of one port, ns by ``boottime_ns``; never later than the truth.
 
-    A frame arrived after the port was last seen empty, and before it is read. A wall clock that
-    is set in between makes one of two offsets wrong, the one of then or the one of now: the one
-    that makes the frame older is used.
+    A frame arrived after the port was last seen empty, and before the present read. The kernel
+    stamps it by the wall clock. If someone sets that clock between the two, its offset to
+    ``boottime_ns`` differs between them; the offset that makes the frame older is used.
     """
 
     def __init__(self) -> None:
@@ -122,19 +106,20 @@ class Arrivals:
         """Begin a read of the port.
 
         Returns:
-            Earliest arrival of what is read: when the port was last seen empty.
+            Earliest possible arrival of its frames: the time when the port was last seen empty.
         """
-        # In this order: a standstill between the two makes frames older, not younger.
+        # In this order, a standstill between the two readings makes frames older, not younger.
         self._now_ns = boottime_ns()
         self._now_offset_ns = self._now_ns - time.time_ns()
         self._offset_ns = min(self._now_offset_ns, self._empty_offset_ns)
         return self._empty_ns
 
     def of(self, ancillary: Sequence[tuple[int, int, bytes]]) -> int:
-        """Return the arrival of a frame of this read; the earliest possible one without a stamp.
+        """Return the arrival of a frame in this read; without a stamp the earliest possible one.
 
         Args:
-            ancillary: what ``recvmsg`` returned, of a socket that carries nothing but stamps.
+            ancillary: ancillary data that ``recvmsg`` returned, with no other item than a stamp.
+                To look for the stamp, as ``stamp_ns`` does, would take twice as long.
         """
         try:
             seconds, ns = _STAMP.unpack(ancillary[0][2])
@@ -146,7 +131,7 @@ class Arrivals:
         return arrived_ns if arrived_ns > self._empty_ns else self._empty_ns
 
     def emptied(self) -> None:
-        """Note that nothing waits in the port: later frames arrive after this read began."""
+        """Take note that the port is empty: later frames arrive after this read began."""
         self._empty_ns, self._empty_offset_ns = self._now_ns, self._now_offset_ns
 
 
@@ -155,10 +140,10 @@ OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 
 
 def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
-    """Return the fault to count, and the state of the bus; None where the frame does not say.
+    """Return the fault that an error frame reports, and the state of the bus or None.
 
     Args:
-        word: id of the frame, with its flags.
+        word: id of the error frame, with its flags.
         payload: its 8 bytes.
     """
     controller = payload[1] if word & CLASS_CONTROLLER else 0
@@ -166,6 +151,6 @@ def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
         return FrameFault.BUS_OFF, BusState.BUS_OFF
     if controller & PASSIVE:
         return FrameFault.BUS_PASSIVE, BusState.PASSIVE
-    if word & CLASS_RESTARTED or controller & (ACTIVE | WARNING):  # less than passive
+    if word & CLASS_RESTARTED or controller & (ACTIVE | WARNING):  # counters below passive
         return FrameFault.ERROR_FRAME, BusState.UP
     return FrameFault.FRAMES_LOST if controller & OVERFLOW else FrameFault.ERROR_FRAME, None

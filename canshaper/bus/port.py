@@ -1,7 +1,7 @@
-"""CAN buses of a deployment: SocketCAN by raw sockets, everything else through python-can.
+"""An open CAN bus: SocketCAN by raw sockets, every other interface through python-can.
 
-Every error of a bus is counted and reported, none leaves this module; reading and sending go on
-with the next tick, so an interface that comes back is used again.
+A port counts and reports every error of its bus, and raises none once it is open. It reads and
+sends again at the next tick, and so uses an interface again that comes back.
 """
 
 import errno
@@ -23,11 +23,11 @@ class Port(Protocol):
     """One open bus."""
 
     name: str
-    waited: int  # valve frames that were in the kernel's queue for longer than their cycle
+    waited: int  # number of valve frames that stayed in the kernel's queue beyond their cycle
 
     @property
     def why(self) -> str:
-        """Cause of a state that does not say it; else empty."""
+        """Cause of a state whose name does not say it; otherwise empty."""
 
     @property
     def state(self) -> BusState:
@@ -35,35 +35,35 @@ class Port(Protocol):
 
     @property
     def arrived_ns(self) -> int:
-        """When the frame arrived that ``frames`` has just handed out, by ``boottime_ns``.
+        """Arrival of the last frame that ``frames`` yielded, by ``boottime_ns``.
 
-        Where no one stamps the frames: when the bus was last seen empty, which is before that.
+        Without a time stamp: the earlier time when the bus was last seen empty.
         """
 
     def frames(self) -> Iterator[Frame]:
         """Yield every frame that waits, in order; end when there is none or the bus fails."""
 
     def background(self) -> Iterator[Frame]:
-        """Yield frames that can wait until the valve frames are out, as of senders with our ids."""
+        """Yield frames to read after the valve frames are sent, as of senders with our ids."""
 
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; False when the frame did not go out."""
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether every valve frame that was sent is on the bus; None where nothing says so."""
+        """Whether all valve frames sent are on the bus; None if the bus does not say."""
 
     def look(self) -> str:
-        """Look after the interface, once a second; what to say of it."""
+        """Check the interface, once a second; return a line for the log, or an empty one."""
 
     def watch(self, name: str, ids: BusRoutes) -> None:
-        """Serve another deployment: its name of the bus, its messages."""
+        """Serve another deployment, with its name of the bus and its messages."""
 
     def fileno(self) -> int:
-        """File descriptor to wait on; -1 where there is none."""
+        """Return the file descriptor to wait on; -1 without one."""
 
     def close(self) -> None:
-        """Close the bus; errors of a bus that is gone do not matter any more."""
+        """Close the bus; ignore the errors of a bus that is gone."""
 
 
 def open_port(
@@ -78,10 +78,10 @@ def open_port(
 
     Args:
         name: name of the bus in the deployment file.
-        config: its section.
+        config: section of the bus in the deployment file.
         on_fault: called with every fault of the bus.
-        ids: the messages that matter; None takes all frames.
-        fd: without ``ids``, what is sent in frames of CAN FD.
+        ids: messages to receive and to send; None receives all frames.
+        fd: messages to send as CAN FD frames; used without ``ids`` only.
 
     Raises:
         BusError: the bus cannot be opened, or is another device; the message says which and why.
@@ -97,12 +97,18 @@ def open_port(
         )
     except WrongDeviceError as error:
         raise WrongBusError(name, f"{error}{whereabouts(config)}") from error
-    except Exception as error:  # each interface raises its own kinds
+    except Exception as error:  # each interface raises its own classes
         raise not_opened(name, config, error) from error
 
 
 def not_opened(name: str, config: Bus, error: Exception) -> BusError:
-    """A bus that cannot be opened, in the words of every verb; ``error`` is why."""
+    """Return the error that every verb reports for a bus that cannot be opened.
+
+    Args:
+        name: name of the bus in the deployment file.
+        config: section of the bus.
+        error: error of its interface.
+    """
     text = (error.strerror if isinstance(error, OSError) else None) or str(error)
     if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
         text = "this kernel has no CAN, or its module can_raw is not loaded"
@@ -114,9 +120,9 @@ def not_opened(name: str, config: Bus, error: Exception) -> BusError:
 
 
 class ListeningPort:
-    """A port that sends only what a deployment that listens may send; all else is left out.
+    """A port of a deployment that only listens: it sends status and claims, and no valve frame.
 
-    The last thing before the bus: whatever is sent through it, no valve receives it.
+    It is the last step before the bus, so no error above it can reach a valve.
     """
 
     def __init__(self, port: Port, ids: BusRoutes) -> None:
@@ -131,17 +137,17 @@ class ListeningPort:
 
     @property
     def why(self) -> str:
-        """Cause of the state."""
+        """Cause of a state whose name does not say it; otherwise empty."""
         return self._port.why
 
     @property
     def confirmed(self) -> bool | None:
-        """None: this port sends no valve frame that could be confirmed."""
+        """None, because this port sends no valve frame that could be confirmed."""
         return None
 
     @property
     def arrived_ns(self) -> int:
-        """When the frame arrived that was just handed out."""
+        """Arrival of the last frame that ``frames`` yielded, by ``boottime_ns``."""
         return self._port.arrived_ns
 
     def frames(self) -> Iterator[Frame]:
@@ -149,24 +155,24 @@ class ListeningPort:
         return self._port.frames()
 
     def background(self) -> Iterator[Frame]:
-        """Yield frames that can wait."""
+        """Yield frames to read after the valve frames are sent."""
         return self._port.background()
 
     def send(self, frame: Frame) -> bool:
-        """Send a status; drop anything else, and return True for it."""
+        """Send a status or a claim; drop any other frame, and return True for it."""
         return frame[1:3] not in self._sent or self._port.send(frame)
 
     def look(self) -> str:
-        """Look after the interface."""
+        """Check the interface; return a line for the log, or an empty one."""
         return self._port.look()
 
     def watch(self, name: str, ids: BusRoutes) -> None:
-        """Serve another deployment."""
+        """Serve another deployment, with its name of the bus and its messages."""
         self.name, self._sent = name, ids.sent | ids.claims
         self._port.watch(name, ids)
 
     def fileno(self) -> int:
-        """File descriptor to wait on."""
+        """Return the file descriptor to wait on; -1 without one."""
         return self._port.fileno()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A bus of python-can: whatever its interface raises or waits for, the loop goes on."""
+"""A bus of python-can whose errors and blocking calls never stop the control loop."""
 
 import logging
 from collections import deque
@@ -17,17 +17,21 @@ from canshaper.config.bus import Bus
 from canshaper.machine.buses import ALWAYS_FD
 from canshaper.machine.routing import BusRoutes
 
-# Failures of an interface in one read: a garbled line of an adapter costs that line, and what waits
-# behind it must not grow old; a bus that is gone fails at every call.
+# Most failures of an interface in one read. After a garbled line of an adapter the read continues,
+# because the frames behind it must not grow old. A bus that is gone fails at every call.
 MOST_FAILURES = 20
 
 
 def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
-    """The next frame of a bus, or None where none comes in time; raises as the interface does."""
+    """Return the next frame of a bus, or None if none comes in time.
+
+    Raises:
+        Exception: each interface raises its own classes.
+    """
     try:
         message: can.Message | None = bus.recv(timeout_s)
     except Exception as error:
-        # slcan keeps a line that is no text, and would fail at it for ever.
+        # slcan keeps a line that it cannot decode, and would fail at that line for ever.
         if isinstance(error.__cause__, UnicodeDecodeError):
             getattr(bus, "_buffer", bytearray()).clear()
         raise
@@ -35,12 +39,12 @@ def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
 
 
 def waiting(bus: Any, most: int) -> Iterator[can.Message | Exception | None]:
-    """Yield what waits, or what the interface raised in its place; None where nothing waits."""
+    """Yield up to ``most`` waiting frames and errors of the interface; None when none waits."""
     failures = 0
     for _ in range(most):
         try:
             message = receive(bus)
-        except Exception as error:  # each interface raises its own kinds
+        except Exception as error:  # each interface raises its own classes
             yield error
             failures += 1
             if failures == MOST_FAILURES:
@@ -51,12 +55,12 @@ def waiting(bus: Any, most: int) -> Iterator[can.Message | Exception | None]:
                 return
 
 
-# Frames sent and not yet seen again: a few ticks of a machine with many axes.
+# Most sent frames whose echo is awaited: a few ticks of a machine with many axes.
 MOST_ECHOES = 256
-# Their calls return at once: datagrams, and a queue in memory. Of other interfaces it is not known.
+# Interfaces whose calls return at once: datagrams and a queue in memory. Others may block.
 NEVER_BLOCK = frozenset(("udp_multicast", "virtual"))
-# What an interface is opened with unless the file says otherwise: a read of a serial line waits
-# so long in the middle of a frame, and TCP sends before it has an answer to what it sent last.
+# Options of an interface unless the file sets them: the longest wait of a serial line in the middle
+# of a frame, s; a TCP connection that sends without waiting for the last acknowledgement.
 DEFAULTS: Mapping[str, Mapping[str, Any]] = {
     "serial": {"timeout": 0.01},
     "socketcand": {"tcp_tune": True},
@@ -64,23 +68,26 @@ DEFAULTS: Mapping[str, Mapping[str, Any]] = {
 
 
 class Changed(logging.Filter):
-    """Passes a line of a log only where it is not the one before."""
+    """Passes a line of a log only if it differs from the previous line."""
 
     _last = ""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether it differs from the line before."""
+        """Return whether the line differs from the previous one."""
         text = record.getMessage()
         before, self._last = self._last, text
         return text != before
 
 
-# It writes the same line at each of some ten thousand attempts a second to reach its server.
+# While socketcand tries to reach its server, it logs the same line ten thousand times a second.
 logging.getLogger("can.interfaces.socketcand.socketcand").addFilter(Changed())
 
 
 class PythonCanPort:
-    """One open bus of python-can, without its Notifier: one exception ends that thread for good."""
+    """One open bus of python-can.
+
+    It uses no Notifier of python-can, because a single exception ends the Notifier's thread.
+    """
 
     def __init__(
         self,
@@ -94,24 +101,24 @@ class PythonCanPort:
         self._brs = config.data_bitrate is not None
         self.state = BusState.UP
         self.why = ""
-        self.confirmed = None  # python-can does not say when a frame has left
-        self.waited = 0  # what does not leave in time is dropped, see ``BusApart``
+        self.confirmed = None  # python-can does not report when a frame is on the bus
+        self.waited = 0  # always: ``BusApart`` drops a frame that does not leave in time
         self.arrived_ns = 0
-        self._arrivals = Arrivals()  # before a frame can arrive
+        self._arrivals = Arrivals()  # before the bus can receive a frame
         self._on_fault = on_fault
         self._bus: Any = open_python_can(config)
         self._apart = config.interface not in NEVER_BLOCK
         if self._apart:
-            # Not before it is needed: only POSIX has what it asks of a line.
+            # Imported only here: it uses modules that only POSIX has.
             self._bus = import_module("canshaper.bus.apart").BusApart(self._bus)
-        # Multicast brings back what this process sent; the others do not.
+        # Multicast returns the frames of this process; the other interfaces do not.
         multicast = config.interface == "udp_multicast"
         self._echoes: deque[Frame] | None = deque(maxlen=MOST_ECHOES) if multicast else None
         self._lost = 0
 
     def frames(self) -> Iterator[Frame]:
         """Yield every frame that waits, in order; end when there is none or the bus fails."""
-        # python-can's own times are those of whatever clock an interface has.
+        # The time stamps of python-can are not used: each interface has its own clock.
         self.arrived_ns = self._arrivals.begin()
         if self._apart and (lost := self._bus.lost) != self._lost:
             self._lost = lost
@@ -128,7 +135,7 @@ class PythonCanPort:
                 self.arrived_ns = self._bus.since_ns
             if self.state is not BusState.NOT_CONFIRMED:
                 self.state = BusState.UP
-            if message.is_error_frame:  # first: its id is an error class, and could match
+            if message.is_error_frame:  # first: its id is an error class
                 self._on_fault(FrameFault.ERROR_FRAME)
             elif message.is_remote_frame or (message.is_fd and not self._fd_bus):
                 self._on_fault(FrameFault.WRONG_LENGTH)
@@ -142,7 +149,7 @@ class PythonCanPort:
                     yield frame
 
     def background(self) -> Iterator[Frame]:
-        """Yield nothing: ``frames`` hands out everything."""
+        """Return no frames: ``frames`` yields all of them."""
         return iter(())
 
     def send(self, frame: Frame) -> bool:
@@ -157,7 +164,7 @@ class PythonCanPort:
         )
         try:
             self._bus.send(message)
-        except Exception as error:  # as above
+        except Exception as error:  # each interface raises its own classes
             blocked = self._apart and isinstance(error, can.CanTimeoutError)
             before = self.state
             self.state = BusState.NOT_CONFIRMED if blocked else BusState.FAILED
@@ -171,31 +178,31 @@ class PythonCanPort:
         return True
 
     def look(self) -> str:
-        """Return nothing: python-can knows no more of an interface."""
+        """Return an empty line: python-can knows no more of an interface."""
         return ""
 
     def watch(self, name: str, ids: BusRoutes) -> None:
-        """Serve another deployment: its name of the bus, its messages of CAN FD."""
+        """Serve another deployment, with its name of the bus and its CAN FD messages."""
         self.name, self._fd = name, ids.fd
 
     def fileno(self) -> int:
-        """File descriptor to wait on; -1 where the interface has none."""
+        """Return the file descriptor to wait on; -1 if the interface has none."""
         try:
             return int(self._bus.fileno())
-        except Exception:  # most have none and say so in their own way
+        except Exception:  # most have none, and each raises its own class
             return -1
 
     def close(self) -> None:
-        """Close the bus; errors of a bus that is gone do not matter any more."""
+        """Close the bus; ignore the errors of a bus that is gone."""
         with suppress(Exception):
             self._bus.shutdown()
 
 
 def open_python_can(config: Bus) -> can.BusABC:
-    """Open a bus of python-can; ``udp_multicast`` stays on this machine but with ``network``.
+    """Open a bus of python-can; ``udp_multicast`` stays on this computer unless ``network`` is set.
 
     Raises:
-        Exception: each interface raises its own kinds.
+        Exception: each interface raises its own classes.
     """
     if config.interface == "udp_multicast" and not config.network:
         return LocalMulticastBus(config.channel)
@@ -216,6 +223,6 @@ def open_python_can(config: Bus) -> can.BusABC:
     )
     if config.interface == "udp_multicast":
         receive_one_group(bus.fileno())
-        while bus.recv(0) is not None:  # of other groups, until now
+        while bus.recv(0) is not None:  # frames of other groups received so far
             pass
     return bus

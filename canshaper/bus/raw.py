@@ -1,7 +1,7 @@
-"""A bus on raw sockets that carry the kernel's frames, made for a control loop.
+"""A bus on raw SocketCAN sockets, made for a control loop.
 
-What a valve needs: a frame goes out now or not at all; frames that do not get onto the bus are seen
-and no more are queued behind them; an interface that comes back is used again by itself.
+It serves a valve: a frame leaves now or not at all. The port notices frames that do not get onto
+the bus, and queues no more behind them. It uses an interface again that comes back.
 """
 
 import socket
@@ -13,26 +13,27 @@ from canshaper.bus.packet import (
     ANCILLARY_BYTES,
     BRS,
     CAN_FRAME,
-    FD_FRAME,
     FD_SIZE,
     FDF,
     SIZE,
     WORD,
     frame_of,
     kernel_ids,
+    pack,
 )
 from canshaper.bus.socketcan import ERROR_CLASSES, dropped_frames, set_filters
 from canshaper.codec.frame import EFF_FLAG, BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.machine.routing import BusRoutes
 
-# Frames read in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
-# empties any backlog and still cannot hold up the tick for ever.
+# Most frames read in one tick. At 1 Mbit/s a bus carries 180 frames in 20 ms; ten times as many
+# empty any backlog, and still end the read.
 MOST_FRAMES = 2000
-# Frames of unknown ids read in one tick at most; the rest is dropped, so their count is a minimum.
+# Most frames of unknown ids read in one tick; others are dropped: their count is a lower bound.
 MOST_UNKNOWN = 20
-# States in which a frame of ours that gets onto the bus is news.
+# States that end once a frame of ours gets onto the bus.
 SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.FAILED))
+# States that end once a frame is received, or sent on a bus that confirms none.
 LOST = frozenset((BusState.DOWN, BusState.FAILED))
 _EACH_FRAME = range(MOST_FRAMES)  # made once: it takes as long as a poll
 
@@ -42,14 +43,13 @@ class RawPort(Interface):
 
     Args:
         name: name of the bus in the deployment file.
-        config: its section.
+        config: section of the bus in the deployment file.
         on_fault, ids, open_sockets, has_echo: see ``Interface``.
-        fd: what is sent in frames of CAN FD.
+        fd: messages to send as CAN FD frames.
 
     Attributes:
-        arrived_ns: when the frame arrived that ``frames`` has just handed out, by
-            ``boottime_ns``.
-        waited: valve frames that were in the kernel's queue for longer than their cycle.
+        arrived_ns: arrival of the last frame that ``frames`` yielded, by ``boottime_ns``.
+        waited: number of valve frames that stayed in the kernel's queue beyond their cycle.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class RawPort(Interface):
                 and len(data) == SIZE
                 and (own := CAN_FRAME.unpack(data)) in self._claimed
             ):
-                self._claimed.remove(own)  # a claim; nothing else of ours comes to this socket
+                self._claimed.remove(own)  # of our frames, this socket receives claims only
                 self._confirmed(own[0])
                 continue
             frame = frame_of(name, data)
@@ -109,9 +109,9 @@ class RawPort(Interface):
             yield frame
 
     def background(self) -> Iterator[Frame]:
-        """Take our own frames, seen back; yield frames that can wait until the valves have theirs.
+        """Note which of our frames are on the bus; yield frames to read after the valve frames.
 
-        Frames of other senders with our ids, and of ids that no one knows, are handed out.
+        These are the frames of other senders with our ids, and the frames with unknown ids.
         """
         self._errors = 0
         if self._quiet_until_ns and time.monotonic_ns() >= self._quiet_until_ns:
@@ -155,12 +155,9 @@ class RawPort(Interface):
         if under_way:
             if self._stuck(word):
                 return False
-            # The last one may have its confirmation behind this tick, but the one before it?
+            # The last frame may be confirmed after this tick; a frame before it has waited.
             self.waited += under_way > 1 and word in self._valves
-        if word in self._fd:
-            packed = FD_FRAME.pack(word, len(data), self._fd_flags, data)
-        else:
-            packed = CAN_FRAME.pack(word, len(data), data)
+        packed = pack(word, data, self._fd_flags if word in self._fd else None)
         try:
             self._send(packed)
         except OSError as error:
@@ -182,26 +179,26 @@ class RawPort(Interface):
             self._up()
 
     def _stuck(self, word: int) -> bool:
-        """Whether frames of this id have been under way for too long to queue another one."""
+        """Return whether frames of this id have waited too long to queue another one."""
         waited_ns = self._under_way.waited_ns(word, time.monotonic_ns())
         if not waited_ns:
             return False
         self._on_fault(FrameFault.NOT_CONFIRMED)
         if word in self._valves:
             self._block(BusState.NOT_CONFIRMED)
-        elif waited_ns > PROBE_NS:  # a status message may starve where valves get through
+        elif waited_ns > PROBE_NS:  # valve frames may get through where a status does not
             self._under_way.restart(word)
         return True
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether every valve frame that was sent is on the bus; None where nothing says so."""
+        """Whether all valve frames sent are on the bus; None if the bus does not say."""
         if not self._confirms:
             return None
         return not any(self._unconfirmed.get(word) for word in self._valves)
 
     def watch(self, name: str, ids: BusRoutes) -> None:
-        """Serve another deployment: its name of the bus, its messages."""
+        """Serve another deployment, with its name of the bus and its messages."""
         self.name, self._ids = name, ids
         self._valves, self._claims = kernel_ids(ids.valves), kernel_ids(ids.claims)
         self._fd = kernel_ids(ids.fd)

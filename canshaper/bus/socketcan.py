@@ -1,4 +1,4 @@
-"""SocketCAN sockets: ids to filters, and the options that a control loop needs.
+"""SocketCAN sockets with the filters and options that a control loop needs.
 
 Why not python-can: docs/decisions.md#raw-sockets.
 """
@@ -22,9 +22,10 @@ CAN_RAW_ERR_FILTER = 2
 CAN_INV_FILTER = 0x20000000
 SO_MEMINFO = 55
 MOST_FILTERS = 512  # CAN_RAW_FILTER_MAX
-# linux/can/error.h: all classes but 0x2, a lost arbitration, which is the daily life of a bus.
+# linux/can/error.h: all classes but 0x2, lost arbitration, which is normal on a bus.
 ERROR_CLASSES = 0x1FFFFFFD
-# Those that say the state of the controller: 0x4, 0x40, 0x100. A disturbed bus floods by others.
+# Classes that show the state of the CAN controller: 0x4, 0x40, 0x100. A disturbed bus sends floods
+# of the others.
 STATE_CLASSES = 0x144
 # linux/sockios.h, linux/if.h
 SIOCGIFFLAGS, IFF_UP, IFF_RUNNING = 0x8913, 0x1, 0x40
@@ -32,25 +33,25 @@ NO_ECHO = (
     "it does not say whether a frame got onto the bus (no echo, as slcan), so a cut line to a valve"
     " would trip no axis; another adapter, or unconfirmed: true in its section"
 )
-# Room for the backlog of a long stall; the default holds about 300 frames.
+# Size for the backlog of a long stall; the kernel's default holds about 300 frames.
 RECEIVE_BUFFER_BYTES = 1 << 20
 
 _FILTER = struct.Struct("=II")
-_MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DROPS
+_MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last member is SK_MEMINFO_DROPS
 
 
 def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
-    """Open the sockets of one interface, and look at its device where the deployment names one.
+    """Open the sockets of one interface, and check its device if the deployment file names one.
 
-    With ``ids`` there are three: for the messages that are received; for those that we send, which
-    receives our own frames back, other senders and the error frames; for ids that no one knows. So
-    neither our own frames nor a flood of foreign ones stand before a joystick's. Without ``ids``,
-    one for everything.
+    With ``ids`` there are three. The first receives the messages that we read. The second sends; it
+    receives our own frames back, frames of other senders with our ids, and the error frames. The
+    third receives unknown ids. So neither our own frames nor a flood of others delays a joystick
+    frame. Without ``ids`` there is one socket for all frames.
 
     Raises:
-        OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD, or it
-            would drive valves and confirms no frame.
-        WrongDeviceError: the interface is another device; nothing was sent or received.
+        OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD, or the
+            bus has valves and the interface confirms no frame.
+        WrongDeviceError: the interface is another device; no frame was sent or received.
     """
     opened: list[socket.socket] = []
     try:
@@ -62,10 +63,11 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
         opened[0].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         receive_errors(opened[0 if ids is None else 1], ERROR_CLASSES)
         if ids is not None:
-            # What is sent on the first comes back on the second as another socket's frame, without
-            # MSG_CONFIRM; so it is sent on the second.
+            # We send on the second socket: a frame sent on the first would come back on the second
+            # without MSG_CONFIRM, as the frame of another program.
             opened[1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
-            opened[2].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)  # all, not one
+            # A frame must fit every filter of the third socket, not one of them.
+            opened[2].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)
             set_filters(opened, ids)
         check_present(bus)
         for one in opened:
@@ -82,14 +84,14 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
 
 
 def check_present(bus: Bus, root: Path = ROOT) -> None:
-    """Whether there is an interface of that name, before a socket is bound to it.
+    """Check that an interface of that name exists, before a socket is bound to it.
 
-    Binding to a name that does not exist makes the kernel look for a module that would make the
-    interface: for a process with root's rights up to half a second, in which no axis is driven. An
-    empty name would bind to every interface.
+    If a process with root's rights binds to an unknown name, the kernel searches for a module that
+    provides the interface. That takes up to half a second, in which no axis is driven. An empty
+    name would bind to every interface.
 
     Raises:
-        OSError: ENODEV, there is none.
+        OSError: ENODEV, there is no such interface.
     """
     names = root / "sys/class/net"
     if not bus.channel or (names.is_dir() and not (names / bus.channel).exists()):
@@ -97,32 +99,32 @@ def check_present(bus: Bus, root: Path = ROOT) -> None:
 
 
 def receive_errors(one: socket.socket, classes: int) -> None:
-    """Let a socket receive the error frames of these classes."""
+    """Let a socket receive error frames of these classes only."""
     one.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, classes)
 
 
 def carrier(one: socket.socket) -> bool | None:
-    """Whether an interface has its bus, up to a second late; None where it is down or gone.
+    """Return whether an interface has a carrier, up to a second late; None if it is down or gone.
 
-    Asked without the lock that a change of any interface holds.
+    The request does not wait for the lock that a change of any interface holds.
 
     Args:
-        one: a socket that is bound to it.
+        one: a socket that is bound to the interface.
 
     Raises:
-        OSError: it goes in this moment.
+        OSError: the interface disappears during the request.
     """
     from fcntl import ioctl  # noqa: PLC0415  (only POSIX has it)
 
     name = one.getsockname()[0].encode()
-    if not name:  # it is gone, and the kernel would look for a module of no name
+    if not name:  # it is gone, and the kernel would search for a module without a name
         return None
     flags = struct.unpack_from("=16xH", ioctl(one, SIOCGIFFLAGS, struct.pack("=16s24x", name)))[0]
     return bool(flags & IFF_RUNNING) if flags & IFF_UP else None
 
 
 def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
-    """Say that the interface of a socket has lost its name, and to which; empty where it has it."""
+    """Return a line that names the new name of a renamed interface; empty if it kept its name."""
     name = one.getsockname()[0]
     if name in ("", channel):
         return ""
@@ -133,7 +135,8 @@ def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
 
 def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
     """Let the three sockets receive these messages."""
-    # What the DBC files know besides is left to the reader where it is too much.
+    # If the DBC files have more ids than the kernel allows, the third socket receives them too. The
+    # controller tells them from unknown ids.
     ours = ids.received | ids.sent
     all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]
     whole_kinds = ids.j1939 + len(SERVICES) * ids.canopen
@@ -149,18 +152,18 @@ def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
         if flag and ids.canopen:
             words += [(base, mask | EFF_FLAG) for base, mask, _ in SERVICES]
         if flag and ids.in_line:
-            words = []  # no filter at all: nothing is received
+            words = []  # an empty list of filters: the socket receives no frame
         filters = filter_words((word | flag, mask) for word, mask in words)
         one.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
 
 
 def filter_words(words: Iterable[tuple[int, int]]) -> bytes:
-    """Filters as the kernel takes them: an id and the mask of its bits that matter, each."""
+    """Return filters in the kernel's format, each from an id and the mask of its tested bits."""
     return b"".join(_FILTER.pack(word, mask) for word, mask in words)
 
 
 def dropped_frames(sockets: list[socket.socket]) -> int:
-    """Frames that the kernel has dropped because a receive queue was full."""
+    """Return how many frames the kernel has dropped because a receive queue was full."""
     return sum(
         _MEMINFO.unpack(one.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, _MEMINFO.size))[8]
         for one in sockets
@@ -168,14 +171,14 @@ def dropped_frames(sockets: list[socket.socket]) -> int:
 
 
 def readable(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
-    """Return a function that says whether a socket has something to read within so many ms."""
+    """Return a function that waits so many ms at most, and is true if a socket can be read."""
     poll = select.poll()
     poll.register(one, select.POLLIN)
     return poll.poll
 
 
 def _word_and_mask(message: tuple[int, bool]) -> tuple[int, int]:
-    """Filter for one message: its id in its own width; a mask without the flags fits both."""
+    """Return (id, mask) for one message; the mask tests the width of the id, too."""
     can_id, extended = message
     if extended:
         return can_id | EFF_FLAG, EFF_MASK | EFF_FLAG

@@ -1,1 +1,1 @@
-"""Campaigns: many drives of the real controller, drawn from what is not known of a machine."""
+"""Campaigns: the real controller drives many simulated cranes, drawn from what is uncertain."""

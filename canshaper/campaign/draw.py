@@ -1,8 +1,8 @@
-"""Draw of one drive of a campaign: crane, load, valves, operator, faults.
+"""Draw one drive of a campaign: crane, load, valves, operator, faults.
 
-Everything comes from the drive's seed by NumPy's SeedSequence, in a fixed order: a drive is the
-same in whatever process and order it is driven, and two files that are driven with the same ranges
-meet the same crane and the same operator.
+Every number comes from the seed of the drive by NumPy's SeedSequence, in a fixed order. A drive is
+therefore the same in every process and in every order. Two files with the same ranges get the same
+crane and the same operator for a seed.
 """
 
 import math
@@ -27,26 +27,26 @@ from canshaper_sim.recorder import dwell_s
 from canshaper_sim.recording import DWELL_S
 from canshaper_sim.strokes import Script
 
-# How near an end stop a drive begins that is to meet it.
+# A drive that is to meet an end stop begins within this distance of it.
 _NEAR_M = 1.5
 Parameters = dict[str, Any]
-"""Parameters of the crane that were drawn, in place of its nominal ones."""
-_GUSTS = 0.25  # standard deviation of the wind, of its mean
-# Parts of the drive in which a load is picked up, and put down.
+"""Drawn parameters of the crane; each replaces the nominal one."""
+_GUSTS = 0.25  # standard deviation of the wind speed, as a part of its mean
+# When a load is picked up, and when it is put down, as parts of the drive.
 _PICK_UP, _PUT_DOWN = (0.1, 0.5), (0.5, 0.9)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One drive.
+    """One drawn drive.
 
     Attributes:
         operator: kind of operator.
-        fault: kind of fault, empty without one.
-        factors: numbers that were drawn, by name.
-        script: what the operator does.
-        options: the crane and all else, see ``DriveOptions``.
-        dwell_s: how long after a release what swings is residual.
+        fault: kind of fault; "" for none.
+        factors: the drawn numbers, by name.
+        script: the strokes of the operator.
+        options: crane and loads of the simulation, see ``DriveOptions``.
+        dwell_s: swing counts as residual from this time after a release on.
     """
 
     operator: str
@@ -58,10 +58,10 @@ class Setting:
 
 
 def driven_axes(deployment: Deployment) -> tuple[str | None, list[str]]:
-    """Name of the crane that is driven, of several the first one, and what its axes move.
+    """Return the name of the driven crane (the first of several) and the coordinates it moves.
 
     Raises:
-        CampaignError: its axes move nothing.
+        CampaignError: no axis moves the crane.
     """
     crane = next(iter(cranes(deployment)), None)
     moved = {*driven_part(deployment, crane).coordinates.values()}
@@ -72,11 +72,11 @@ def driven_axes(deployment: Deployment) -> tuple[str | None, list[str]]:
 
 
 def check_same_axes(first: Deployment, second: Deployment) -> None:
-    """Look whether a seed means the same crane and operator with both deployments.
+    """Check that a seed draws the same crane and operator for both deployments.
 
     Raises:
-        CampaignError: they have other axes: the same numbers would be drawn for other things; or
-            their files say of another crane that it is simulated.
+        CampaignError: their axes differ, so that the same number would be drawn for another
+            quantity; or their files simulate different cranes.
     """
     (_, ones), (_, others) = driven_axes(first), driven_axes(second)
     if ones != others:
@@ -98,9 +98,9 @@ def draw_drive(
 
     Args:
         deployment: the machine.
-        seed: of the drive, 0 or more.
-        ranges: from which the crane is drawn.
-        nominal: the crane that the ranges are about.
+        seed: seed of the drive, 0 or more.
+        ranges: ranges of the crane's parameters.
+        nominal: the crane that the ranges refer to; None for that of the file.
         longest_s: longest ``dwell_s`` of all files that are driven with the same seeds.
     """
     of_crane, of_operator, of_load, of_fault, of_place = (
@@ -113,13 +113,13 @@ def draw_drive(
     swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
     operator = of_operator.one_of([*OPERATORS])
     script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
-    duration_s = script.duration_s  # of what the operator does, whatever the tails of the file
+    duration_s = script.duration_s  # of the strokes alone: the tails of the file change no draw
     rest_s = max(dwell_s(driven_part(deployment, crane)), longest_s)
     script = replace(script, duration_s=duration_s + (rest_s - DWELL_S))
     if deployment.config.crane:
         script = script.moving(deployment.by_coordinate)
     loads, of_loads = _loads(of_load, ranges, duration_s, drawn["grapple"])
-    if "rope_m" in factors:  # on a rope every load swings alike
+    if "rope_m" in factors:  # on a rope the period does not depend on the load
         loads, of_loads = [], {}
     sensors = any(axis.sway_sensor for axis in deployment.axes.values())
     fault = _fault(of_fault, ranges, duration_s, sensors=sensors)
@@ -138,7 +138,7 @@ def draw_drive(
 
 
 def on_unit(setting: Setting, unit: Path, nominal: CraneParameters) -> Setting:
-    """The drive of a unit: operator and faults are drawn, the crane is its own."""
+    """Return the drive with an FMU as its crane: only operator and faults stay drawn."""
     drawn = setting.options["parameters"]
     assert drawn
     parameters = replace(nominal, sway_sensor=drawn.sway_sensor)
@@ -149,7 +149,7 @@ def on_unit(setting: Setting, unit: Path, nominal: CraneParameters) -> Setting:
 def _crane(
     draw: Draw, axes: Sequence[str], ranges: Uncertainty, nominal: CraneParameters
 ) -> tuple[Parameters, dict[str, float]]:
-    """Tool, pose and valves; and the numbers that were drawn for them."""
+    """Draw tool, pose and valves; return them and the drawn numbers."""
     factors = {
         "length_pct": draw.between(*ranges.length_pct),
         "damping_pct": draw.between(*ranges.damping_pct),
@@ -168,9 +168,9 @@ def _crane(
         c6_n_m_s_rad=damped * grapple.c6_n_m_s_rad,
     )
     crane: Parameters = {"grapple": grapple}
-    part = kind if by_rope else "joints"  # of the crane, that has axes of its own
+    part = kind if by_rope else "joints"  # that holds the parameters of the axes
     own: Parameters = {}
-    if by_joints:  # they reach the start that they were given, not any
+    if by_joints:  # joints cannot reach every radius: they begin at that of the file
         del factors["radius_m"]
     elif by_rope:
         own = _on_rope(getattr(nominal, kind), factors)
@@ -198,7 +198,7 @@ def _crane(
 
 
 def _clamp(factors: dict[str, float], name: str, crane: Any) -> float:
-    """Bring a length that was drawn within what the crane has, and return it."""
+    """Clamp a drawn length to the range of the crane; write it back and return it."""
     low: float = getattr(crane, f"{name}_min_m")
     high: float = getattr(crane, f"{name}_max_m")
     factors[f"{name}_m"] = clamped = min(max(factors[f"{name}_m"], low), high)
@@ -206,7 +206,7 @@ def _clamp(factors: dict[str, float], name: str, crane: Any) -> float:
 
 
 def _on_rope(nominal: Any, factors: dict[str, float]) -> Parameters:
-    """Return the rope that was drawn, and the radius where one was."""
+    """Return the parameters of the drawn rope, and of the radius where one was drawn."""
     own: Parameters = {}
     if "radius_m" in factors:
         own["start_radius_m"] = _clamp(factors, "radius", nominal)
@@ -220,9 +220,9 @@ def _on_rope(nominal: Any, factors: dict[str, float]) -> Parameters:
 def _place(
     draw: Draw, axes: Sequence[str], ranges: Uncertainty, nominal: CraneParameters, seed: int
 ) -> tuple[Parameters, dict[str, float]]:
-    """Pump, ground and wind, and how near its stops the tip is; what was drawn of them.
+    """Draw pump, ground, wind and a start near an end stop; return them and the drawn numbers.
 
-    A crane with a rope has none of them.
+    A crane with a rope gets none of them.
     """
     if kind_of(axes) in ON_ROPE:
         return {}, {}
@@ -254,7 +254,7 @@ def _place(
 def _loads(
     draw: Draw, ranges: Uncertainty, duration_s: float, empty: Grapple
 ) -> tuple[list[tuple[float, Grapple]], dict[str, float]]:
-    """When something else hangs from the tip, and what was drawn of it."""
+    """Draw a load; return what hangs from the tip from when on, and the drawn numbers."""
     loaded = draw.between(0.0, 100.0) < ranges.load_change_pct
     mass, lower_m = draw.between(*ranges.load_mass), draw.between(*ranges.load_m)
     times_s = [duration_s * draw.between(*part) for part in (_PICK_UP, _PUT_DOWN)]
@@ -265,7 +265,7 @@ def _loads(
 
 
 def _fault(draw: Draw, ranges: Uncertainty, duration_s: float, *, sensors: bool) -> Fault:
-    """Draw a fault of bus or sensor, or none."""
+    """Draw a fault of the bus or of a sensor, or none."""
     of_bus, of_sensor = draw.between(0.0, 100.0), draw.between(0.0, 100.0)
     if of_bus < ranges.bus_fault_pct:
         return bus_fault(draw, duration_s)

@@ -1,7 +1,7 @@
-"""Work on a Dask cluster or in jobs of Slurm, with the results of this machine's processes.
+"""Work on a Dask cluster or in Slurm jobs, with the same results as in processes of this machine.
 
-Every piece is done once, and its result handed out once, whatever becomes of the process that had
-it: one that dies costs time, no result.
+Each job yields one result. A worker that dies costs time, but no result: another worker does its
+job again.
 """
 
 import signal
@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 from canshaper.errors import CampaignError, WorkerError
 from canshaper.machine.identity import program_sha256
 
-# A scheduler answers at once, or is not there; workers of a batch system may start later.
+# A scheduler answers at once or is absent; a batch system may start its workers later.
 CONNECT_S, WORKERS_S = 10.0, 60.0
 
 J = TypeVar("J")
@@ -25,14 +25,14 @@ class Engine(Protocol):
     """Where work is done."""
 
     def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Do every job; each with its result, in any order.
+        """Do every job; yield each job with its result, in any order.
 
         Args:
-            work: what to do; a function of a module, or ``functools.partial`` of one.
-            jobs: taken one by one, a few more than are being done.
+            work: does one job; a function of a module, or a ``functools.partial`` of one.
+            jobs: read one by one, a few ahead of those that are done.
 
         Raises:
-            CampaignError: the processes die of it, or the cluster is gone.
+            CampaignError: a job kills its workers, or the cluster does not answer.
         """
 
 
@@ -42,8 +42,8 @@ class Cluster:
 
     Attributes:
         scheduler: its address, such as tcp://10.0.0.1:8786.
-        on_refusal: called with what is wrong with a worker that is given nothing more.
-        workers_s: how long to wait for the first worker; None for ever.
+        on_refusal: called with the reason why a worker gets no more jobs.
+        workers_s: time to wait for the first worker; None for no limit.
     """
 
     scheduler: str
@@ -51,7 +51,7 @@ class Cluster:
     workers_s: float | None = WORKERS_S
 
     def __post_init__(self) -> None:
-        """Check the address; a client that has begun with a wrong one takes half a minute to end.
+        """Check the address here: a client with a wrong one takes half a minute to end.
 
         Raises:
             CampaignError: ``scheduler`` is no address.
@@ -92,7 +92,7 @@ class Cluster:
                 done.add(future)
 
             def fill() -> None:
-                """Give every core four jobs; workers come and go, one job is always under way."""
+                """Keep four jobs for each core under way; one job where all workers are gone."""
                 most = max(1, 4 * sum(client.ncores().values()))
                 for job in islice(waiting, max(0, most - len(doing))):
                     submit(job)
@@ -116,13 +116,13 @@ class Cluster:
 
 @dataclass
 class Slurm:
-    """Jobs of Slurm, each a worker of a Dask scheduler in this process.
+    """Slurm jobs, each one a worker of a Dask scheduler in this process.
 
-    Queue, account, cores and memory of a job are those of the user's Dask configuration; without
-    one a job has one core.
+    The user's Dask configuration gives queue, account, cores and memory of a job; without it a job
+    has one core.
 
     Attributes:
-        count: how many jobs.
+        count: number of Slurm jobs.
         on_refusal: see ``Cluster``.
     """
 
@@ -130,27 +130,31 @@ class Slurm:
     on_refusal: Callable[[str], object] = field(default=lambda _text: None)
 
     def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Do every job; see ``Engine``. It waits until Slurm has begun one of its own."""
+        """Do every job; see ``Engine``. The first one waits until Slurm has started a worker."""
         import dask  # noqa: PLC0415  (an extra)
 
         ctrl_c = signal.getsignal(signal.SIGINT)
         from dask_jobqueue import SLURMCluster  # noqa: PLC0415  (the same)
 
-        signal.signal(signal.SIGINT, ctrl_c)  # the import makes it an exit with status 0
+        signal.signal(signal.SIGINT, ctrl_c)  # the import replaces Ctrl-C by an exit with status 0
         given = dask.config.get("jobqueue.slurm")
         defaults = {"cores": 1, "memory": "1 GB", "log_directory": "out/slurm"}
         options = {name: given[name.replace("_", "-")] or one for name, one in defaults.items()}
         page = given["scheduler-options"] | {"dashboard": False, "dashboard_address": ":0"}
         with SLURMCluster(**options, scheduler_options=page) as slurm:
             _try_job(slurm.job_script())
-            # Unlike `scale` it replaces a job that ends, at its time limit or otherwise.
+            # Unlike `scale` it replaces a job that ends, for example at its time limit.
             slurm.adapt(minimum_jobs=self.count, maximum_jobs=self.count)
             workers = Cluster(slurm.scheduler_address, self.on_refusal, None)
             yield from workers.run(work, jobs)
 
 
 def _try_job(script: str) -> None:
-    """Let Slurm say whether it would take a job; afterwards its answer is in a log only."""
+    """Ask Slurm whether it accepts the job script: a later refusal would be in a log only.
+
+    Raises:
+        CampaignError: it does not, or this machine has no sbatch.
+    """
     try:
         done = subprocess.run(
             ["sbatch", "--test-only"], input=script, capture_output=True, text=True, check=False
@@ -163,7 +167,11 @@ def _try_job(script: str) -> None:
 
 
 def _others(client: Any, refused: set[str]) -> dict[str, Any]:
-    """Where a job may run: anywhere, until a worker was refused."""
+    """Return the options of a job that keep it away from refused workers.
+
+    Raises:
+        CampaignError: every worker was refused.
+    """
     if not refused:
         return {}
     workers = [address for address in client.ncores() if address not in refused]
@@ -173,7 +181,11 @@ def _others(client: Any, refused: set[str]) -> dict[str, Any]:
 
 
 def _checked(program: str, work: Callable[[J], R], job: J) -> R:
-    """Do a job in a worker, if it runs the same program."""
+    """Do a job in a worker that runs the same program.
+
+    Raises:
+        WorkerError: the worker runs another version.
+    """
     if (own := program_sha256()) != program:
         from distributed import get_worker  # noqa: PLC0415  (an extra)
 

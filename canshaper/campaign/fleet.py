@@ -1,24 +1,29 @@
-"""Filters for a fleet: the worst drives of a campaign leave least.
+"""Filters for a fleet: the design whose worst drives of a campaign leave the least swing.
 
-``robust`` and ``tune`` cover a box of lengths, each of them alike. A fleet is what the section
-"uncertainty" draws: lengths, damping, loads that are picked up, valves, operators. Its candidates
-are designs of every swinging axis, for a middle and a range of lengths. Each drives the same
-drives, in C, and that one is taken whose worst twentieth leaves least on average: fewer drives
-settle that than their 99th percentile, which falls with it. Drives that no candidate has seen judge
-it.
+``robust`` and ``tune`` weigh all lengths of a range alike. A fleet is what the section
+"uncertainty" draws: lengths, damping, loads, valves, operators. A candidate is a design of every
+swinging axis for one range of lengths. All candidates do the same drives, in C. The best one has
+the least mean residual swing over its worst twentieth: this mean needs fewer drives than the 99th
+percentile, and falls with it. Other drives, which chose no candidate, judge the best one.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache, partial
 
 from canshaper.campaign.draw import Setting, draw_drive
-from canshaper.campaign.fleet_filters import (
+from canshaper.campaign.fleet_candidates import (
+    BOX,
+    CHOOSING,
+    FILE,
+    FLEET,
     GFF,
+    JUDGING,
+    OTHER,
     ROBUST,
     Candidate,
+    Driven,
     FleetFilter,
+    Rows,
     designed,
     fitted,
     swinging,
@@ -33,50 +38,16 @@ from canshaper.report.console import OnProgress
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import dwell_s
 
-# Seeds of the drives that choose and of those that judge; a campaign begins with 0.
-CHOOSING = range(1_000_000, 1_000_400)
-JUDGING = range(2_000_000, 2_001_000)
-# Share of the worst drives whose mean is to be least.
-_WORST = 0.05
-# Option of the run-on.
+# Option of the command line that sets the run-on.
 _OPTIONS = {ROBUST: "--duration", GFF: "--max-run-on"}
-# Candidates: middle as a part of the way from the shortest length to the longest, and range, on
-# which a G_FF that its run-on holds does not depend.
+# Candidates: middle, 0 at the shortest length and 1 at the longest, and half the range as a part of
+# the middle. A G_FF whose run-on is given does not depend on the range: it has one.
 _MIDDLES = (0.15, 0.3, 0.45)
 _RANGES = {ROBUST: (0.1, 0.2, 0.3), GFF: (0.2,)}
-_BEFORE = 0.9  # of the time from which on swing is left: what runs on longer swings then
-_DURATIONS = (0.8, 0.9, 1.0, 1.1, 1.2)  # of the front, of the run-on that is asked for
+_BEFORE = 0.9  # of dwell_s: what runs on longer is counted as residual swing
+_DURATIONS = (0.8, 0.9, 1.0, 1.1, 1.2)  # run-ons of the front, of the one asked for
 
 
-@dataclass(frozen=True)
-class Driven:
-    """Drives of a candidate.
-
-    Attributes:
-        candidate: it; None for the file as it is.
-        filters: of each swinging axis.
-        left_deg: residual swing of each drive; of one that swings over its largest.
-        run_on_s: of each drive, until the tip stands.
-        why: there are no such filters, and so no drives.
-    """
-
-    candidate: Candidate | None
-    filters: Sequence[FleetFilter] = ()
-    left_deg: list[float] = field(default_factory=list)
-    run_on_s: list[float] = field(default_factory=list)
-    why: str = ""
-
-    @property
-    def worst_deg(self) -> float:
-        """Mean of what the worst drives leave."""
-        count = math.ceil(_WORST * len(self.left_deg))
-        return math.fsum(sorted(self.left_deg)[-count:]) / count
-
-
-FILE, BOX, FLEET, OTHER = "the file", "box of lengths", "for the fleet", "fleet, robust"
-Rows = Mapping[str, Sequence[Driven]]
-"""Of the file, of the box of all lengths, of the best of each run-on, and next to G_FF of the best
-robust shapers; some may be none."""
 Known = Mapping[Candidate | None, Sequence[FleetFilter]]
 
 
@@ -91,28 +62,28 @@ def design_fleet(
 ) -> tuple[Driven, Rows]:
     """Design the filters of all swinging axes for the fleet of the file.
 
-    G_FF stands next to robust shapers of the run-on that is asked for.
+    A G_FF is compared with robust shapers of the same run-on.
 
     Args:
         deployment: the machine.
-        kind: of the filters, robust or gff.
-        duration_s: see ``Candidate``; None for that of the file's responses, or one swing, and of
-            G_FF a little less than the time from which on swing counts as left.
-        workers: drive the candidates.
-        on_progress: called with the part that is done.
-        front: quicker and slower ones too.
+        kind: kind of the filters, robust or gff.
+        duration_s: see ``Candidate``. None: of robust the longest response in the file, or one
+            swing; of G_FF a little less than ``dwell_s``.
+        workers: processes that drive the candidates.
+        on_progress: called with the part that is done, 0 to 1.
+        front: also design for shorter and longer run-ons.
 
     Returns:
-        The design, and all rows, as the drives judge them that it has not seen.
+        The design, and all rows, measured over the drives that judge.
 
     Raises:
-        ConfigError: the C has no part for the machine.
-        DesignError: no axis can be designed so.
-        NativeError: no C can be compiled.
-        UsageError: the tail is shorter than the run-on, or there is no such filter.
+        ConfigError: the C does not support the machine.
+        DesignError: no axis swings, or one has several filters.
+        NativeError: the C cannot be compiled.
+        UsageError: the run-on exceeds ``tail_s``, or no filter keeps it.
     """
     axes, option = swinging(deployment), _OPTIONS[kind]
-    NativeCrane(deployment)  # its faults are named before anything begins
+    NativeCrane(deployment)  # raises its errors before any work begins
     longest_s = min(deployment.axes[name].config.limits.tail_s for name in axes)
     usual_s = _BEFORE * dwell_s(deployment) if kind == GFF else _duration_s(deployment, axes)
     asked_s = duration_s or min(longest_s, usual_s)
@@ -125,7 +96,7 @@ def design_fleet(
     groups = {(kind, one): [*_grid(kind, low, high, one)] for one in durations}
     groups[ROBUST, asked_s] = [*_grid(ROBUST, low, high, asked_s)]
     grid = [one for group in groups.values() for one in group]
-    count = len(grid) + len(groups) + 2  # of those that are judged: the file and the box
+    count = len(grid) + len(groups) + 2  # 2: the file and the box are only judged
     source, done = Source.of(deployment, deployment.config.uncertainty), 0
 
     def drive(
@@ -162,14 +133,14 @@ def _grid(kind: str, low: float, high: float, duration_s: float) -> Iterator[Can
 
 
 def _duration_s(deployment: Deployment, axes: Mapping[str, Sway]) -> float:
-    """Longest response in the file, or one swing where none says how long it is."""
+    """Return the longest response in the file, or one swing where no filter states its length."""
     made = (deployment.axes[name].config.filter.design() for name in axes)
     own = [one.duration_s for one in made if one and one.duration_s]
     return max(own, default=max(sway.mode().period_s for sway in axes.values()))
 
 
 def _lengths(deployment: Deployment) -> tuple[float, float]:
-    """Shortest and longest pendulum of the drives that choose, as parts of the nominal one."""
+    """Return the shortest and the longest drawn pendulum, as parts of the nominal length."""
     nominal = changed_parameters([], deployment)
     lengths = []
     for seed in CHOOSING:
@@ -181,13 +152,8 @@ def _lengths(deployment: Deployment) -> tuple[float, float]:
     return min(lengths), max(lengths)
 
 
-def _driven(
-    source: Source,
-    seeds: range,
-    known: Known,
-    candidate: Candidate | None,
-) -> Driven:
-    """Drive a candidate; one whose filters are not known is designed first."""
+def _driven(source: Source, seeds: range, known: Known, candidate: Candidate | None) -> Driven:
+    """Drive a candidate; design its filters first where ``known`` lacks them."""
     deployment, filters = source.load(), known.get(candidate)
     if candidate:
         try:
@@ -209,7 +175,11 @@ def _driven(
 
 @cache
 def _drives(path: str, files: tuple[tuple[str, bytes], ...], seeds: range) -> list[Setting]:
-    """Drives without a fault of bus or sensor, drawn once in a process."""
+    """Return the drives without a fault that the C supports; each process draws them once.
+
+    Raises:
+        DesignError: there is none.
+    """
     deployment = loaded(path, files)
     native, nominal = NativeCrane(deployment), changed_parameters([], deployment)
     drawn = [draw_drive(deployment, s, deployment.config.uncertainty, nominal) for s in seeds]

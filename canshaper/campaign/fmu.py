@@ -1,4 +1,4 @@
-"""The simulated crane in C as a co-simulation unit, for another's controller or operator."""
+"""The simulated crane in C as a co-simulation unit, for the controller of another tool."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -7,7 +7,7 @@ from canshaper.campaign.native import grapple_numbers, is_simple, steps_of, valv
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.fmu import Unit, Variable
-from canshaper.native.source import real
+from canshaper.native.library import real
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW, TIP_AXES
 from canshaper_sim.cranes import cranes
 from canshaper_sim.parameters import changed_parameters
@@ -25,7 +25,8 @@ def plant_unit(deployment: Deployment) -> Unit:
     """Return the simulated crane of a deployment as a unit.
 
     Raises:
-        ConfigError: the C has no part for something of it.
+        ConfigError: there are several cranes, or one that the C does not support: one with
+            joints or a rope, a slope, wind or too little oil.
     """
     crane, axes = changed_parameters([], deployment), deployment.by_coordinate
     moves_tip = not {*deployment.coordinates.values()} - {*TIP_AXES}

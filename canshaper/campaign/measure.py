@@ -1,4 +1,4 @@
-"""One drive of a campaign, measured while it is driven: no frame is recorded."""
+"""Drive and measure one drive of a campaign; no frame is recorded."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -22,10 +22,10 @@ from canshaper_sim.plant import PlantNode
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 Row = dict[str, Any]
-"""Row of one drive: seed, operator, fault, what was drawn, what was measured."""
+"""Row of one drive: seed, operator, fault, drawn numbers, measures."""
 
 
-# One drive in so many is driven by both engines.
+# Both engines drive each drive whose seed is a multiple of this.
 BOTH_OF = 50
 
 
@@ -42,21 +42,21 @@ def measured_drive(
 ) -> Row:
     """Draw a drive, drive it and measure it; see ``draw_drive``.
 
-    A broken promise is a valve frame that the gate had to refuse: it knows nothing of how
-    the controller makes a frame, only what was asked and what the limits are. In C there is none.
+    A promise is broken where the gate refuses a valve frame. The gate knows demands and limits, but
+    not how the controller makes a frame. A drive in C has no gate.
 
     Args:
         deployment: the machine.
-        seed: of the drive.
-        ranges: from which the crane is drawn.
-        nominal: the crane that the ranges are about.
-        native: drives what it can; one drive in ``BOTH_OF`` is driven by both.
-        both: this one is.
+        seed: seed of the drive.
+        ranges: ranges of the crane's parameters.
+        nominal: the crane that the ranges refer to.
+        native: the engine in C, for the drives that it supports; None for Python alone.
+        both: drive with both engines, whatever the seed; see ``BOTH_OF``.
         longest_s: see ``draw_drive``.
-        unit: FMU in place of the crane.
+        unit: path of an FMU that replaces the crane.
 
     Raises:
-        CampaignError: both drive it, and not alike.
+        CampaignError: the two engines measured different values.
     """
     setting = draw_drive(deployment, seed, ranges, nominal, longest_s)
     nominal = nominal or changed_parameters([], deployment)
@@ -82,7 +82,7 @@ def _row(
     nominal: CraneParameters,
     native: NativeCrane | None = None,
 ) -> Row:
-    """The row of a setting."""
+    """Drive a setting, and with anti-sway off too where a switch can do that; return its row."""
     drive = _Drive(deployment, setting, nominal, native)
     off = switches_off(deployment) and not setting.fault
     raw = _Drive(deployment, setting, nominal, native, bypass=True) if off else None
@@ -101,13 +101,13 @@ def _row(
 class _Drive:
     """A drive of a setting, driven and measured.
 
-    One whose grapple swings above the horizontal ends there: what comes after that says nothing,
-    and it leaves as much as its largest swing.
+    The drive ends when the grapple swings above the horizontal, where the model does not hold; its
+    residual swing is then its largest swing.
 
     Attributes:
-        measures: see ``MEASURES``.
-        refused: valve frames that the gate has refused, with their times.
-        swung_over: its grapple swung above the horizontal.
+        measures: measures by the names of ``MEASURES``.
+        refused: valve frames that the gate refused, with their times.
+        swung_over: the grapple swung above the horizontal.
     """
 
     def __init__(
@@ -128,12 +128,12 @@ class _Drive:
             self.measures = tracks.measures(crane_only=bypass)
         if self.swung_over:
             self.measures["residual_deg"] = self.measures["peak_deg"]
-            self.measures["still_s"] = setting.script.duration_s  # it never is, at least so long
+            self.measures["still_s"] = setting.script.duration_s  # never still: the whole drive
 
     def _simulate(
         self, deployment: Deployment, setting: Setting, tracks: "_Tracks", bypass: bool
     ) -> bool:
-        """Drive in Python, behind the gate; whether it swung over."""
+        """Drive in Python, behind the gate; return whether the grapple swung over."""
         options: DriveOptions = {**setting.options, "bypass": bypass}
         simulation = Simulation(deployment, setting.script, **options)
         plant = simulation.plant
@@ -148,9 +148,9 @@ class _Drive:
 
 
 class _Tracks:
-    """Tracks of the crane, tick by tick, and the measures of them at the end.
+    """States of the crane, tick by tick, and their measures at the end.
 
-    Speeds are parts of the nominal full speeds: what the operator expects of a deflection.
+    Speeds are parts of the nominal full speeds, which the operator expects of full deflection.
     """
 
     def __init__(self, deployment: Deployment, setting: Setting, nominal: CraneParameters) -> None:
@@ -172,13 +172,13 @@ class _Tracks:
         self._along: list[float] = []
 
     def add(self, time_ms: int, plant: PlantNode) -> None:
-        """Take the state of the crane after a tick."""
+        """Store the state of the crane after a tick."""
         moves = self._moves
         crane, commands, speeds = plant.crane, self._commands, self._speeds
         self._t_s.append(time_ms / 1000.0)
         state = crane.state
         self._poses.append((state.theta1_rad, state.radius_m))
-        # A slope and the wind hold the grapple askew: that is no swing.
+        # The lean of the grapple on a slope and in the wind is no swing.
         across, along = crane.rest_rad
         self._across.append(math.degrees(state.theta5_rad - across))
         self._along.append(math.degrees(state.theta6_rad - along))
@@ -189,7 +189,7 @@ class _Tracks:
     def measures(self, *, crane_only: bool) -> dict[str, float | None]:
         """Return the measures of the drive by the names of ``MEASURES``; None for a missing one.
 
-        ``crane_only``: those of its axes are left out.
+        ``crane_only``: leave out the measures of the axes.
         """
         across, along = self._across, self._along
         swing = [*map(math.hypot, across, along)]
@@ -223,13 +223,13 @@ class _Tracks:
         }
 
     def _sway(self, moved: str) -> list[float] | None:
-        """Swing that the axis of a coordinate makes; None for one that makes none."""
+        """Return the swing that a coordinate excites, deg; None where it excites none."""
         if moved in WITHOUT_SWAY:
             return None
         return self._across if moved in (SLEW, BRIDGE) else self._along
 
     def _travel_errors(self, axes: Mapping[str, AxisTrace]) -> Iterator[float]:
-        """Yield the travel error of each axis: its way less the joystick's, s of full speed."""
+        """Yield the travel error of each axis: travel less demanded travel, in s of full speed."""
         for name, axis in axes.items():
             most = self._limits[name].maximum
             commanded = math.fsum(min(max(one, -most), most) for one in axis.joystick)

@@ -1,7 +1,7 @@
-"""Drives of a campaign in C: joysticks, controller, crane and measures, equal to Python's.
+"""Drives of a campaign in C: joysticks, controller, crane and measures, equal to those in Python.
 
-Draws are Python's, and frames that a bus disturbs. What the C has no part for is left to Python,
-drive by drive; the gate is Python's too, so that only Python's drives say whether it refuses.
+Python draws each drive, and makes the frames that a bus fault disturbs. Python also drives what the
+C does not support. The C has no gate: only a drive in Python shows whether the gate refuses.
 """
 
 import ctypes
@@ -32,7 +32,7 @@ from canshaper_sim.valve_frames import CommandReader
 
 SOURCES = Path(__file__).with_name("c")
 QUICK = ("-O3", "-flto", "-fno-semantic-interposition")
-PROBES = 256  # of sine, cosine and exponential function, which libraries round differently
+PROBES = 256  # of sine, cosine and exponential function: libraries round them differently
 _FRAME_BYTES = 12
 _ARRIVAL = np.dtype([("number", "i4"), ("changed", "u1", CLASSICAL_BYTES)])
 _VALVE = (
@@ -43,9 +43,9 @@ _MEASURES = (
     *("still_s", "residual_deg", "peak_deg", "run_on_s", "run_on_m"),
     *("travel_error_s", "dip_pct"),
 )
-_COLUMNS = 13  # of what is measured
+_COLUMNS = 13  # time series that the C measures
 _GRAPPLE = ("l1_m", "l2_m", "m1_kg", "m2_kg", "c5_n_m_s_rad", "c6_n_m_s_rad", "g_m_s2")
-# Of what the C has no part for: as it is by default.
+# Parameters that the C does not support: they have to keep their defaults.
 _ABSENT = ("boom", "contact", "log", "pump_flow", "ends")
 _PLAIN = CraneParameters()
 _UNCOMPENSATED = ("load", "load_per_t")
@@ -64,7 +64,7 @@ class _Joystick(ctypes.Structure):
 
 
 def _drive_type(joysticks: int) -> type[ctypes.Structure]:
-    """``plant_drive``, with so many joysticks."""
+    """Return the struct ``plant_drive`` for this number of joysticks."""
 
     class Drive(ctypes.Structure):
         _fields_ = (
@@ -85,11 +85,11 @@ class NativeCrane:
     Args:
         deployment: the machine.
         sources: folder of the C of crane and measures.
-        keeps: what is compiled, for the next time.
+        keeps: store the compiled library for later processes.
 
     Raises:
-        ConfigError: the C has no part for something of the deployment.
-        NativeError: it cannot be compiled here, or its arithmetic is another one.
+        ConfigError: the C does not support something of the deployment.
+        NativeError: the C cannot be compiled here, or its arithmetic differs from Python's.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class NativeCrane:
         cache = _cache_folder() if keeps else None
         try:
             library = NativeLibrary(deployment, *QUICK, *files, cache=cache)
-        except NativeError:  # a compiler that has no link-time optimisation
+        except NativeError:  # the compiler has no link-time optimisation
             library = NativeLibrary(deployment, *files, cache=cache)
         self._c, self._deployment = library.c, deployment
         _check_functions(self._c)
@@ -136,7 +136,7 @@ class NativeCrane:
         self._numbered = Numbered(JoystickNode(deployment, still))
 
     def has(self, setting: Setting) -> bool:
-        """Whether the C has a part for all of the crane that was drawn."""
+        """Whether the C supports the drawn crane."""
         parameters = setting.options["parameters"]
         return parameters is not None and is_simple(parameters)
 
@@ -146,12 +146,12 @@ class NativeCrane:
         """Drive a setting and measure it.
 
         Args:
-            setting: what was drawn; see ``has``.
-            nominal: the crane whose full speeds a deflection asks for.
-            bypass: anti-sway is switched off.
+            setting: the drawn drive, which ``has`` accepts.
+            nominal: the crane whose full speeds the operator expects of full deflection.
+            bypass: drive with anti-sway off.
 
         Returns:
-            The measures, None for a missing one; and whether it swung over.
+            The measures by name, None for a missing one, and whether the grapple swung over.
         """
         options, tick_ms = setting.options, self._deployment.config.tick_ms
         parameters, script = options["parameters"], setting.script
@@ -199,7 +199,7 @@ class NativeCrane:
         return {name: None if math.isnan(one) else one for name, one in named}, bool(swung_over)
 
     def _arrivals(self, hands: Joysticks, ticks: int) -> tuple[Any, Any]:
-        """How many joystick frames come in each tick, and which ones, as arrays."""
+        """Return the number of joystick frames in each tick, and these frames, as arrays."""
         tick_ms = self._deployment.config.tick_ms
         by_tick = [hands.frames_of_tick(k * tick_ms, tick_ms) for k in range(ticks)]
         came = [frame for frames in by_tick for frame in frames]
@@ -211,7 +211,11 @@ class NativeCrane:
 
 
 def _cache_folder() -> Path:
-    """Folder of what was compiled, for no one else to write into."""
+    """Return the folder of compiled libraries, into which no other user may write.
+
+    Raises:
+        NativeError: it cannot be made.
+    """
     root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     folder = Path(root) / "canshaper" / "native"
     try:
@@ -224,10 +228,10 @@ def _cache_folder() -> Path:
 
 
 def _check_functions(c: Any) -> None:
-    """Hold the functions of the C's mathematics library against Python's.
+    """Compare sin, cos and exp of the C's mathematics library with Python's.
 
     Raises:
-        NativeError: one is rounded otherwise.
+        NativeError: one of them rounds differently.
     """
     out = (ctypes.c_double * 3)()
     for k in range(PROBES):
@@ -238,7 +242,7 @@ def _check_functions(c: Any) -> None:
 
 
 def _wiring(deployment: Deployment, axis: str | None) -> dict[str, int]:
-    """Where the valve of an axis finds its command."""
+    """Return where the simulated valve of an axis finds its command in the frames."""
     if axis is None:
         return {"axis": -1}
     reader = CommandReader(deployment, axis)
@@ -247,13 +251,13 @@ def _wiring(deployment: Deployment, axis: str | None) -> dict[str, int]:
 
 
 def steps_of(tick_ms: int) -> dict[str, Any]:
-    """How a tick is divided for the crane."""
+    """Return length and number of the integration steps of a tick."""
     steps = math.ceil(tick_ms / 1000.0 / INTERNAL_STEP_S - 1e-9)
     return {"step_s": tick_ms / 1000.0 / steps, "steps": steps}
 
 
 def valve_numbers(parameters: CraneParameters, axis: str) -> dict[str, float]:
-    """Return the valve of an axis, its full speed and its ends, in the order of the C."""
+    """Return valve, full speed, start and end stops of an axis, in the order of the C."""
     number = TIP_AXES.index(axis)
     of = (("slew", "theta1_rad", "rad"), ("radius", "radius_m", "m"), ("height", "height_m", "m"))
     name, start, unit = of[number]
@@ -268,12 +272,12 @@ def valve_numbers(parameters: CraneParameters, axis: str) -> dict[str, float]:
 
 
 def grapple_numbers(grapple: Grapple) -> Sequence[float]:
-    """Return a grapple in the order of the C."""
+    """Return the parameters of a grapple in the order of the C."""
     return [getattr(grapple, name) for name in _GRAPPLE]
 
 
 def is_simple(p: CraneParameters) -> bool:
-    """Whether the C has all that this crane does."""
+    """Whether the C supports every parameter of this crane."""
     valves = [getattr(p, axis) for axis in TIP_AXES]
     compensated = not any(getattr(one, name) for one in valves for name in _UNCOMPENSATED)
     calm = p.carrier.level and not (p.wind.speed_m_s or p.wind.gust_m_s)

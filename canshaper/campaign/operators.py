@@ -1,4 +1,4 @@
-"""Operators of a drive, and faults that happen in it."""
+"""Operators and faults of a drive, drawn at random."""
 
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -14,37 +14,37 @@ from canshaper_sim.axes import WITHOUT_SWAY
 from canshaper_sim.operator import random_script, reach_s
 from canshaper_sim.strokes import Script, Stroke
 
-# After the last stroke: the dwell of the residual, and more than a swing to see it in.
+# After the last stroke: the dwell of the residual swing, and over one period to measure it in.
 REST_S = 5.0
 _START_S = 0.5
 _RAMP_S = (0.1, 0.4)
-_LEVEL = (0.25, 1.2)  # a part of them is full deflection
+_LEVEL = (0.25, 1.2)  # those above 1 are clamped: full deflection is frequent
 _RANDOM_S = 15.0
 
 T = TypeVar("T")
 
 
 class Draw:
-    """Uniform numbers of one stream.
+    """Uniform random numbers.
 
     Args:
-        sequence: the stream.
+        sequence: seed of the numbers.
     """
 
     def __init__(self, sequence: np.random.SeedSequence) -> None:
         self._source = np.random.Generator(np.random.PCG64(sequence))
 
     def between(self, low: float, high: float) -> float:
-        """Number from low to high."""
+        """Draw a number from low to high."""
         return low + (high - low) * float(self._source.random())
 
     def one_of(self, choices: Sequence[T]) -> T:
-        """One of these, each as likely as another."""
+        """Draw one of these, all equally likely."""
         return choices[int(self.between(0.0, len(choices)))]
 
 
 class _Hand:
-    """Strokes that do not carry the boom out of its reach."""
+    """An operator's hand, whose strokes keep the boom within its reach."""
 
     def __init__(self, draw: Draw, axes: Sequence[str]) -> None:
         self._draw, self._reach_s = draw, reach_s(axes)
@@ -52,7 +52,7 @@ class _Hand:
         self.strokes: list[Stroke] = []
 
     def stroke(self, axis: str, start_s: float, duration_s: float, level: float) -> Stroke:
-        """One more; turned round or shorter where it would go too far."""
+        """Add a stroke and return it; reverse or shorten one that would leave the reach."""
         low_s, high_s = self._reach_s[axis]
         travel_s = self._travel_s.get(axis, 0.0)
         if not low_s <= travel_s + level * duration_s <= high_s:
@@ -66,7 +66,7 @@ class _Hand:
         return stroke
 
     def level(self) -> float:
-        """A deflection in any direction."""
+        """Draw a deflection in either direction."""
         return min(1.0, self._draw.between(*_LEVEL)) * self._draw.one_of((-1, 1))
 
 
@@ -111,7 +111,7 @@ def _swinging(axes: Sequence[str]) -> Sequence[str]:
 def _resting(
     strokes: Callable[[Draw, Sequence[str]], Sequence[Stroke]],
 ) -> "Callable[[Draw, Sequence[str], str], Script]":
-    """Return a maker of scripts with these strokes and a rest at the end."""
+    """Return a function that makes a script of these strokes and a rest at the end."""
 
     def script(draw: Draw, axes: Sequence[str], name: str) -> Script:
         drawn = tuple(strokes(draw, axes))
@@ -127,7 +127,7 @@ OPERATORS: Mapping[str, Callable[[Draw, Sequence[str], str], Script]] = {
     "reversals": _resting(_reversals),
     "both": _resting(_both),
 }
-"""Operators by name; called with the stream, the axes of the crane and a name for the script."""
+"""Operators by name; each takes the random numbers, the axes of the crane and the script's name."""
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,9 @@ class Fault:
     """One fault.
 
     Attributes:
-        name: what it is; empty for none.
-        disturb: stands between joysticks and bus.
-        sensor: parameters of the sway sensors that are different.
+        name: kind of fault; "" for none.
+        disturb: puts a disturbed bus behind the joysticks; None for a good bus.
+        sensor: parameters of the sway sensors that the fault changes.
     """
 
     name: str
@@ -146,14 +146,14 @@ class Fault:
 
 
 class _Disturbed:
-    """Joysticks behind a bad bus for a part of the drive.
+    """Joysticks behind a bus that is disturbed for a part of the drive.
 
     Args:
-        joysticks: those who hold them.
-        kind: lost, late, garbled: what becomes of a frame.
-        share: of the frames that it happens to.
-        ms: from and to when.
-        seed: of the choice.
+        joysticks: source of the frames.
+        kind: lost, late or garbled: what happens to a disturbed frame.
+        share: share of the frames that are disturbed.
+        ms: begin and end of the disturbance.
+        seed: seed of the choice of frames.
     """
 
     def __init__(
@@ -181,10 +181,12 @@ class _Disturbed:
 
 
 class Numbered:
-    """Joystick frames with their numbers for ids, and no bit of them set, the same in every drive.
+    """Joystick frames whose id is their number and whose bits are all 0, the same in every drive.
+
+    Behind a disturbed bus they show which frames arrive, and which bits of them are inverted.
 
     Args:
-        joysticks: those who hold them, whatever they do.
+        joysticks: give the times and lengths of the frames.
     """
 
     def __init__(self, joysticks: Joysticks) -> None:
@@ -202,7 +204,7 @@ class Numbered:
 
 
 def bus_fault(draw: Draw, duration_s: float) -> Fault:
-    """Joystick frames that are lost, late by a tick or with a wrong bit, or all of a while gone."""
+    """Draw a bus fault: joystick frames are lost, late by a tick, have a wrong bit, or all stop."""
     kind = draw.one_of(("silent", "lost", "late", "garbled"))
     share, begin_s = draw.between(0.02, 0.5), draw.between(0.0, 0.8 * duration_s)
     long_s, seed = draw.between(0.1, 0.5), int(draw.between(0.0, 2**31))
@@ -216,6 +218,6 @@ def bus_fault(draw: Draw, duration_s: float) -> Fault:
 
 
 def sensor_fault(draw: Draw, duration_s: float) -> Fault:
-    """A sway sensor that fails at some time."""
+    """Draw a fault of the sway sensor and its time."""
     kind = draw.one_of(("lost", "stuck", "reversed", "jump"))
     return Fault(f"sensor {kind}", sensor={f"{kind}_s": draw.between(0.0, duration_s)})

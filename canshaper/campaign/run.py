@@ -1,4 +1,4 @@
-"""A campaign: which drives there are, who drives them, and what is kept of them."""
+"""Run a campaign: choose the drives, drive them, keep their rows."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -20,23 +20,23 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 from canshaper_sim.parameters import changed_parameters
 
-# Drives in one piece of work: a second of it.
+# Drives in one job, which takes about a second.
 _DRIVES = 16
 Seeds = tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Source:
-    """A deployment as it is sent to where it is driven.
+    """A deployment as it is sent to a worker.
 
     Attributes:
-        path: of the deployment file.
-        files: content of it and of its DBC files, by their absolute paths.
-        ranges: from which its cranes are drawn; of two files that are compared, those of the first.
-        changes: parameters of the nominal crane, NAME=VALUE.
-        engine: native or python; what C has no part for is Python's.
-        longest_s: longest ``dwell_s`` of the files that are compared; see ``draw_drive``.
-        unit: FMU in place of the crane.
+        path: path of the deployment file.
+        files: content of this file and of its DBC files, by absolute path.
+        ranges: ranges of the crane's parameters; of two compared files those of the first.
+        changes: changed parameters of the nominal crane, NAME=VALUE.
+        engine: native or python; Python drives what the C does not support.
+        longest_s: longest ``dwell_s`` of the compared files; see ``draw_drive``.
+        unit: path of an FMU that replaces the crane.
     """
 
     path: str
@@ -63,20 +63,23 @@ class Source:
         return cls(str(path), files, ranges, tuple(changes), engine, longest_s)
 
     def load(self) -> Deployment:
-        """Load the deployment, once in a process."""
+        """Return the deployment; each process loads it once."""
         return loaded(self.path, self.files)
 
     def native(self) -> NativeCrane | ConfigError | None:
-        """Controller and crane in C, once in a process; why not, or None without ``engine``.
+        """Return controller and crane in C; each process compiles them once.
+
+        Returns:
+            The error where the C does not support the machine; None where ``engine`` is python.
 
         Raises:
-            NativeError: it cannot be compiled here, or its arithmetic is another one.
+            NativeError: the C cannot be compiled here, or its arithmetic differs from Python's.
         """
         return _native(self.path, self.files) if self.engine == "native" else None
 
     @property
     def about(self) -> dict[str, Any]:
-        """Identity of the drives: only drives with the same identity go together."""
+        """Identity of the drives: a folder keeps drives of one identity only."""
         unit = [sha256(self.unit.read_bytes()).hexdigest()] if self.unit else []
         content = sha256(b"".join(sha256(data).digest() for _, data in self.files)).hexdigest()
         return {
@@ -90,7 +93,7 @@ class Source:
 
 @cache
 def loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deployment:
-    """The deployment, once in a process: from where it lies, or elsewhere from what was sent."""
+    """Return the deployment, from its own files or, where these differ, from the sent ones."""
     try:
         if all(Path(path).read_bytes() == data for path, data in files):
             return load_deployment(Path(source_path))
@@ -114,7 +117,7 @@ def _native(source_path: str, files: tuple[tuple[str, bytes], ...]) -> NativeCra
 
 
 def drive_all(source: Source, seeds: Seeds, *, both: int = -1) -> list[Row]:
-    """Draw, drive and measure each of some drives; the one named ``both`` by both engines."""
+    """Draw, drive and measure drives; return their rows. Both engines drive the seed ``both``."""
     deployment = source.load()
     nominal = changed_parameters([*source.changes], deployment)
     native = source.native()
@@ -127,10 +130,10 @@ def drive_all(source: Source, seeds: Seeds, *, both: int = -1) -> list[Row]:
 
 
 def shard_of(seeds: range, shard: str | None) -> range:
-    """One of N shares of a campaign, I/N; all of it without one.
+    """Return share I of N of the seeds, for a shard I/N; all of them for None.
 
     Raises:
-        CampaignError: there is no such share, or no drive in it.
+        CampaignError: the shard is not I/N, or its share has no drive.
     """
     if shard is None:
         return seeds
@@ -149,17 +152,17 @@ def run_campaign(
     store: Store,
     on_progress: Callable[[int], object],
 ) -> None:
-    """Make every drive that is not kept yet, and keep it; what is done is kept however it ends.
+    """Do every drive that the store lacks. It keeps the finished ones even after an error.
 
     Args:
-        engine: who drives.
-        source: what is driven.
-        seeds: the drives.
-        store: where they are kept.
-        on_progress: called with the number of drives that are done.
+        engine: does the drives.
+        source: the deployment.
+        seeds: seeds of the drives.
+        store: keeps the rows.
+        on_progress: called with the number of finished drives.
 
     Raises:
-        CampaignError: the engine cannot go on, or the disk takes no more.
+        CampaignError: the engine fails, or the disk is full.
     """
     left = [seed for seed in seeds if seed not in store.seeds]
     done = len(seeds) - len(left)

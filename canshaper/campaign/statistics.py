@@ -1,4 +1,4 @@
-"""Figures of many drives, and how sure they are: no distribution is assumed of anything."""
+"""Statistics of many drives, with confidence bounds that assume no distribution."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,33 +8,44 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from canshaper.config.desk import MEASURES, QUANTILES
+
+Columns = Mapping[str, Sequence[Any]]
+"""A value of each drive, by the name of its column."""
 CONFIDENCE = 0.95
-# A factor is cut into so many parts, with as many drives each, to see what it explains.
+# The range of a factor is divided into so many parts, each with the same number of drives.
 _PARTS = 10
 
 
 @dataclass(frozen=True)
 class Quantile:
-    """A quantile of a measure, with the bounds that hold for its true value.
+    """A quantile of a measure, with the confidence bounds of its true value.
 
     Attributes:
-        value: of the drives that were made.
-        low: the true one is not below; None where there are too few drives to say.
-        high: nor above; the same.
+        value: quantile of the drives.
+        low: lower bound; None where the drives are too few for one.
+        high: upper bound; None where the drives are too few for one.
     """
 
     value: float
     low: float | None
     high: float | None
 
+    def __str__(self) -> str:
+        """Return the value with its bounds; "?" for a missing one."""
+        low, high = ("?" if bound is None else f"{bound:.3g}" for bound in (self.low, self.high))
+        return f"{self.value:.3g} ({low}..{high})"
+
 
 def quantile(values: Sequence[float], share: float, confidence: float = CONFIDENCE) -> Quantile:
-    """Quantile by order statistics: the number of drives below the true one is binomial.
+    """Return a quantile with its bounds by order statistics.
+
+    The number of drives below the true quantile has a binomial distribution.
 
     Args:
-        values: one a drive, in any order.
-        share: which quantile, such as 0.99.
-        confidence: that the true one lies between the bounds, at least.
+        values: one value for each drive, in any order.
+        share: the quantile, such as 0.99.
+        confidence: least probability that the true quantile lies between the bounds.
 
     Raises:
         ValueError: there are no values.
@@ -53,15 +64,20 @@ def quantile(values: Sequence[float], share: float, confidence: float = CONFIDEN
     )
 
 
-def most_of(events: int, count: int, confidence: float = CONFIDENCE) -> float:
-    """Largest share of all drives that may have an event (one-sided, Clopper and Pearson).
+def named_quantiles(values: Sequence[float]) -> dict[str, Quantile]:
+    """Return the quantiles of a measure that a campaign states, by name."""
+    return {name: quantile(values, share) for name, share in QUANTILES.items()}
 
-    Without any event it is 1 - (1 - confidence)^(1 / count), for .95 nearly 3 / count.
+
+def most_of(events: int, count: int, confidence: float = CONFIDENCE) -> float:
+    """Return the largest share of all drives that may have an event (Clopper-Pearson, one-sided).
+
+    Without an event it is 1 - (1 - confidence)^(1 / count): nearly 3 / count for 0.95.
 
     Args:
-        events: drives that had it.
-        count: drives that were made.
-        confidence: that the true share is not larger.
+        events: number of drives with the event.
+        count: number of drives.
+        confidence: probability that the true share is not larger.
     """
     if events >= count:
         return 1.0
@@ -73,10 +89,10 @@ class Influence:
     """Influence of one factor on a measure.
 
     Attributes:
-        name: the factor.
-        explained: part of the variance of the measure's ranks that it explains by itself, whatever
-            the shape; corrected for chance.
-        trend: Spearman's rank correlation, whose sign says the direction; None of a word.
+        name: name of the factor.
+        explained: part of the variance of the measure's ranks that the factor alone explains, by a
+            relation of any shape; corrected for chance.
+        trend: Spearman's rank correlation; its sign is the direction. None for a factor of words.
     """
 
     name: str
@@ -87,11 +103,11 @@ class Influence:
 def influences(
     factors: Mapping[str, Sequence[Any]], measure: Sequence[float | None]
 ) -> list[Influence]:
-    """Factors by what they explain of a measure, the largest first.
+    """Return the factors, ordered by how much of a measure they explain.
 
     Args:
-        factors: of each factor a number or a word for every drive.
-        measure: of every drive; those without one are left out.
+        factors: by the name of the factor a number or a word for each drive.
+        measure: the measure of each drive; a drive with None is left out.
     """
     keep = [k for k, value in enumerate(measure) if value is not None]
     if len(keep) < 2 * _PARTS:
@@ -121,3 +137,43 @@ def _influence(name: str, column: Sequence[Any], ranks: Any) -> Influence | None
     free, parts = len(ranks) - 1, int(used.sum())
     within = (total - between) / (free + 1 - parts)
     return Influence(name, max(0.0, 1.0 - within * free / total), trend)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One measure of two files, over the same drives.
+
+    Attributes:
+        first: quantiles of the first file.
+        second: quantiles of the second file.
+        better: of the drives that differ, the share in which the second file has less.
+        median: median of the second less the first, drive by drive.
+    """
+
+    first: Mapping[str, Quantile]
+    second: Mapping[str, Quantile]
+    better: float
+    median: Quantile
+
+
+def differences(first: Columns, second: Columns) -> dict[str, Difference]:
+    """Compare the measures of two files over the drives without a fault that both have."""
+    rows = [
+        {seed: k for k, seed in enumerate(one["seed"]) if not one["fault"][k]}
+        for one in (first, second)
+    ]
+    both = sorted(rows[0].keys() & rows[1].keys())
+    by_measure = {}
+    for measure in MEASURES:
+        pairs = [(first[measure][rows[0][s]], second[measure][rows[1][s]]) for s in both]
+        pairs = [(a, b) for a, b in pairs if a is not None and b is not None]
+        if not pairs:
+            continue
+        ones, others = zip(*pairs, strict=True)
+        differ = [b - a for a, b in pairs]
+        unequal = [one for one in differ if one]
+        better = sum(one < 0.0 for one in unequal) / len(unequal) if unequal else 0.0
+        by_measure[measure] = Difference(
+            named_quantiles(ones), named_quantiles(others), better, quantile(differ, 0.5)
+        )
+    return by_measure

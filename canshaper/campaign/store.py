@@ -1,7 +1,7 @@
-"""Rows of a campaign on the disk: Parquet files in a folder, one row a drive, each drive once.
+"""Rows of a campaign on the disk: a folder of Parquet files, with one row for each drive.
 
-A file is written under another name and put in its place at once: what a program that ends, a full
-disk or a power loss leaves behind is whole. Any program that reads Parquet reads the folder.
+A file is written under another name and then renamed: after a crash, on a full disk and after a
+power loss every file of the folder is whole. Any program that reads Parquet reads the folder.
 """
 
 import json
@@ -16,12 +16,12 @@ import pyarrow.parquet as pq
 
 from canshaper.errors import CampaignError
 
-# Rows that wait in memory, at most, and for how long: so much a power loss costs.
+# Most rows that wait in memory, and how long at most: a power loss costs no more than these.
 MOST_ROWS = 1000
 MOST_S = 30.0
 _KEY = b"canshaper"
 _TYPES = {bool: pa.bool_(), int: pa.int64(), str: pa.string(), float: pa.float64()}
-# Of columns whose first value may be missing.
+# Types of the columns that may have no value, and are no measures.
 _KNOWN = {"seed": pa.int64(), "operator": pa.string(), "fault": pa.string(), "why": pa.string()}
 
 
@@ -29,14 +29,14 @@ class Store:
     """The rows of one folder.
 
     Args:
-        folder: made where it is not there.
-        about: what the drives are of; another folder's or program's are refused.
+        folder: the folder; it is made where it does not exist.
+        about: identity of the drives, see ``Source.about``.
 
     Attributes:
-        seeds: of the drives that are kept.
+        seeds: seeds of the drives that are kept.
 
     Raises:
-        CampaignError: the folder has rows of something else, or cannot be read.
+        CampaignError: the folder has drives of another identity, or cannot be read.
     """
 
     def __init__(self, folder: Path, about: dict[str, Any]) -> None:
@@ -52,7 +52,7 @@ class Store:
         self._look()
 
     def add(self, rows: Iterable[dict[str, Any]]) -> None:
-        """Keep rows; those of a drive that is there already are left out."""
+        """Add rows; leave out those whose drive is kept already."""
         for row in rows:
             if row["seed"] not in self.seeds:
                 self.seeds.add(row["seed"])
@@ -61,10 +61,10 @@ class Store:
             self.flush()
 
     def flush(self) -> None:
-        """Put what waits on the disk.
+        """Write the waiting rows to the disk, all or none.
 
         Raises:
-            CampaignError: the disk does not take it; nothing of it is there.
+            CampaignError: the disk refuses them.
         """
         self._flushed_s = monotonic()
         others = self._look()
@@ -77,7 +77,7 @@ class Store:
             metadata={_KEY: self._about.encode()},
         )
         path = self.folder / f"drives-{rows[0]['seed']:09d}.parquet"
-        # No program reads it as a part of the folder, and no two campaigns write the same one.
+        # Readers pass over this name, and no other process uses it.
         half = path.with_name(f".{path.name}.{os.getpid()}")
         try:
             pq.write_table(pa.Table.from_pylist(rows, schema), half)
@@ -93,10 +93,10 @@ class Store:
         self._rows = []
 
     def merge(self, folder: Path) -> int:
-        """Take the rows of another folder, file by file; how many were new.
+        """Add the rows of another folder; return how many were new.
 
         Raises:
-            CampaignError: they are of something else, or there are none.
+            CampaignError: its drives have another identity, or it has none.
         """
         before = len(self.seeds)
         files = parts(folder)
@@ -109,7 +109,7 @@ class Store:
         return len(self.seeds) - before
 
     def columns(self, names: Sequence[str] | None = None) -> dict[str, list[Any]]:
-        """Columns of all rows on the disk, in the order of the seeds."""
+        """Return the columns of all rows on the disk, ordered by seed."""
         tables = [_read(path, names) for path in parts(self.folder)]
         if not tables:
             return {}
@@ -117,7 +117,7 @@ class Store:
         return {name: table[name].to_pylist() for name in table.column_names}
 
     def _look(self) -> set[int]:
-        """Seeds in files that are new: first all, later what another campaign has put here."""
+        """Return the seeds of the files that are new: another campaign may write here too."""
         new = set(parts(self.folder)) - self._files
         seeds: set[int] = set()
         for path in new:
@@ -137,7 +137,7 @@ class Store:
 
 
 def parts(folder: Path) -> list[Path]:
-    """The files of a folder."""
+    """Return the Parquet files of a folder, ordered by name."""
     return sorted(folder.glob("drives-*.parquet"))
 
 
@@ -149,13 +149,13 @@ def _read(path: Path, names: Sequence[str] | None = None) -> Any:
 
 
 def _type(rows: list[dict[str, Any]], name: str) -> Any:
-    """Type of a column: that of its first value; of one without any that of a measure."""
+    """Return the type of a column: that of its first value, a float where it has none."""
     values: Iterator[Any] = (row[name] for row in rows if row[name] is not None)
     return _TYPES[type(next(values, 0.0))]
 
 
 def _differs(expected: str, kept: str) -> str:
-    """Return how a folder differs from the one expected, for an error."""
+    """Return the first difference between two identities, for an error message."""
     ours, theirs = json.loads(expected), json.loads(kept) if kept else {}
     keys = [key for key in ours if ours[key] != theirs.get(key)]
     key = keys[0] if keys else "file"

@@ -9,34 +9,35 @@ from rich.table import Table
 
 from canshaper.campaign.statistics import (
     CONFIDENCE,
+    Columns,
+    Difference,
     Influence,
     Quantile,
     influences,
     most_of,
-    quantile,
+    named_quantiles,
 )
-from canshaper.config.desk import MEASURES, QUANTILES
+from canshaper.config.desk import MEASURES
 from canshaper.report.console import new_table
 
-Columns = Mapping[str, Sequence[Any]]
-# Not drawn, but measured or noted of a drive.
+# Columns that are not drawn.
 _OUTCOMES = ("seed", *MEASURES, "raw_deg", "broken", "why", "swung_over", "fault", "engine")
 WORST = 10
-# A drive is worse than without canshaper where it leaves so much more swing, deg.
+# A drive is worse than with anti-sway off where it leaves so much more swing, deg.
 MORE_DEG = 0.3
-# What the worst drives are sorted by, and what is looked into first.
+# The measure that orders the worst drives, and whose factors are shown.
 FIRST = "residual_deg"
 
 
 @dataclass(frozen=True)
 class Promises:
-    """Drives in which the gate had to refuse a valve frame.
+    """Drives in which the gate refused a valve frame.
 
     Attributes:
-        drives: all that the gate saw, those with faults too.
-        broken: those that broke one.
-        most: largest share of all drives that may break one.
-        why: of the first of them.
+        drives: number of drives with a gate, with and without faults.
+        broken: number of drives with a refused frame.
+        most: upper bound of their share of all drives.
+        why: seed, time and reason of the first one; "" where there is none.
     """
 
     drives: int
@@ -47,13 +48,13 @@ class Promises:
 
 @dataclass(frozen=True)
 class Worse:
-    """Drives without a fault that leave more swing than with anti-sway off, plus ``MORE_DEG``.
+    """Drives without a fault that leave over ``MORE_DEG`` more swing than with anti-sway off.
 
     Attributes:
-        drives: all that were driven in both ways.
-        worse: how many do.
+        drives: number of drives that were also driven with anti-sway off.
+        worse: number of drives that leave more swing.
         low, high: bounds of their share.
-        seeds: of the five worst, with what each leaves and what it leaves with anti-sway off, deg.
+        seeds: seeds of the five worst, each with its swing and that with anti-sway off, deg.
     """
 
     drives: int
@@ -65,13 +66,13 @@ class Worse:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One limit of the file.
+    """Verdict on one limit of the file.
 
     Attributes:
-        key: of ``accept``.
-        limit: the most that it may be.
-        quantile: that of the drives.
-        kept: its upper bound is within the limit; without one it is not shown.
+        key: key of the limit in ``accept``.
+        limit: largest value that is accepted.
+        quantile: quantile of the drives.
+        kept: the upper bound of the quantile is within the limit; False where there is no bound.
     """
 
     key: str
@@ -85,14 +86,14 @@ class Summary:
     """Summary of all drives of a campaign.
 
     Attributes:
-        quantiles: by measure and quantile, of the drives without a fault of bus or sensor.
-        faulty: the same, of those with one.
-        counts: of drives without and with a fault, and of those whose grapple swung over.
-        engines: how many drives were driven by each: native, python, both.
-        promises, worse: see there.
-        influences: of the measures, each factor.
-        worst: the drives that leave the most swing, without a fault.
-        verdicts: of the limits of the file.
+        quantiles: quantiles of the drives without a fault, by measure and name.
+        faulty: quantiles of the drives with a fault.
+        counts: number of drives without a fault, with one, and with a grapple that swung over.
+        engines: number of drives by engine: native, python, both.
+        promises, worse: see their classes.
+        influences: factors by measure, the one that explains most first.
+        worst: drives without a fault that leave the most swing.
+        verdicts: one for each limit of the file.
     """
 
     quantiles: Mapping[str, Mapping[str, Quantile]]
@@ -116,23 +117,23 @@ class Summary:
 
 
 def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
-    """Figures of all drives.
+    """Summarise all drives.
 
     Args:
-        columns: of every drive, see ``Store``.
+        columns: columns of all drives, see ``Store.columns``.
         accept: limits by their keys in the file.
     """
     faults = columns["fault"]
     sound = _where(columns, [not fault for fault in faults])
     faulty = _where(columns, [bool(fault) for fault in faults])
-    quantiles = _quantiles(sound)
+    of_sound = _quantiles(sound)
     broken = [k for k, count in enumerate(columns["broken"]) if count]
     engines = dict(Counter(columns["engine"]))
     drives = len(columns["seed"]) - engines.get("native", 0)
     why = f"drive {columns['seed'][broken[0]]} at {columns['why'][broken[0]]}" if broken else ""
     factors = {name: column for name, column in sound.items() if name not in _OUTCOMES}
     return Summary(
-        quantiles,
+        of_sound,
         _quantiles(faulty),
         {
             "without_fault": len(sound["seed"]),
@@ -144,12 +145,12 @@ def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
         _worse(sound),
         {measure: influences(factors, sound[measure]) for measure in MEASURES},
         worst(sound),
-        [_verdict(key, limit, quantiles) for key, limit in accept.items()],
+        [_verdict(key, limit, of_sound) for key, limit in accept.items()],
     )
 
 
 def _worse(columns: Columns) -> Worse:
-    """Compare each drive with the same one with anti-sway off."""
+    """Compare each drive with the same drive with anti-sway off."""
     of = columns["seed"], columns[FIRST], columns.get("raw_deg", [None] * len(columns["seed"]))
     pairs = [(s, a, b) for s, a, b in zip(*of, strict=True) if a is not None and b is not None]
     worse = sorted((one for one in pairs if one[1] > one[2] + MORE_DEG), key=lambda o: o[2] - o[1])
@@ -168,17 +169,13 @@ def _where(columns: Columns, keep: Sequence[bool]) -> dict[str, list[Any]]:
 
 
 def _quantiles(columns: Columns) -> dict[str, dict[str, Quantile]]:
-    """Return quantiles by measure and share; no measure that no drive has."""
-    quantiles = {}
-    for measure in MEASURES:
-        values = [value for value in columns[measure] if value is not None]
-        if values:
-            quantiles[measure] = {name: quantile(values, part) for name, part in QUANTILES.items()}
-    return quantiles
+    """Return the quantiles by measure and name; leave out a measure that no drive has."""
+    had = {one: [value for value in columns[one] if value is not None] for one in MEASURES}
+    return {measure: named_quantiles(values) for measure, values in had.items() if values}
 
 
 def worst(columns: Columns) -> list[dict[str, Any]]:
-    """The drives that leave the most swing, without a fault; the worst one first."""
+    """Return the drives without a fault that leave the most swing, the worst one first."""
     faults = columns["fault"]
     order = sorted(
         (k for k, value in enumerate(columns[FIRST]) if value is not None and not faults[k]),
@@ -194,55 +191,13 @@ def _verdict(key: str, limit: float, quantiles: Mapping[str, Mapping[str, Quanti
     return Verdict(key, limit, one, one.high is not None and one.high <= limit)
 
 
-@dataclass(frozen=True)
-class Difference:
-    """One measure of two files, over the same drives.
-
-    Attributes:
-        first: quantiles of the first file.
-        second: of the second one.
-        better: share of the drives in which the second one has less, of those that differ.
-        median: of the second less the first, drive by drive.
-    """
-
-    first: Mapping[str, Quantile]
-    second: Mapping[str, Quantile]
-    better: float
-    median: Quantile
-
-
-def differences(first: Columns, second: Columns) -> dict[str, Difference]:
-    """Measure by measure, over the drives that both have, without a fault."""
-    rows = [
-        {seed: k for k, seed in enumerate(one["seed"]) if not one["fault"][k]}
-        for one in (first, second)
-    ]
-    both = sorted(rows[0].keys() & rows[1].keys())
-    by_measure = {}
-    for measure in MEASURES:
-        pairs = [(first[measure][rows[0][s]], second[measure][rows[1][s]]) for s in both]
-        pairs = [(a, b) for a, b in pairs if a is not None and b is not None]
-        if not pairs:
-            continue
-        ones, others = zip(*pairs, strict=True)
-        differ = [b - a for a, b in pairs]
-        unequal = [one for one in differ if one]
-        by_measure[measure] = Difference(
-            {name: quantile(ones, part) for name, part in QUANTILES.items()},
-            {name: quantile(others, part) for name, part in QUANTILES.items()},
-            sum(one < 0.0 for one in unequal) / len(unequal) if unequal else 0.0,
-            quantile(differ, 0.5),
-        )
-    return by_measure
-
-
 _SHOWN = ("p50", "p95", "p99")
 _INFLUENCES = 5
 _SURE = f"{100 * CONFIDENCE:g} %"
 
 
 def tables(summary: Summary) -> Iterator[Table]:
-    """Quantiles without and with faults, what explains the residual, the worst drives."""
+    """Yield the tables: quantiles without and with faults, factors, the worst drives."""
     counts = summary.counts
     for title, quantiles, count in (
         ("no fault", summary.quantiles, counts["without_fault"]),
@@ -251,7 +206,7 @@ def tables(summary: Summary) -> Iterator[Table]:
         if quantiles:
             drawn = new_table(f"{title}: {count} drives", *_SHOWN)
             for measure, one in quantiles.items():
-                drawn.add_row(measure, *(bounded(one[name]) for name in _SHOWN))
+                drawn.add_row(measure, *(str(one[name]) for name in _SHOWN))
             yield drawn
     if explained := summary.influences[FIRST]:
         drawn = new_table(f"what drives {FIRST}", "explains", "trend")
@@ -269,7 +224,7 @@ def tables(summary: Summary) -> Iterator[Table]:
 
 
 def lines(summary: Summary) -> Iterator[str]:
-    """Yield the lines that the tables do not have: promises, the verdict."""
+    """Yield the lines of text: engines, promises, drives that are worse, verdicts."""
     promises, engines = summary.promises, summary.engines
     drives = ", ".join(f"{count} {name}" for name, count in sorted(engines.items()))
     yield f"Drives by engine: {drives}; the gate sees all but native"
@@ -295,25 +250,18 @@ def lines(summary: Summary) -> Iterator[str]:
         verdict = "kept" if one.kept else "NOT SHOWN"
         if one.quantile.low is not None and one.quantile.low > one.limit:
             verdict = "EXCEEDED"
-        value = bounded(one.quantile)
-        yield f"accept.{one.key}: {value}, expected at most {one.limit:g}: {verdict}"
+        yield f"accept.{one.key}: {one.quantile}, expected at most {one.limit:g}: {verdict}"
 
 
 def difference_table(differences: Mapping[str, Difference]) -> Table:
-    """Two files over the same drives."""
+    """Return the table that compares two files over the same drives."""
     drawn = new_table("second - first", "first p99", "second p99", "median", "less in")
     for measure, one in differences.items():
         drawn.add_row(
             measure,
             f"{one.first['p99'].value:.2f}",
             f"{one.second['p99'].value:.2f}",
-            bounded(one.median),
+            str(one.median),
             f"{100 * one.better:.0f} %",
         )
     return drawn
-
-
-def bounded(one: Quantile) -> str:
-    """A quantile with its bounds."""
-    low, high = ("?" if bound is None else f"{bound:.3g}" for bound in (one.low, one.high))
-    return f"{one.value:.3g} ({low}..{high})"

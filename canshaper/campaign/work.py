@@ -1,9 +1,9 @@
-"""A working cycle with a model of an operator: empty grapple out to the pile, log back.
+"""A working cycle of a modelled operator: empty grapple out to the pile, log back.
 
-A move ends when the tip is within the tolerance for a while, and the load swings no farther than
-that, left alone. One that is not done in time counts as that long; so do all from the one on in
-which the grapple swings above the horizontal. Between two moves the grapple stands on pile or bunk,
-the joysticks neutral. Lift and rotator do not move: they take their time in every set-up.
+A move ends when tip and swing have been within the tolerance for a while. A move that takes longer
+than ``LIMIT_S`` counts as ``LIMIT_S``; so do the move in which the grapple swings above the
+horizontal and all moves after it. Between two moves the grapple stands on pile or bunk, and the
+joysticks are neutral. Lift and rotator do not move: their time is the same in every set-up.
 """
 
 import math
@@ -25,24 +25,24 @@ from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script, Stroke
 
 MOVES, LIMIT_S, LOADS, AXES = 10, 30.0, ("empty", "log"), (SLEW, NEAR_FAR)
-_HELD_S, _GRIP_S = 0.3 - 1e-9, 1.5  # within the tolerance; between two moves, not counted
-# Degrees and metres of the bunk, behind the cab, and of the pile, as loading was studied (Hartsch
-# et al. 2022, 2024: 45 to 135 degrees, 4 to 10 m) and this crane reaches.
+_HELD_S, _GRIP_S = 0.3 - 1e-9, 1.5  # time within the tolerance; rest between two moves, not counted
+# Slew angle, degrees, and radius, m, of the bunk, behind the cab, and of the pile: as measured in
+# loading (Hartsch et al. 2022, 2024: 45 to 135 degrees, 4 to 10 m), as far as this crane reaches.
 _PLACES = ((-5.0, 5.0), (2.6, 3.4)), ((55.0, 125.0), (4.0, 7.0))
-# Log of 600 kg in a grapple of 300 kg, .4 m lower: the heaviest that a campaign draws.
+# A log of 600 kg in a grapple of 300 kg, .4 m lower: the heaviest load that a campaign draws.
 _LOG_MASS, _LOG_M = 3.0, 0.4
 _PRESS = (2.0, 3.2, 0.5, 0.0)  # start, duration, level, ramp
-_STANDS = 0.01  # of the speed before
+_STANDS = 0.01  # of the speed at the release: below it the axis stands
 
 
 @dataclass(frozen=True)
 class SetUp:
-    """Filters and state between joysticks and crane.
+    """The filters that an operator works with.
 
     Attributes:
-        name: of it; where it is no candidate the profile that is chosen, "" for the own filters.
-        bypass: anti-sway is switched off.
-        candidate: filters in place of those of the file.
+        name: name of the set-up; without a candidate the profile, "" for the filters of the file.
+        bypass: anti-sway is off.
+        candidate: filters that replace those of the file.
     """
 
     name: str = ""
@@ -50,13 +50,13 @@ class SetUp:
     candidate: Candidate | None = field(default=None, compare=False)
 
     def deployment(self, source: Source) -> Deployment:
-        """The deployment that is driven."""
+        """Return the deployment with the filters of this set-up."""
         loaded = source.load()
         return with_candidate(loaded, self.candidate) if self.candidate else loaded
 
     @property
     def options(self) -> DriveOptions:
-        """Options of its drives."""
+        """Options of the simulated drives."""
         if self.bypass or self.candidate or not self.name:
             return {"bypass": self.bypass}
         return {"prepare": choosing(self.name)}
@@ -64,42 +64,42 @@ class SetUp:
 
 @dataclass(frozen=True)
 class Work:
-    """One working cycle."""
+    """One working cycle: set-up, operator, tolerance and places."""
 
     set_up: SetUp
     operator: str
     skill: Skill
-    known: tuple[Known, ...]  # of each axis; of slew a m is a rad
-    techniques: tuple[tuple[float, float], ...]  # one for each load
+    known: tuple[Known, ...]  # by axis; of slew in rad, where m is said
+    techniques: tuple[tuple[float, float], ...]  # speed and share of caught swing, for each load
     within: tuple[float, float]  # tip from the target, m, and swing, degrees; infinite: any
-    seed: str  # of places and operator
+    seed: str  # seed of places and operator
 
 
 class Move(NamedTuple):
-    """One move, as it was done."""
+    """Result of one move."""
 
     load: str
     done: bool = False
     seconds: float = LIMIT_S
-    taps: int = 0  # corrections and catches
-    waiting_s: float = 0.0  # no joystick moved
+    taps: int = 0  # number of corrections and catches
+    waiting_s: float = 0.0  # time with every joystick neutral
     peak_deg: float = 90.0
-    beyond_m: float = 0.0  # farthest that an axis went beyond the target
+    beyond_m: float = 0.0  # largest overshoot of an axis
 
 
 @dataclass(frozen=True, slots=True)
 class _Joysticks(Script):
-    """Joysticks that a model holds, by axis."""
+    """Joysticks in the hands of the modelled operator."""
 
     held: dict[str, float] = field(default_factory=dict)
 
     def command(self, axis: str, time_s: float) -> float:
-        """Joystick value -1 .. 1 of one axis, now."""
+        """Return the present joystick value of an axis, -1 to 1."""
         return self.held.get(axis, 0.0)
 
 
 def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
-    """Slew angle and radius of the tip: bunk, pile, bunk, ... one more than there are moves."""
+    """Return slew angle and radius of the start and of each target: bunk, pile, bunk, ..."""
     source = random.Random(f"places {seed}")
     side, at = source.choice((-1.0, 1.0)), []
     for number in range(MOVES + 1):
@@ -111,10 +111,10 @@ def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
 
 
 def learn(source: Source, set_up: SetUp) -> tuple[Known, ...]:
-    """Press and let go each joystick once: what practice teaches of a crane.
+    """Measure what practice teaches of a crane: press and release each joystick once.
 
     Raises:
-        CampaignError: it has no tip that slew and near-far move, or they do not move it.
+        CampaignError: the crane has no slew or no near-far axis, has a rope, or does not move.
         ConfigError: the deployment does not fit the machine.
     """
     deployment = set_up.deployment(source)

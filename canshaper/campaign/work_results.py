@@ -1,4 +1,4 @@
-"""Practice, then the work that counts, with and without anti-sway; a table and picture of it."""
+"""Let operators practise and work, with and without anti-sway; table and picture of the results."""
 
 import math
 from collections import Counter, defaultdict
@@ -28,23 +28,23 @@ from canshaper_sim.recording import CraneTrace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Techniques that are tried in practice, and in how many working cycles each.
+# Techniques that an operator tries in practice, and the number of working cycles for each.
 _SPEEDS, _CATCHES, _PRACTICE = (0.25, 0.5, 0.75, 1.0), (0.0, 0.5, 1.0), 2
 Done = dict[Work, list[Move]]
-"""Moves of each working cycle."""
+"""The moves of each working cycle."""
 Doing = Callable[[Sequence[Work]], Done]
-"""Does works."""
+"""A function that does working cycles."""
 
 
 class Task(NamedTuple):
-    """A tolerance, and who works to it."""
+    """A tolerance, and the operator who works to it."""
 
     operator: str
     within: tuple[float, float]  # tip, m, and swing, degrees; infinite: any
 
     @property
     def head(self) -> str:
-        """Head of its column."""
+        """Head of the column of the task, in two lines."""
         tip_m, most_deg = self.within
         swing = "tip only" if most_deg == math.inf else f"{most_deg:g} deg"
         return f"{100.0 * tip_m:g} cm\n{swing}"
@@ -55,7 +55,7 @@ class Task(NamedTuple):
         return self.head.replace("\n", ", ")
 
 
-# By the profile that is for it.
+# Tasks by the profile that suits them.
 TASKS = {
     "precise": Task("waiting", (0.30, 2.0)),
     "loading": Task("catching", (0.30, 6.0)),
@@ -74,15 +74,15 @@ def practised(
     *,
     cycles: int = _PRACTICE,
 ) -> list[Work]:
-    """Let each person practise with each set-up; return works by the fastest technique of each.
+    """Let each operator practise with each set-up; return works with the fastest techniques.
 
     Args:
         source: the deployment.
-        set_ups: with what they work.
-        people: who works.
-        within: tip from the target, m, and swing, degrees.
-        do: does works.
-        cycles: of practice with each technique.
+        set_ups: the set-ups to practise with.
+        people: skills by operator.
+        within: tolerance: tip from the target, m, and swing, degrees.
+        do: does the working cycles.
+        cycles: working cycles of practice with each technique.
 
     Raises:
         CampaignError: see ``learn``.
@@ -114,7 +114,7 @@ def do_all(
     works: Sequence[Work],
     done: Done | None = None,
 ) -> Done:
-    """Do all works; ``done`` is filled with each one that is done, in any order."""
+    """Do all works and return them in this order; ``done`` gets each work when it is done."""
     done = {} if done is None else done
     for work, moves in engine.run(partial(do_work, source), works):
         done[work] = moves
@@ -136,14 +136,14 @@ def at_work(
     Args:
         engine: does the works.
         source: the deployment.
-        set_ups: with what they work.
-        tasks: by name.
-        progress: called with the part that is done, 0 to 1, and a word for the work.
-        seeds: working cycles of each task with each set-up.
+        set_ups: the set-ups to compare.
+        tasks: tasks by name.
+        progress: called with the part that is done, 0 to 1, and the name of the work.
+        seeds: number of working cycles of each task with each set-up.
 
     Returns:
-        The moves, by task and set-up, and "". Interrupted: those of the working cycles that every
-        set-up has done, and where it was interrupted.
+        The moves, by task and set-up, and "". After Ctrl-C: the moves of the working cycles that
+        every set-up has done, and a text that says how many these are.
 
     Raises:
         CampaignError: see ``learn``.
@@ -175,9 +175,9 @@ def at_work(
 def choice(
     title: str, tasks: Mapping[str, Task], moves: Mapping[str, Mapping[SetUp, Sequence[Move]]]
 ) -> tuple[Table, list[str]]:
-    """Seconds a move of each set-up, empty / log, in a column for each task.
+    """Return the table of seconds a move, empty / log, by set-up (row) and task (column).
 
-    Red where it is slower than ``OFF``; and that in words.
+    A cell slower than ``OFF`` is red. Also return a text for each such cell.
     """
     drawn = new_table(title, *(tasks[name].head for name in moves))
     slower = []
@@ -196,12 +196,12 @@ def choice(
 
 
 def set_up_name(one: SetUp) -> str:
-    """Name in a table."""
+    """Return the name of a set-up in a table."""
     return one.name or OWN
 
 
 def as_data(moves: Mapping[str, Mapping[SetUp, Sequence[Move]]]) -> dict[str, Any]:
-    """Seconds a move by task, set-up and load, for ``--json``."""
+    """Return seconds a move by task, set-up and load, for ``--json``."""
     return {
         name: {
             set_up_name(one): {load: _seconds(done, load) for load in LOADS}
@@ -216,7 +216,7 @@ def _seconds(moves: Sequence[Move], load: str | None = None) -> float:
 
 
 def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, float]:
-    """Change of the mean in %, and its bounds by the bootstrap over pairs."""
+    """Return the change of the mean, %, and its bounds by the bootstrap over pairs."""
 
     def change(a: Any, b: Any, axis: int = -1) -> Any:
         return 100.0 * (np.mean(b, axis) / np.mean(a, axis) - 1.0)
@@ -238,7 +238,7 @@ _MEASURES: Sequence[tuple[str, str, Callable[[Move], float], Callable[..., float
 
 
 def table(done: Done) -> Table:
-    """A row for each operator and load, each measure with anti-sway off / on."""
+    """Return the table: a row for each operator and load, each measure with anti-sway off / on."""
     heads = "seconds\n", "change, %\n95 %", *(head for head, *_ in _MEASURES)
     drawn = new_table("a move, off / on", *heads)
     for name, load in product(dict.fromkeys(one.operator for one in done), LOADS):
@@ -262,7 +262,7 @@ def table(done: Done) -> Table:
 
 
 def figure(source: Source, works: Sequence[Work]) -> "Figure":
-    """Picture of the first two moves of two works, anti-sway off and on."""
+    """Return the picture of the first two moves of two works, anti-sway off and on."""
     from canshaper.report import style  # noqa: PLC0415  (an extra)
     from canshaper.report.style import draw_top_views  # noqa: PLC0415  (the same)
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
 
 MOST_WARNINGS = 10  # warnings of DBC files that are printed; the rest is only counted
+EXIT_NOT_ENOUGH_DATA = 1  # a measurement of an axis has not enough data
 EXIT_USELESS = 1  # the filter leaves more than half of the swing
 EXIT_WRONG = 2  # a file or an option is wrong, or a package is not installed
 EXIT_INTERRUPTED = 130  # SIGINT, as a shell reports it

@@ -1,9 +1,10 @@
 """Output of a verb: lines and tables on the terminal, pictures, and all of it as one HTML file."""
 
 import io
+import json
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import typer
 from rich.table import Table
 
 from canshaper import __version__
-from canshaper.cli.common import install_line
+from canshaper.cli.common import echo, install_line
 from canshaper.errors import UsageError
 from canshaper.report import html
 from canshaper.report.console import SafeConsole
@@ -105,6 +106,43 @@ class Results(SafeConsole):
     def picture_line(self, path: Path | None) -> None:
         """Print where the picture is, or why there is none; the report needs no such line."""
         super().print(f"Picture: {path or _no_picture()}", soft_wrap=True)
+
+    def conclude(
+        self,
+        show: Callable[["Results"], None],
+        *,
+        figure: Callable[[], "Figure"] | None = None,
+        path: Path | None = None,
+        data: Callable[[Path | None], Mapping[str, Any]] | None = None,
+        after: Sequence[str] = (),
+        code: int = 0,
+    ) -> None:
+        """End a verb that measured or designed: results, picture, what follows, exit code.
+
+        What the verb writes into the deployment file is written before: the reader of its output
+        may end at any line.
+
+        Args:
+            show: prints the results.
+            figure: draws their picture; None where there is nothing to draw.
+            path: file of the picture without --picture; None for only in the report.
+            data: of ``--json``, by the file of the picture; None where JSON is not asked for.
+            after: lines on what was written, and what to do next.
+            code: exit code.
+
+        Raises:
+            typer.Exit: the exit code is not 0.
+            OSError: picture or report cannot be written.
+        """
+        show(self)
+        drawn = self.picture(path, figure) if figure else None
+        if data:
+            echo(json.dumps(data(drawn), indent=2, default=str))
+        if figure and (path or self._picture):
+            self.picture_line(drawn)
+        if after:
+            self.print("\n".join(after), soft_wrap=True)
+        self.write(code)
 
     def write(self, code: int = 0) -> None:
         """Write the report if --report asks for one; then raise the exit code, if it is not 0."""

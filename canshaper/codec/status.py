@@ -107,11 +107,11 @@ class ReportedAim(Protocol):
 
 
 def _command_pct(one: ReportedAxis) -> float:
-    return 100.0 * one.axis.command
+    return 100.0 * one.axis.demand
 
 
 def _applied_pct(one: ReportedAxis) -> float:
-    return 100.0 * one.axis.sent
+    return 100.0 * one.axis.output.setpoint
 
 
 # Nothing here may be a lambda: a deployment is pickled by the process that has read it.

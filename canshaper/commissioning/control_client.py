@@ -1,4 +1,4 @@
-"""The other end of the control socket: for ``set``, ``fault``, ``metrics`` and the live page."""
+"""Client of the control socket, for ``set``, ``fault``, ``metrics`` and the live page."""
 
 import getpass
 import json
@@ -48,7 +48,7 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
     Args:
         path: its control socket.
         values: numbers by their keys, such as ``axes.slew.sway.period_s``.
-        by: who else than the person, for the daemon's log.
+        by: program that changes them for the person, for the daemon's log.
 
     Raises:
         ControlError: no daemon answers, or it refuses; then nothing has changed.
@@ -57,7 +57,7 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
 
 
 def rehearse(path: Path, what: str) -> dict[str, Any]:
-    """Let a running daemon make a fault, by its name, ``end`` it, or ``report`` of it.
+    """Ask a running daemon to make a fault by its name, or to ``end`` or ``report`` it.
 
     Raises:
         ControlError: no daemon answers, or it refuses.
@@ -72,7 +72,7 @@ def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
 
     Args:
         path: its control socket.
-        on_wait: called again and again meanwhile; what it raises ends the waiting.
+        on_wait: called again and again meanwhile; an error that it raises ends the wait.
 
     Returns:
         The folder where it was written.

@@ -1,10 +1,10 @@
-"""Warnings about a valid deployment file, whose numbers may be meant otherwise."""
+"""Warnings about a valid deployment file whose numbers are likely to be wrong."""
 
 from collections.abc import Iterator
 
 from canshaper.codec.sense import turned
 from canshaper.codec.signals import find_signal
-from canshaper.commissioning.assumed import assumptions
+from canshaper.commissioning.origins import assumptions
 from canshaper.config.source import Place, Source
 from canshaper.design.tuning.verdict import verdicts
 from canshaper.errors import Problem
@@ -21,7 +21,7 @@ Mistakes = Iterator[tuple[Place, str]]
 
 
 def warnings_of(deployment: Deployment) -> list[Problem]:
-    """Filters that do not fit, travel that no one has stated, guesses, likely mistakes."""
+    """Return warnings: filters that do not fit, travel not stated, guesses, likely mistakes."""
     source = Source(deployment.path)
     config = deployment.config
     poor = ((place, str(one)) for place, one in verdicts(deployment) if one.word != "good")
@@ -31,7 +31,7 @@ def warnings_of(deployment: Deployment) -> list[Problem]:
 
 
 def _pump(deployment: Deployment) -> Mistakes:
-    """Nothing says whether the pump has the oil that two axes ask for at once."""
+    """Yield that the file does not say whether the pump has oil for two axes at once."""
     axes = deployment.config.axes
     shaped = [name for name, axis in axes.items() if axis.filter.kind != "off"]
     crane = deployment.config.crane
@@ -43,7 +43,7 @@ def _pump(deployment: Deployment) -> Mistakes:
 
 
 def likely_mistakes(deployment: Deployment) -> Mistakes:
-    """Yield where, what it would do, and what to write where it is not meant."""
+    """Yield likely mistakes: the place, the effect, and what to write instead."""
     first: dict[tuple[str, str], str] = {}
     for name, axis in deployment.axes.items():
         command = axis.config.command
@@ -60,7 +60,7 @@ def likely_mistakes(deployment: Deployment) -> Mistakes:
 
 
 def _full(deployment: Deployment, axis: BoundAxis) -> Mistakes:
-    """Full speed long before the joystick is at its end."""
+    """Yield a joystick that asks for full speed long before its end."""
     command = axis.config.command
     in_dbc = deployment.messages.find(deployment.joysticks[command.joystick].message.name)
     signal = None if isinstance(in_dbc, str) else find_signal(in_dbc[1], command.signal)
@@ -72,7 +72,7 @@ def _full(deployment: Deployment, axis: BoundAxis) -> Mistakes:
 
 
 def _turned(axis: BoundAxis) -> Mistakes:
-    """Directions whose names say that each is the other."""
+    """Yield directions whose names say that they are exchanged."""
     command, direction = axis.config.command, axis.config.valve.direction
     pairs: dict[tuple[str, str], tuple[str, str]] = {}
     if flags := command.flags:
@@ -90,7 +90,7 @@ def _turned(axis: BoundAxis) -> Mistakes:
 
 
 def _resolutions(deployment: Deployment, axis: BoundAxis) -> Mistakes:
-    """Signals that rest in a valve message and look like its command in another resolution."""
+    """Yield constant signals of a valve message that look like its command, finer or coarser."""
     command = find_signal(axis.valve_message, axis.config.valve.signal)
     for one in deployment.starts:
         signal = find_signal(axis.valve_message, one.signal)
@@ -103,7 +103,7 @@ def _resolutions(deployment: Deployment, axis: BoundAxis) -> Mistakes:
 
 
 def _senders(deployment: Deployment) -> Mistakes:
-    """Commands of valves that are of another node in the DBC than all that we send."""
+    """Yield valve messages that the DBC gives to another node than our other messages."""
     read = {node: i.message.name for i in deployment.inputs() for node in i.message.senders}
     messages = [one.fields.message for one in deployment.sent()]
     nodes = [node for one in messages for node in one.senders if node not in read]
@@ -118,7 +118,7 @@ def _senders(deployment: Deployment) -> Mistakes:
 
 
 def _speeds(deployment: Deployment) -> Mistakes:
-    """Full speeds of the tip that do not fit each other; ways to stop follow from them."""
+    """Yield full speeds that do not fit each other: stopping distances follow from them."""
     axes = {n: (a.sway.full_speed_m_s, a) for n, a in deployment.config.axes.items() if a.sway}
     fastest = max(axes, key=lambda name: axes[name][0], default="")
     for name, (speed, axis) in axes.items():
@@ -135,7 +135,7 @@ def _speeds(deployment: Deployment) -> Mistakes:
 
 
 def _ids(deployment: Deployment) -> Mistakes:
-    """Messages with an id that is used, of a DBC file from which nothing is used."""
+    """Yield messages of an unused DBC file that share their id with a used message."""
     messages = [one for bus in deployment.on_bus.values() for one in bus]
     used = {(one.frame_id, one.is_extended_frame): one.name for one in messages}
     for i, file in enumerate(deployment.messages.files):

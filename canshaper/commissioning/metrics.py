@@ -16,7 +16,7 @@ from canshaper.commissioning import control_client as client
 from canshaper.errors import ControlError
 from canshaper.shaping.states import State
 
-# What the daemon says of an axis: name and unit, words, how it is read.
+# Metrics of an axis: name with unit, help text, and how to read it from the daemon's answer.
 _OF_AN_AXIS: tuple[tuple[str, str, Callable[[Mapping[str, Any]], float]], ...] = (
     ("joystick_ratio", "What the operator asks for, -1 to 1.", lambda one: one["joystick"]),
     ("setpoint_ratio", "Velocity that the valve is sent, -1 to 1.", lambda one: one["setpoint"]),
@@ -26,7 +26,7 @@ _OF_AN_AXIS: tuple[tuple[str, str, Callable[[Mapping[str, Any]], float]], ...] =
 
 
 class DaemonCollector(Collector):
-    """Metrics of the daemon with this control socket; of one that does not answer only that."""
+    """Metrics of the daemon at a control socket; only ``canshaper_up`` where none answers."""
 
     def __init__(self, control: Path) -> None:
         self._control = control
@@ -84,7 +84,7 @@ def _metrics(now: Mapping[str, Any]) -> Iterator[Metric]:
 def _states(
     what: str, words: str, now: Mapping[str, str], possible: Iterable[str]
 ) -> GaugeMetricFamily:
-    """Return a series for each state that there may be, as the conventions have it."""
+    """Return a series for each possible state, by the conventions of Prometheus."""
     gauge = GaugeMetricFamily(f"canshaper_{what}_state", words, labels=(what, "state"))
     for state in possible:
         for name, state_now in now.items():

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from canshaper.commissioning.calibration.fit import FULL, Calibration
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.verdict import ENDS_US, histogram, summary
-from canshaper.commissioning.sensor.finding import Finding, heading
+from canshaper.commissioning.sensor.verdict import SensorFinding, heading
 from canshaper.report import style
 from canshaper.report.console import axis_title
 from canshaper.shaping.limits import OutputLimits
@@ -134,7 +134,7 @@ def _time(us: int) -> str:
     return f"{us} µs" if us < 1000 else f"{us // 1000} ms"
 
 
-def of_sensors(findings: Sequence[Finding]) -> Figure:
+def of_sensors(findings: Sequence[SensorFinding]) -> Figure:
     """Measured over model, a row a finding with a fit."""
     rows = [finding for finding in findings if finding.fit]
     height = _TOP_PX + _ROW_PX * len(rows) + _FOOT_PX

@@ -1,4 +1,4 @@
-"""Robust shapers of an axis printed, drawn, and written into the file."""
+"""Robust shapers of an axis: printed, drawn, written into the file."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from canshaper.commissioning.filter_file import filter_changes
+from canshaper.commissioning.origins import filter_changes
 from canshaper.commissioning.robust import RobustDesign
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.source import Place
 from canshaper.design.tuning.evaluate import shaper_of, swing_left
 from canshaper.design.tuning.modes import second_residual
-from canshaper.edit.edit import change
+from canshaper.edit.edit import change, flow
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import new_table
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def summary_line(one: RobustDesign) -> str:
-    """How long it takes, and what it leaves."""
+    """Return a line: how long a shaper takes, and what it leaves."""
     shaper, lengths = one.shaper, f"lengths within ±{one.task.range_pct:g} %"
     if one.task.lengths_m:
         lengths = "pendulums of {:g} to {:g} m".format(*one.task.lengths_m)
@@ -43,7 +43,7 @@ def print_design(deployment: Deployment, one: RobustDesign, console: Console) ->
 
 
 def _print_consequences(deployment: Deployment, one: RobustDesign, console: Console) -> None:
-    """Print the tail that it needs, and the stopping distance with it."""
+    """Print the tail that a shaper needs, and the stopping distance with it."""
     axis = one.bound.name
     if one.needed_s is not None:
         tail_s = one.bound.config.limits.tail_s
@@ -60,7 +60,7 @@ def _print_consequences(deployment: Deployment, one: RobustDesign, console: Cons
 
 
 def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console: Console) -> None:
-    """Print what each design leaves with each load, and the stopping distance with the longest."""
+    """Print what each design leaves with each load; the stopping distance with the longest."""
     bound = designs[0].bound
     loads = {f"{one.breakpoint:g}": one.sway.mode() for one in bound.config.gain_schedule}
     names = [*(f"for {name}" for name in loads), "own"]
@@ -92,8 +92,16 @@ def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
     return [*change(deployment.path, changes), *notes]
 
 
+def lines_for_file(designs: Sequence[RobustDesign]) -> list[str]:
+    """Return the sections of the file that the designs need, a line each."""
+    tasks = [one.task for one in designs]
+    sways = [one.sway | ({"length": one.rope} if one.rope else {}) for one in tasks]
+    lines = [f"sway: {flow(sway)}" for sway in sways if sway]
+    return lines + [f"filter: {flow(one.section)}" for one in designs]
+
+
 def figure(one: RobustDesign) -> "Figure":
-    """The new filter next to that of the file."""
+    """Draw the new filter next to that of the file."""
     from canshaper.design.tuning import robust_plot  # noqa: PLC0415  # pictures alone need it
 
     task, present = one.task, one.bound.config.filter

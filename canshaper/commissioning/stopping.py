@@ -1,7 +1,7 @@
 """Stopping distances of a deployment as a table: what the tip travels after each event.
 
 Travel is in seconds of full speed: times the speed of the tip it is metres, times the angular speed
-of a slewing axis radians. It is that of the commands; the valve adds its own lag.
+of a slewing axis radians. It is the travel of the commands; the lag of the valve adds to it.
 """
 
 import copy
@@ -18,7 +18,7 @@ from rich.text import Text
 
 from canshaper.config.filters import Filter, Profile
 from canshaper.config.schema import AxisSection
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import at_ends
@@ -68,7 +68,7 @@ class Travel:
 
     @classmethod
     def worst(cls, travels: "list[Travel]") -> Self:
-        """The longest after each event."""
+        """Return the longest travel after each event."""
         return cls(*(max(getattr(t, f.name) for t in travels) for f in fields(cls)))
 
 
@@ -85,7 +85,7 @@ class Stopping:
     stated_m: float | None
 
     def cell(self, way_s: float) -> str:
-        """A travel as it is read: metres, degrees too where it slews; seconds without a speed."""
+        """Return a travel as text: metres, for slew degrees too; seconds without a known speed."""
         if self.speed.m_s is None:
             return f"{way_s:.2f} s"
         text = f"{way_s * self.speed.m_s:.2f} m"
@@ -95,7 +95,7 @@ class Stopping:
 
 
 def stopping(deployment: Deployment) -> list[Stopping]:
-    """Stopping of every axis, with the worst of its filters."""
+    """Return the stopping of every axis, with the worst of its filters."""
     return [_stopping(deployment, bound) for bound in deployment.axes.values()]
 
 
@@ -142,7 +142,7 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
 
 
 def _variants(bound: BoundAxis) -> Iterator[BoundAxis]:
-    """The axis with each sway and filter that its file names."""
+    """Yield the axis with each pair of sway and filter that its file names."""
     config = bound.config
     parts: list[AxisSection | Profile] = [config, *config.profiles.values()]
     for part in parts:
@@ -223,7 +223,7 @@ def _motion_notes(deployment: Deployment) -> Iterator[RenderableType]:
 
 
 def travel(new_axis: Callable[[], ShapedAxis], *, timeout_s: float, period_s: float) -> Travel:
-    """Travel of an axis with its filter, computed by letting it run, in the worse direction.
+    """Return the travel of an axis with its filter: it is run, and the worse direction counts.
 
     Args:
         new_axis: makes the axis.
@@ -237,8 +237,8 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
     axis.tick(CommandInput())
     for _ in range(round(WARM_UP_S / period_s)):
         axis.tick(CommandInput(sign))
-    # An event waits for the next tick, and silence for the timeout before; until then it goes on.
-    full = sign * axis.sent
+    # Until the next tick, and for silence until the timeout too, the axis moves on at full speed.
+    full = sign * axis.output.setpoint
 
     def after(joystick: CommandInput, wait_s: float = period_s) -> float:
         return full * wait_s + _way(axis, joystick, sign, period_s)[0]
@@ -256,9 +256,9 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
 def needed_s(
     new_axis: Callable[[], ShapedAxis], tail_s: float, *, timeout_s: float, period_s: float
 ) -> float:
-    """Travel to which an axis can be bounded without cutting the run-on of its filter short.
+    """Return the least bound of travel that does not cut the run-on of a filter short.
 
-    Of all strokes at full speed the worst one counts, and the wait for a lost joystick.
+    It holds for every stroke at full speed, and includes the timeout of a lost joystick.
 
     Args:
         new_axis: makes the axis, with ``OutputLimits.run_on`` that bounds nothing.
@@ -275,14 +275,14 @@ def needed_s(
             for _ in range(ticks):
                 axis.tick(CommandInput(sign))
             way = max(way, _way(axis, CommandInput(), sign, period_s)[0])
-        most = max(most, sign * axis.sent * (timeout_s + 2.0 * period_s) + way)
+        most = max(most, sign * axis.output.setpoint * (timeout_s + 2.0 * period_s) + way)
     return most
 
 
 def _way(
     steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float
 ) -> tuple[float, int]:
-    """How far the axis gets in the old direction, and for how many ticks it moves there."""
+    """Return the travel in the old direction, and the number of ticks with motion there."""
     axis = copy.deepcopy(steady)
     way_s = most_s = 0.0
     last = 0
@@ -290,7 +290,7 @@ def _way(
         axis.tick(joystick)
         if axis.state not in MOVING:
             break
-        velocity = sign * axis.sent
+        velocity = sign * axis.output.setpoint
         way_s += velocity * period_s
         most_s = max(most_s, way_s)
         last = tick if velocity > 0.0 else last

@@ -33,12 +33,12 @@ _GENERIC = {"velocity", "speed", "command", "cmd", "valve", "flow", "position", 
 # A switch has two bits at most: off, on, error, not available.
 SWITCH_BITS = 2
 _BYTE = 8
-# Part of a name that two have in common, from which on they are likely to belong together.
+# Two names that share this part are likely to belong together.
 LIKELY = 0.6
 
 
 def axes(message: Message) -> list[Signal]:
-    """Signals of a message that can be the velocity of an axis, by its DBC."""
+    """Return the signals of a message that the DBC describes as a velocity of an axis."""
     return [s for s in message.signals if not s.is_float and symmetrical_range(s) is None]
 
 
@@ -56,7 +56,7 @@ def two_sided(signal: Signal) -> bool:
 
 
 def one_sided(message: Message) -> list[Signal]:
-    """Signals of a message that may be a velocity around a middle, or with flags."""
+    """Return the signals that may be a velocity around a middle value, or with flags."""
     return [
         s
         for s in message.signals
@@ -66,7 +66,7 @@ def one_sided(message: Message) -> list[Signal]:
 
 
 def direction_flags(message: Message, signal: Signal) -> tuple[str, str, str] | None:
-    """Flags of neutral, negative and positive of a signal, by their names."""
+    """Return the flags of neutral, negative and positive of a signal, found by their names."""
     flags = switches(message)
     near = sorted(
         flags, key=lambda s: (-likeness(s.name, signal.name), abs(s.start - signal.start))
@@ -78,7 +78,7 @@ def direction_flags(message: Message, signal: Signal) -> tuple[str, str, str] | 
 
 
 def reach(signal: Signal) -> tuple[float, float]:
-    """Least and largest value of a signal, by its bits and by its range where it has one."""
+    """Return least and largest value of a signal, by its bits, and by its range in the DBC."""
     low, high = -math.inf, math.inf
     if not signal.is_float:
         ends = [raw * signal.scale + signal.offset for raw in raw_limits(signal)]
@@ -90,26 +90,26 @@ def reach(signal: Signal) -> tuple[float, float]:
 
 
 def likely_middle(signal: Signal) -> float:
-    """Value of a one-sided signal at zero: the middle of what it reaches, a half step up."""
+    """Return the likely zero of a one-sided signal: the middle of its reach, rounded up."""
     low, high = reach(signal)
     steps = math.ceil((high - low) / abs(signal.scale) / 2.0)
     return low + steps * abs(signal.scale)
 
 
 def likely_full(signal: Signal, zero: float = 0.0) -> float:
-    """Value of a signal at full, from zero on: the nearer end of what it reaches."""
+    """Return the likely distance from zero to full: to the nearer end of its reach."""
     low, high = reach(signal)
     full = min(zero - low, high - zero) if low < zero < high else high - zero
     return full if math.isfinite(full) else 1.0
 
 
 def switches(message: Message) -> list[Signal]:
-    """Signals of a message that can be a switch."""
+    """Return the signals of a message that can be a switch."""
     return [s for s in message.signals if not s.is_signed and s.length <= SWITCH_BITS]
 
 
 def switch_parts(message: Message) -> list[Signal]:
-    """Other signals that can be a switch as a whole, and each bit of them: SIGNAL/BIT."""
+    """Return wider signals that can be a switch as a whole, and each bit of them, SIGNAL/BIT."""
     parts: list[Signal] = []
     for s in message.signals:
         bits = s.length <= SWITCH_BITS if s.is_signed else SWITCH_BITS < s.length <= _BYTE
@@ -121,13 +121,13 @@ def switch_parts(message: Message) -> list[Signal]:
 
 
 def enabling(signals: Sequence[Signal]) -> str | None:
-    """The likely enable switch, by its name; none whose values mean the contrary."""
+    """Return the likely enable switch, by its name; none whose values say the contrary."""
     fine = [s for s in signals if contrary_fault(s, "enable", CONTRARY_ENABLE) is None]
     return named(fine, ENABLE)
 
 
 def modes(message: Message) -> list[Signal]:
-    """Signals of more bits whose values the DBC names: one of these may be what enables."""
+    """Return wider signals whose values have names in the DBC: one value may be the enable."""
     return [
         s
         for s in message.signals
@@ -137,24 +137,24 @@ def modes(message: Message) -> list[Signal]:
 
 
 def enabling_code(signal: Signal) -> int | None:
-    """The one value of such a signal whose name says that it enables."""
+    """Return the only value whose name says that it enables; None for none or several."""
     codes = [code for code, name in (signal.choices or {}).items() if ENABLING.search(str(name))]
     return codes[0] if len(codes) == 1 else None
 
 
 def named(signals: Sequence[Signal], pattern: re.Pattern[str]) -> str | None:
-    """The first signal whose name says what is looked for."""
+    """Return the first signal whose name matches; None for none."""
     return next((s.name for s in signals if pattern.search(s.name)), None)
 
 
 def counter(message: Message) -> str | None:
-    """The alive counter of a message, by its name."""
+    """Return the alive counter of a message, by its name; None for none."""
     candidates = [s for s in message.signals if not s.is_signed and raw_limits(s)[1] > 1]
     return named(candidates, COUNTER)
 
 
 def joysticks(messages: Sequence[Message]) -> list[Message]:
-    """Messages that can be of a joystick, the likely ones first."""
+    """Return the messages that can be of a joystick, the likely ones first."""
     possible = [m for m in messages if not is_status(m) and (velocities(m) or one_sided(m))]
     return sorted(possible, key=lambda m: (*_rank(m, possible), not _JOYSTICK.search(m.name)))
 
@@ -167,7 +167,7 @@ def likely_joysticks(messages: Sequence[Message]) -> list[Message]:
 
 
 def _rank(message: Message, others: Sequence[Message]) -> tuple[int, int]:
-    """How likely a message is a joystick's: by who gets it and by its name, and how described."""
+    """Return a rank, low for a likely joystick: by readers and name, then by its description."""
     senders = {node for m in others for node in m.senders} - {*message.senders}
     readers = {node for m in others if m is not message for s in m.signals for node in s.receivers}
     up = any(node in senders for s in message.signals for node in s.receivers)
@@ -179,14 +179,14 @@ def _rank(message: Message, others: Sequence[Message]) -> tuple[int, int]:
 
 
 def _tier(message: Message, described: object) -> int:
-    """How well a message is described: cyclic with its range, two-sided, or neither."""
+    """Return 0 for a cyclic and described message, 1 for a two-sided one, 2 for others."""
     if message.cycle_time and described:
         return 0
     return 1 if velocities(message) else 2
 
 
 def commands(message: Message) -> list[Signal]:
-    """Signals of a message that can command a valve, by its DBC."""
+    """Return the signals of a message that the DBC describes as a command of a valve."""
     return [s for s in axes(message) if command_fault(s) is None]
 
 
@@ -202,16 +202,16 @@ def valve_signals(message: Message) -> list[Signal]:
 
 
 def valves(messages: Sequence[Message], joystick: str) -> list[Message]:
-    """Messages that can command a valve.
+    """Return the messages that can command a valve.
 
-    Those that the DBC describes first, of them those whose names are like that of their joystick.
+    Those that the DBC describes come first, of them those named like their joystick.
     """
     candidates = [m for m in messages if not is_status(m) and valve_signals(m)]
     return sorted(candidates, key=lambda m: (_tier(m, commands(m)), -likeness(m.name, joystick)))
 
 
 def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
-    """MESSAGE.SIGNAL of what can be a radius in m, by name, at least twice within a timeout."""
+    """Return MESSAGE.SIGNAL of radii in m, by name, that come twice or more within a timeout."""
     return [
         f"{message.name}.{signal.name}"
         for message in messages
@@ -224,7 +224,7 @@ def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
 def loads(messages: Sequence[Message]) -> list[tuple[Message, Signal]]:
     """Return signals that can say what the grapple holds.
 
-    Not of J1939 where the sender is to be named besides.
+    Those of J1939 are left out: the file would have to name their sender too.
     """
     return [
         (message, signal)
@@ -238,7 +238,7 @@ def loads(messages: Sequence[Message]) -> list[tuple[Message, Signal]]:
 def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Message, Signal]]:
     """Return signals that can measure a swing of so many seconds, the likely ones first.
 
-    Not of J1939 where the sender is to be named besides.
+    Those of J1939 are left out: the file would have to name their sender too.
     """
     sensors = [
         (message, signal)
@@ -258,40 +258,40 @@ def is_status(message: Message) -> bool:
 
 
 def status_of(messages: Sequence[Message], axis: str) -> Message | None:
-    """The status message of an axis, by its name."""
+    """Return the status message of an axis, by its name; None for none."""
     candidates = [m for m in messages if is_status(m) and m.cycle_time]
     likely = max(candidates, key=lambda m: likeness(m.name, axis), default=None)
     return likely if likely and likeness(likely.name, axis) >= LIKELY else None
 
 
 def service_status(messages: Sequence[Message]) -> Message | None:
-    """The message with the counters of the service."""
+    """Return the message with the counters of the service; None for none."""
     return _with(required_names(SERVICE_STATUS), messages)
 
 
 def identity(messages: Sequence[Message]) -> Message | None:
-    """The message with the digest of what runs."""
+    """Return the message with the digest of what runs; None for none."""
     return _with(required_names(IDENTITY), messages)
 
 
 def _with(signals: set[str], messages: Sequence[Message]) -> Message | None:
-    """The first message that has all these signals."""
+    """Return the first message with all these signals; None for none."""
     return next((m for m in messages if {s.name for s in m.signals} >= signals), None)
 
 
 def axis_name(signal: str) -> str:
-    """A name for an axis after its joystick: NearFar is near_far."""
+    """Return a name for an axis after its joystick: near_far for NearFar."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", signal).lower()
 
 
 def alike(one: str, other: str) -> bool:
-    """Whether two names have a word in common that says more than what every valve has."""
+    """Return whether two names share a word that not every valve has."""
     first, second = ({word.lower() for word in _WORD.findall(name)} for name in (one, other))
     return bool(first & second - _GENERIC)
 
 
 def likeness(one: str, other: str) -> float:
-    """How much of the shorter name is in the longer one, 0 to 1."""
+    """Return how much of the shorter name is in the longer one, 0 to 1."""
     a, b = sorted((one.lower().replace("_", ""), other.lower().replace("_", "")), key=len)
     match = SequenceMatcher(None, a, b, autojunk=False).find_longest_match()
     return match.size / len(a) if a else 0.0

@@ -1,4 +1,4 @@
-"""The G_FF of an axis: tuned as options and file ask for, judged, shown, written into the file."""
+"""The G_FF of an axis: tuned by options and file, judged, shown, written into the file."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from canshaper.commissioning.filter_file import write_filters
+from canshaper.commissioning.origins import write_filters
 from canshaper.commissioning.stopping import consequences
 from canshaper.config.desk import Objective
 from canshaper.config.filters import designed
@@ -28,23 +28,23 @@ if TYPE_CHECKING:
 
 # What a tuning aims at, one of: a preference, a range of lengths, Eq. 15.
 _AIMS = ({"preference"}, {"length_range_pct"}, {"q", "r", "s", "p", "states"})
-# What the manual rule cannot keep.
+# Options that the manual rule cannot keep.
 _BEYOND = ("max_jump", "max_rate_per_s", "max_run_on_s", "third_pole", *_AIMS[0], *_AIMS[1])
 
 
 @dataclass(frozen=True)
 class TunedDesign:
-    """A setting of G_FF that was made for an axis.
+    """A G_FF that was tuned for an axis.
 
     Attributes:
         bound: the axis.
-        task: what was asked.
-        tuning: the answer.
-        setting: that with the digits of a file, measured.
+        task: what was asked for.
+        tuning: the poles that answer it.
+        setting: the poles with the digits of a file, and what they do.
         before: the setting in the file, where its filter is a G_FF.
-        tail: tail that it needs and what that leaves; see ``deploy.tail_for``.
+        tail: tail that it needs, and the swing that is left with it; see ``deploy.tail_for``.
         verdict: whether it damps.
-        objective: what makes it again, for the file; None for the manual rule.
+        objective: keys for the file that tune it again; None for the manual rule.
         choices: front that a preference has chosen from.
     """
 
@@ -195,14 +195,14 @@ def print_tuned(deployment: Deployment, one: TunedDesign, console: Console) -> N
 
 
 def write_tuned(deployment: Deployment, one: TunedDesign) -> list[str]:
-    """Write it into the file; see ``write_filters``."""
+    """Write a design into the file; see ``write_filters``."""
     values = dict.fromkeys(one.bound.config.filter.model_dump(exclude_none=True)) | one.section
     tail_s = one.tail[0] if one.tail else None
     return write_filters(deployment, one.bound.name, [((), values)], tail_s, "tune")
 
 
 def figure(one: TunedDesign) -> "Figure":
-    """The setting next to that of the file."""
+    """Draw the setting next to that of the file."""
     from canshaper.design.tuning import plot  # noqa: PLC0415  # pictures alone need it
 
     assert one.bound.config.sway is not None
@@ -219,7 +219,7 @@ def figure(one: TunedDesign) -> "Figure":
 
 
 def as_dict(one: TunedDesign) -> dict[str, Any]:
-    """Everything, for ``--json``."""
+    """Return the design as JSON data."""
     setting: dict[str, Any] = asdict(one.setting)
     result: dict[str, Any] = asdict(one.tuning) | setting.pop("measures") | setting
     return result | {

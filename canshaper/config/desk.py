@@ -137,7 +137,7 @@ class Uncertainty(Section):
         0.0, 3.0, "swing at the start, along and across the boom"
     )
     load_mass: Range[Annotated[float, _end(1, 20, "times")]] = _usual(
-        1.0, 3.0, "mass with a load, of that without"
+        1.0, 3.0, "mass with a load, in masses without"
     )
     load_m: Range[Annotated[float, _end(0, 3, "m")]] = _usual(
         0.0, 0.4, "how much lower the centre of mass is with a load"
@@ -161,7 +161,7 @@ class Uncertainty(Section):
         -15.0, 10.0, "full speed of an axis"
     )
     pump_flow: Range[Annotated[float, _end(0.5, MOST_FLOW, "full axis flows")]] = _usual(
-        MOST_FLOW, MOST_FLOW, "most that the pump delivers"
+        MOST_FLOW, MOST_FLOW, "most that the pump delivers, 100 for no limit"
     )
     slope_deg: Range[Annotated[float, _end(0, 15, "deg")]] = _usual(
         0.0, 0.0, "slope on which the carrier stands, along and across"
@@ -178,17 +178,17 @@ class Uncertainty(Section):
     """Drives with plain load sensing: where the pump delivers less than is asked for, the axis with
     the heaviest load goes without oil."""
     stops_pct: Annotated[
-        float, number(0, 100, "% of the drives", "that begin near an end stop of the tip")
+        float, number(0, 100, "% of the drives", "drives that begin near an end stop of the tip")
     ] = 0.0
     load_change_pct: Annotated[
-        float, number(0, 100, "% of the drives", "in which a load is picked up and put down")
+        float, number(0, 100, "% of the drives", "drives with a load picked up and put down")
     ] = 40.0
     sensor_fault_pct: Annotated[
         float,
-        number(0, 100, "% of the drives", "with a fault of the sway sensors, where there are"),
+        number(0, 100, "% of the drives", "drives with a fault of the sway sensors"),
     ] = 10.0
     bus_fault_pct: Annotated[
-        float, number(0, 100, "% of the drives", "with joystick frames lost, late or wrong")
+        float, number(0, 100, "% of the drives", "drives with joystick frames lost, late or wrong")
     ] = 10.0
 
 

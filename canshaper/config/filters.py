@@ -129,6 +129,11 @@ class FilterSection(Section):
             check(**self.parameters())
         return self
 
+    @property
+    def runs_ahead(self) -> bool | None:
+        """Whether the filter runs far ahead of the demand, see ``ShaperKind``."""
+        return KINDS[self.kind].runs_ahead
+
     def parameters(self) -> dict[str, Any]:
         """Return the parameters for ``build_shaper``, by name."""
         return self.model_dump(exclude={"kind", "designed_for"}, exclude_none=True)

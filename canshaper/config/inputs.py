@@ -236,7 +236,6 @@ Kind = Literal["angle", "inclination", "rate"]
 class SwaySensorSection(NamedCodes, InputSection):
     """A sensor that measures the swing of the tool in the plane of the axis.
 
-    Kind angle is the angle of a joint, inclination the tool's against the vertical, rate a gyro's.
     Several axes may read the same message. Offset, noise and largest offset are in degrees, those
     of a rate in degrees per second.
     """
@@ -246,7 +245,8 @@ class SwaySensorSection(NamedCodes, InputSection):
     merit: str | None = Field(
         None, description="signal of its figure of merit, as in SSI: 0 good, all else measures none"
     )
-    kind: Kind = Field(description="what it measures")
+    kind: Kind
+    """What it measures: angle of a joint, inclination against the vertical, rate of a gyro."""
     fusion_s: (
         Annotated[
             float,
@@ -256,11 +256,11 @@ class SwaySensorSection(NamedCodes, InputSection):
     ) = None
     """Time constant with which an inclinometer corrects its gyro by accelerations, of its data
     sheet; 0 without a gyro."""
-    use: Literal["watch", "damp"] = Field(
-        "watch", description="say whether it can be trusted, or damp the swing by it too"
-    )
+    use: Literal["watch", "damp"] = "watch"
+    """watch only says whether it could be trusted; damp feeds the swing back, with filters of kind
+    robust and gff."""
     invert: bool = Field(
-        False, description="a tip that speeds up in positive direction makes it negative"
+        False, description="it is negative where the tip speeds up in positive direction"
     )
     delay_ms: Annotated[
         float, number(0, 500, "ms", "age of a measurement when its frame arrives")

@@ -1,53 +1,54 @@
-"""Numbers of a running machine, changed within the limits of its deployment file.
+"""Numbers that change while the machine runs, within the ranges of its deployment file.
 
-The new numbers are lost when the daemon ends or reads its file again.
+A changed number holds until the daemon ends, or reads its file again.
 """
 
 from collections.abc import Iterable, Mapping
 
 from canshaper.config.adjust import Key, adjusted, value
 from canshaper.config.schema import AxisSection
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisControl
 from canshaper.machine.filters import filter_fault
 from canshaper.machine.stop_distance import stop_fault
 
-# In one request: each axis that changes costs the loop some 40 us.
+# Most numbers in one request: each axis that changes takes about 40 us of the loop.
 MOST_NUMBERS = 16
 
 
 class Adjuster:
-    """Changes numbers that the deployment's ``control`` section allows to change.
+    """Changes the numbers that the section ``control`` of the file makes adjustable.
 
     Args:
-        controller: the machine.
+        controller: controller of the machine.
     """
 
     def __init__(self, controller: Controller) -> None:
         self._axes, self._motions = controller.axes, controller.motions
         self._deployment = controller.deployment
-        control = self._deployment.config.control
-        self._ranges = control.adjustable if control else {}
+        section = self._deployment.config.control
+        self._ranges = section.adjustable if section else {}
         self._in_file = {text: self._now(text) for text in self._ranges}
 
     def table(self) -> dict[str, dict[str, float]]:
-        """Return value now, value in the file, minimum and maximum of every adjustable number."""
+        """Return each adjustable number: its value now and in the file, its minimum and maximum."""
         return {
             text: {"now": self._now(text), "file": self._in_file[text], "low": low, "high": high}
             for text, (low, high) in self._ranges.items()
         }
 
     def change(self, values: Mapping[str, object]) -> list[str]:
-        """Change numbers, all or none of them, without a jump of any output.
+        """Change all of these numbers or none, without a jump of any output.
 
         Args:
-            values: numbers by their keys, as in the file's ``adjustable``.
+            values: new numbers by their keys, as in the file's ``adjustable``.
 
         Returns:
-            What has changed, a line for the log each.
+            A line for the log for each number that has changed.
 
         Raises:
-            ValueError: what was expected and what came; nothing has changed.
+            ValueError: a number is refused; the text says what was expected and what came. No
+                number has changed.
         """
         numbers = dict(self._checked(values))
         by_axis: dict[str, dict[Key, float]] = {}
@@ -88,20 +89,20 @@ class Adjuster:
                 raise ValueError(f"{text}: expected {low:g} to {high:g}, got {number:g}")
             yield _key(text), float(number)
 
-    def _config(self, name: str, runner: AxisControl, values: Mapping[Key, float]) -> AxisSection:
+    def _config(self, name: str, control: AxisControl, values: Mapping[Key, float]) -> AxisSection:
         try:
-            config = adjusted(runner.bound.config, values, self._deployment.config.axes[name])
+            config = adjusted(control.bound.config, values, self._deployment.config.axes[name])
         except ValueError as error:
             raise ValueError(f"axes.{name}.{error}") from None
-        before = runner.limits(runner.bound.config)
-        if runner.limits(config) != before and not runner.axis.neutral:
-            state = runner.axis.state.name
+        before = control.limits(control.bound.config)
+        if control.limits(config) != before and not control.axis.neutral:
+            state = control.axis.state.name
             raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
-        if runner.axis.output.commanded and not runner.axis.command:
-            # Another filter may ask for a motion that no one asks for any more.
+        if control.axis.output.commanded and not control.axis.demand:
+            # A new filter could open the valve again, though no one demands motion any more.
             raise ValueError(f"axes.{name}: it runs on with its joystick released; wait for rest")
         rate = config.limits.slowest_per_s
-        if fault := filter_fault(config.filter, config.sway, runner.period_s, rate):
+        if fault := filter_fault(config.filter, config.sway, control.period_s, rate):
             raise ValueError(f"axes.{name}.filter: {fault}")
         if fault := stop_fault(self._deployment, name, config):
             raise ValueError(f"axes.{name}.limits.stop_distance_m: {fault}")

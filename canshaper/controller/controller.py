@@ -6,11 +6,11 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.axis_control import AxisControl
+from canshaper.controller.couplings import Couplings
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.motion import Couplings
-from canshaper.controller.received import MachineInputs, parts, received_by
-from canshaper.controller.runner import AxisControl
-from canshaper.controller.status import SensorReport, StatusMessages
+from canshaper.controller.machine_inputs import MachineInputs, parts, received_by
+from canshaper.controller.status_messages import SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
 from canshaper.inputs.input import Key, Part, carry_over
 from canshaper.inputs.stops import EnableGate
@@ -23,17 +23,18 @@ NOWHERE: frozenset[str] = frozenset()
 
 
 class Controller:
-    """All axes of a deployment.
+    """Controls all axes of a machine: takes the frames received, and yields the frames to send.
 
     Attributes:
-        counters: what went wrong so far.
+        counters: counts of the faults so far.
         joysticks: the joysticks by name.
-        inputs: input of each message that is known by its identifier.
-        events: changes of state since the owner last emptied the list.
+        inputs: receiver of each message that has an exact identifier.
+        events: events for the log since the owner last emptied the list.
         motions: the two-axis motions.
         status: the status messages.
-        moves: whether the frame that was handed out last is that of a valve, and any axis moves.
-        not_neutral: exception in the last ``neutral_frames``; None without one.
+        moves: whether the frame that was handed out last is a valve's, and an axis that has run in
+            this tick moves.
+        not_neutral: first exception in the last ``neutral_frames``; None without one.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -55,11 +56,11 @@ class Controller:
             for name, bound in deployment.axes.items()
         }
         self.status = StatusMessages(deployment, self.axes, self._senders)
-        for runner in self.axes.values():
-            if switches := inputs.gates.get(runner.bound.config.command.joystick):
-                runner.stops.interlocks.append(EnableGate(switches))
-            if runner.bound.feedback and runner.feedback:
-                inputs.bound.append((runner.bound.feedback, runner.feedback))
+        for control in self.axes.values():
+            if switches := inputs.gates.get(control.bound.config.command.joystick):
+                control.stops.interlocks.append(EnableGate(switches))
+            if control.bound.feedback and control.feedback:
+                inputs.bound.append((control.bound.feedback, control.feedback))
         self._sensors: dict[str, SensorReport] = {}
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
@@ -80,15 +81,15 @@ class Controller:
         self.moves = False
 
     def carry_over(self, before: "Controller") -> None:
-        """Continue where the controller that ran before a reload has ended.
+        """Continue from the state of the controller that ran before a reload.
 
-        Latched states, reports of other nodes and alive counters stay as they are. A bus that was
-        opened again has missed frames: the last good values from it no longer count.
+        Trips, reports of other nodes and alive counters stay as they are. A bus that was opened
+        again has missed frames, so the values last received on it no longer count.
         """
         self._overrun.copy_state(before._overrun)
         if before._stop is not None:
-            for runner in before.axes.values():
-                runner.stops.see(before._stop)
+            for control in before.axes.values():
+                control.stops.see(before._stop)
         carry_over(before._parts(), self._parts())
         open_before = before.deployment.config.buses.values()
         for name, bus in self.deployment.config.buses.items():
@@ -103,29 +104,29 @@ class Controller:
 
     @property
     def neutral(self) -> bool:
-        """Whether no axis can move without the operator."""
-        return all(runner.axis.neutral for runner in self.axes.values())
+        """Whether every axis is in a state in which its valve gets neutral."""
+        return all(control.axis.neutral for control in self.axes.values())
 
     @property
     def silent_buses(self) -> frozenset[str]:
-        """Buses on which we have no address yet, or no longer."""
+        """Buses on which only a protocol may send now, because we have no address there."""
         return NOWHERE.union(*(protocol.silent for protocol in self._protocols))
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Take a frame that was received.
+        """Take a received frame.
 
         Args:
             frame: the frame.
-            arrived_ns: time of its arrival, from which its age counts; not after the tick that
-                follows.
+            arrived_ns: monotonic time of its arrival, from which its age counts; not later than
+                the next tick.
 
         Returns:
-            The frame for the other bus of a gateway, to be sent at once; else None.
+            A frame for the other bus of a gateway, which the caller sends at once; else None.
         """
         key = frame[:3]
         if (entry := self.inputs.get(key)) is not None:
             fault = entry.receive(frame.data, arrived_ns)
-        elif key in self._sent:  # a bus never hands back what was sent by us
+        elif key in self._sent:  # a bus never hands back our own frames
             fault = FrameFault.SECOND_SENDER
             self._outputs.foreign_sender(key, arrived_ns)
         elif (handler := self._handler(frame)) is not None:
@@ -139,21 +140,21 @@ class Controller:
         return self._forward(frame, arrived_ns) if self._forwarding else None
 
     def _handler(self, frame: Frame) -> FrameHandler | None:
-        """Return the handler of a frame that is known by more than its identifier."""
+        """Return a protocol's handler of a frame that has no exact identifier, or None."""
         for protocol in self._protocols:
             if (handler := protocol.handler(frame)) is not None:
                 return handler
         return None
 
     def _forward(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Return the frame for the other bus of a gateway, if a joystick has received one."""
+        """Return a joystick's new frame with our velocities for the other bus of a gateway."""
         for rule in self._forwarding.values():
             if rule.new_frame():
-                if self._stood_still:  # a frame that has waited is not passed on later either
+                if self._stood_still:  # this frame has waited: it is never passed on
                     return None
                 if (stop := self._stop) is not None:
-                    for runner in self.axes.values():
-                        runner.stops.see(stop)
+                    for control in self.axes.values():
+                        control.stops.see(stop)
                 stopped = stop is not None and stop.stops(arrived_ns)
                 passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
                 self.moves = rule.moves
@@ -161,18 +162,18 @@ class Controller:
         return None
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """Run every axis that is due.
+        """Run every axis that is due, and yield the frames to send.
 
-        The frames come one by one: the frame of each valve as soon as its axis has moved, all of
-        them before any status. The caller sends each at once, and has to take all of them.
+        A valve's frame comes as soon as the last of its axes has its setpoint; all valves come
+        before any status. The caller sends each frame at once, and has to take all of them.
 
         Args:
             now_ns: monotonic time of this tick.
-            missed: deadlines missed since the last tick; the last output was held meanwhile.
+            missed: deadlines missed since the last tick; the valves kept their last output.
 
         Yields:
-            The frames to send now. One that could not be sent is reported by ``send_failed``,
-            and never sent later.
+            The next frame. The caller reports one that it could not send by ``send_failed``, and
+            never sends it later.
         """
         last, now = self._last, self._last + 1 + missed
         self._last = now
@@ -185,22 +186,22 @@ class Controller:
         if self._couplings.any:
             self._couplings.step(now_ns, last, now, self.events)
         silent = self.silent_buses if self._protocols else NOWHERE
-        for name, runner, message, rule in self._outputs.turns:
-            period = runner.period_ticks
+        for name, control, message, rule in self._outputs.turns:
+            period = control.period_ticks
             if now // period - last // period:
-                transition = runner.tick(now_ns, self._stop, overrun)
-                self.moves |= runner.axis.output.steps != 0
+                transition = control.tick(now_ns, self._stop, overrun)
+                self.moves |= control.axis.output.steps != 0
                 if rule is not None:
                     if (own := rule.own(now_ns)) is not None:
                         yield own
                 elif message is not None and message.key[0] not in silent:
                     yield message.frame()
-                runner.axis.advance()
-                if runner.feedback is not None or runner.axis.sensed is not None:
-                    self._report(name, runner, now_ns)
+                control.axis.propagate()
+                if control.feedback is not None or control.axis.sensed is not None:
+                    self._report(name, control, now_ns)
                 if transition is not None:
-                    self._changed(name, runner, transition)
-                    changed.append(runner)
+                    self._changed(name, control, transition)
+                    changed.append(control)
         self.moves = False
         for frame in self.status.frames(changed, self.counters, last, now):
             if frame.bus not in silent:
@@ -208,15 +209,15 @@ class Controller:
         if self._protocols:
             yield from self._of_protocols(now_ns)
 
-    def _changed(self, name: str, runner: AxisControl, transition: Transition) -> None:
-        """Report the change of state of an axis; a trip ends what a two-axis motion adds."""
+    def _changed(self, name: str, control: AxisControl, transition: Transition) -> None:
+        """Report a change of state; a trip ends the velocity that a two-axis motion adds."""
         self.events.append(StateEvent(name, transition))
         if transition.new is State.TRIPPED:
             for motion in self.motions:
-                motion.on_trip(runner)
+                motion.on_trip(control)
 
     def _of_protocols(self, now_ns: int) -> Iterator[Frame]:
-        """Yield the frames of protocols besides commands and status; take faults and events."""
+        """Yield the protocols' own frames; count their faults, and take over their events."""
         for protocol in self._protocols:
             if fault := protocol.silence(now_ns):
                 self.counters.add(fault)
@@ -227,15 +228,15 @@ class Controller:
         """Count missed deadlines; return the axes whose filters failed in them."""
         self.counters.add(FrameFault.MISSED_DEADLINE, now - last - 1)
         changed = []
-        for name, runner in self.axes.items():
-            if (transition := runner.hold(last, now)) is not None:
-                self._changed(name, runner, transition)
-                changed.append(runner)
+        for name, control in self.axes.items():
+            if (transition := control.hold(last, now)) is not None:
+                self._changed(name, control, transition)
+                changed.append(control)
         return changed
 
-    def _report(self, name: str, runner: AxisControl, now_ns: int) -> None:
+    def _report(self, name: str, control: AxisControl, now_ns: int) -> None:
         """Report changes of the valve's feedback and of the sway sensor."""
-        sent, feedback = runner.axis.sent, runner.feedback
+        sent, feedback = control.axis.output.setpoint, control.feedback
         if feedback is not None and feedback.check(sent, now_ns):
             event = FeedbackEvent(name, feedback.following, feedback.part, sent)
             self.events.append(event)
@@ -245,20 +246,20 @@ class Controller:
             self.events += sensor.events()
 
     def stalled(self) -> None:
-        """Distrust every input: the loop stood still for longer than any input may age.
+        """Invalidate every input, because the loop stood still for too long; moving axes trip.
 
-        Axes in motion trip. The next tick also invalidates the frames that have waited in the
-        sockets until then; a fault or trip in one of them counts, though it may be over by now.
+        The frames that wait in the sockets are read before the next tick, and invalidated by it. A
+        fault or a cause of a trip in one of them still counts, even if a later frame ends it.
         """
         self._stood_still = True
         for protocol in self._protocols:
             protocol.stalled()
-        for runner in self.axes.values():
-            runner.stops.invalid = True
-            runner.trip_in_motion(Reason.LOOP_STALLED)
+        for control in self.axes.values():
+            control.stops.invalid = True
+            control.trip_in_motion(Reason.LOOP_STALLED)
 
     def _invalidate(self, bus: str | None = None) -> None:
-        """Invalidate the inputs of one bus, or all: they have to come again before they count."""
+        """Invalidate the inputs of one bus, or of all: only new frames count again."""
         for (where, _, _), entry in self.inputs.items():
             if bus in (None, where):
                 entry.invalidate()
@@ -266,28 +267,28 @@ class Controller:
             protocol.invalidate(bus)
 
     def on_bus_off(self, bus: str) -> None:
-        """Pass on to the protocols that we are off a bus: frames are missed there."""
+        """Tell the protocols that our CAN controller is off a bus, and misses frames there."""
         for protocol in self._protocols:
             protocol.on_bus_off(bus)
 
     def send_failed(self, frame: Frame) -> None:
-        """Take note that a frame did not reach its bus; the axes of a valve frame trip."""
+        """Count a frame that did not reach its bus; a valve frame trips its moving axes."""
         self.counters.add(FrameFault.SEND_FAILED)
         for protocol in self._protocols:
             protocol.send_failed(frame)
         self._outputs.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
+        """Return whether a late valve frame moves a valve, and so must not leave."""
         return self._outputs.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
-        """Trip the axes of a valve frame that the gate has refused; see ``ValveOutputs``."""
+        """Trip the axes of a valve frame that the gate has refused; see ``ValveMessages``."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
         return self._outputs.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return a neutral frame for every valve, the last frames sent; see ``not_neutral``."""
+        """Return a neutral frame for every valve, to be sent last; see ``not_neutral``."""
         errors: list[Exception] = []
         for protocol in self._protocols:
             try:

@@ -33,7 +33,14 @@ class StateEvent:
 
 @dataclass(frozen=True, slots=True)
 class FeedbackEvent:
-    """Change of a valve's state by its feedback."""
+    """The feedback of a valve shows another state of the valve.
+
+    Attributes:
+        axis: name of the axis.
+        following: the new state.
+        value: the feedback as a part of full.
+        sent: the setpoint as a part of full.
+    """
 
     axis: str
     following: Following
@@ -48,7 +55,7 @@ class FeedbackEvent:
 
     @property
     def fault(self) -> FrameFault:
-        """Fault that the event counts as; none where the valve follows."""
+        """Fault that the event counts as; ``NONE`` where the valve follows."""
         return FAULT_OF.get(self.following, FrameFault.NONE)
 
 
@@ -57,9 +64,9 @@ class MotionEvent:
     """The axes of a two-axis motion move as one again, or each by itself.
 
     Attributes:
-        motion: its name in the file.
-        why: what keeps the axes apart: ``radius=lost``, or an axis with its state; empty where
-            nothing does.
+        motion: name of the motion in the file.
+        why: what keeps the axes apart: ``radius=lost``, or an axis with its state; empty where they
+            move as one.
     """
 
     motion: str
@@ -73,11 +80,13 @@ class MotionEvent:
 
 @dataclass(frozen=True, slots=True)
 class ValueEvent:
-    """A measured value is known again, lost, or restless: it jumps to and fro.
+    """A measured value has become known, lost, or restless: it jumps to and fro.
 
     Attributes:
-        name: ends of an axis, load_state, flow of other functions, hydraulics.
-        state: known, lost or restless; of the pump, whether it delivers enough for all axes.
+        name: the value: ends or rope length of an axis, load state, flow of other functions, or
+            hydraulics.
+        state: known, lost, jumped or restless; for hydraulics, whether the pump delivers enough for
+            all axes.
     """
 
     name: str
@@ -107,9 +116,9 @@ class SwingLengthEvent:
     """Change of the measured pendulum length: it differs from the file, or agrees with it again.
 
     Attributes:
-        axis: its name in the file.
-        seen: what the sway sensor has shown.
-        file: sway data of the axis.
+        axis: name of the axis in the file.
+        seen: length that the sway sensor has shown.
+        file: sway data of the axis in the file.
     """
 
     axis: str
@@ -138,7 +147,7 @@ def _shown(frame: Frame) -> str:
 
 @dataclass(frozen=True, slots=True)
 class DisagreementEvent:
-    """Gate and codecs disagree about a frame of a joystick."""
+    """Gate and codecs decode different demands from a joystick's frame."""
 
     frame: Frame
     axis: str

@@ -1,4 +1,4 @@
-"""Sway data and filter of an axis, chosen in motion by load state and operator."""
+"""Choice of an axis' sway data and filter by load state and operator, in motion too."""
 
 import math
 from collections import deque
@@ -21,22 +21,23 @@ from canshaper.shaping.registry import (
 
 # Shortest time between two changes of one axis: a noisy weight must not keep the loop busy.
 LEAST_BETWEEN_NS = 100_000_000
-# A profile that changes on the way to a speed leaves as much swing as no filter: it waits until the
-# axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
+# A profile that changes on the way to a speed would leave as much swing as no filter. So the change
+# waits until the axis is at rest, or has kept the demanded speed, within this part of full speed,
+# for this time.
 STEADY = 0.02
 STEADY_NS = 200_000_000
-LATE_S = 1.0  # a load is gripped at rest: so soon in a press its signal is late
-# A load is gripped and dropped once in so long; a signal that says so again does not settle.
+LATE_S = 1.0  # a load is gripped at rest: a signal that changes this soon in a press is late
+# No crane grips or drops loads more than twice in this time: a signal that does is restless.
 SETTLES_NS = 2_000_000_000
 _MOST_JUMPS = 3
 
 
 class Load:
-    """The load, or that it is not known: its signal is silent, or jumps to and fro.
+    """Load by its signal; not known while the signal is silent, or jumps to and fro.
 
     Args:
-        signal: says what hangs on the crane.
-        breakpoints: all of them of the machine.
+        signal: signal of the load state.
+        breakpoints: load states of all parameter sets of the machine.
 
     Attributes:
         value: the load, in the unit of its signal; None while it is not known.
@@ -49,11 +50,11 @@ class Load:
         self._signal = signal
         self._jump = 0.5 * (max(breakpoints) - min(breakpoints))
         self._jumps_ns: deque[int] = deque(maxlen=_MOST_JUMPS)
-        self._said: float | None = None  # before it jumped last
+        self._said: float | None = None  # value after the last jump
         self._state = "known"
 
     def step(self, now_ns: int) -> ValueEvent | None:
-        """Take what the signal says now; whether it is known, where that has changed."""
+        """Read the signal; return the event if its state has changed."""
         value, jumps_ns = self._signal.fresh(now_ns), self._jumps_ns
         if value is not None and (self._said is None or abs(value - self._said) >= self._jump > 0):
             if self._said is not None:
@@ -73,14 +74,14 @@ class SetChooser:
 
     Args:
         bound: the axis.
-        axis: its state machine, which is retuned.
-        load: what hangs on the crane, where there is a signal for it.
+        axis: the shaped axis, which is retuned.
+        load: the load, or None without a signal for it.
         profile: see below.
 
     Attributes:
-        profile: the operator's choice, where there is one.
-        number: set in force: 0 the axis' own, then its sets, then each profile and its sets, in the
-            order of the file; between two sets the nearer one.
+        profile: the operator's choice, or None.
+        number: number of the parameter set in force: 0 the axis' own, then its sets, then each
+            profile and its sets, in the order of the file; between two sets the nearer one.
     """
 
     def __init__(
@@ -101,20 +102,21 @@ class SetChooser:
         self._now: tuple[str, int | None] = ("", None)
         self._not_before_ns = 0
         self._maximum = config.limits.max_pct / 100.0
-        self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
-        # What drove the axis in each tick of a press that began at rest; None: in another one.
+        self._restless_ns: int | None = None  # when the speed was not steady, while a profile waits
+        # Velocity that drove the sway model in each tick of a press that began at rest; None in a
+        # later press.
         self._driven: list[float] | None = []
         self._late = round(LATE_S / axis.sway.tick_s) if axis.sway else 0
 
     def update(self, now_ns: int) -> None:
-        """Retune the axis where something has changed."""
+        """Retune the axis if load or operator asks for another parameter set."""
         self._follow_press()
         name = self.profile.name(now_ns) if self.profile else ""
         if name not in self._programs:
             name = ""
         before, steps = self._now
         value = self._load.value if self._load else None
-        lost = value is None and steps is not None  # on the way to a speed it hangs there still
+        lost = value is None and steps is not None  # while the speed changes it hangs there still
         if name == before and not lost:
             self._restless_ns = None
         elif not self._steady(now_ns):
@@ -138,36 +140,36 @@ class SetChooser:
         )
 
     def _follow_press(self) -> None:
-        """Remember what drove the axis in the last tick, in its first press since rest."""
+        """Record what drove the sway model in the last tick, in the first press since rest."""
         axis, driven = self._axis, self._driven
         if not axis.output.commanded:
             self._driven = []
         elif driven is not None:
             driven.append(axis.output.applied)
-            if axis.command == 0.0 or len(driven) > self._late:
+            if axis.demand == 0.0 or len(driven) > self._late:
                 self._driven = None
 
     def _steady(self, now_ns: int) -> bool:
-        """Whether another profile may be taken now."""
+        """Return whether the axis is at rest or steady, so that the profile may change."""
         axis = self._axis
         if axis.neutral:
             return True
-        speed = min(abs(axis.command), self._maximum)
-        off = abs(axis.output.applied - math.copysign(speed, axis.command))
+        speed = min(abs(axis.demand), self._maximum)
+        off = abs(axis.output.applied - math.copysign(speed, axis.demand))
         if off > STEADY or self._restless_ns is None:
             self._restless_ns = now_ns
         return now_ns - self._restless_ns >= STEADY_NS
 
 
 def profile_by_number(bound: BoundAxis) -> list[str]:
-    """Name of the profile that each set of an axis belongs to, by its number."""
+    """Return the profile of each parameter set of an axis, by the number of the set."""
     if not bound.config.profiles:
         return []
     return [name for name, (_, sets) in programs(bound).items() for _ in range(1 + len(sets))]
 
 
 def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[ParameterSet]]]:
-    """Return the parameter sets of an axis by the name of the profile ("" without one)."""
+    """Return base set and breakpoint sets of each profile by its name ("" without one)."""
     config = bound.config
     assert config.sway is not None  # checked with the deployment
     mode = config.sway.mode()

@@ -1,25 +1,26 @@
-"""Valve messages: their axes, counters of faults, and frames that come too late."""
+"""Valve messages and their axes; counters of faults; detection of an overrun."""
 
 from collections.abc import Mapping, Sequence
 from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.message import Sender
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.protocols.interface import ForwardingRule, MessageKey
 from canshaper.shaping.states import Reason
 
 Turn = tuple[str, AxisControl, Sender | None, ForwardingRule | None]
-"""An axis with its name; the last axis of a message with that message, or a forwarding rule."""
+"""Name and control of an axis; for the last axis of a message its sender and forwarding rule."""
 
 
 class ValveOutputs:
-    """All valve messages.
+    """All valve messages of a machine, each with the axes in it.
 
     Args:
         axes: the axes by name, in their order.
         valves: names of the axes that command each message, by its identifier.
-        forwarding: rules by which frames leave in place of a message, by its identifier.
+        forwarding: rules by which joystick frames leave in place of a valve message, by its
+            identifier.
 
     Attributes:
         turns: the axes in their order; a message goes out with the last one of its axes.
@@ -34,32 +35,32 @@ class ValveOutputs:
         self._axes = {key: [axes[name] for name in names] for key, names in valves.items()}
         self._forwarding = forwarding
         self.turns: list[Turn] = []
-        for name, runner in axes.items():
-            key = runner.valve.key
-            if self._axes[key][-1] is runner:
-                self.turns.append((name, runner, runner.valve, forwarding.get(key)))
+        for name, control in axes.items():
+            key = control.valve.key
+            if self._axes[key][-1] is control:
+                self.turns.append((name, control, control.valve, forwarding.get(key)))
             else:
-                self.turns.append((name, runner, None, None))
+                self.turns.append((name, control, None, None))
 
     def foreign_sender(self, key: MessageKey, arrived_ns: int) -> None:
         """Trip the axes of a message that another sender has sent."""
-        for runner in self._axes.get(key, ()):
-            runner.stops.foreign_sender(arrived_ns)
+        for control in self._axes.get(key, ()):
+            control.stops.foreign_sender(arrived_ns)
 
     def send_failed(self, key: MessageKey) -> None:
-        """Trip the axes in motion of a message that did not reach its bus."""
-        for runner in self._axes.get(key, ()):
-            runner.trip_in_motion(Reason.SEND_FAILED)
+        """Trip the moving axes of a message that did not reach its bus."""
+        for control in self._axes.get(key, ()):
+            control.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a frame that comes too late moves a valve, and so must not leave.
+        """Return whether a late frame moves a valve, and so must not leave.
 
-        Its receiver will see no gap in the counter.
+        If so, its alive counter is taken back: the valve sees no gap.
         """
-        runners = self._axes[frame[:3]]
-        if not any(runner.axis.raw for runner in runners):
+        controls = self._axes[frame[:3]]
+        if not any(control.axis.output.steps for control in controls):
             return False
-        runners[-1].valve.take_back()
+        controls[-1].valve.take_back()
         return True
 
     def refused(self, frame: Frame) -> Frame:
@@ -68,35 +69,35 @@ class ValveOutputs:
         Returns:
             The same frame with neutral commands, to be sent in its place.
         """
-        runners = self._axes[frame[:3]]
-        for runner in runners:
-            runner.stops.trip = Reason.OUTPUT_REFUSED
-            runner.put(0)
-        return runners[0].valve.instead(frame)
+        controls = self._axes[frame[:3]]
+        for control in controls:
+            control.stops.trip = Reason.OUTPUT_REFUSED
+            control.put(0)
+        return controls[0].valve.instead(frame)
 
     def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
-        """Return a neutral frame for every valve whose bus is not silent, the last frames sent.
+        """Return a neutral frame, to be sent last, for every valve whose bus is not silent.
 
         Args:
-            silent: names of those buses.
-            errors: gets the exceptions; the other valves still get their frames.
+            silent: names of the silent buses.
+            errors: list that gets the exceptions; the other valves still get their frames.
         """
         frames: list[Frame] = []
-        for key, runners in self._axes.items():
+        for key, controls in self._axes.items():
             try:
-                for runner in runners:
-                    runner.put(0)
+                for control in controls:
+                    control.put(0)
                 if (rule := self._forwarding.get(key)) is not None:
                     frames += rule.last()
                 elif key[0] not in silent:
-                    frames.append(runners[-1].valve.frame())
+                    frames.append(controls[-1].valve.frame())
             except Exception as error:
                 errors.append(error)
         return frames
 
 
 class Counters:
-    """Counters of faults, by the signal names of the status message."""
+    """Counts of faults, by the signal names of the status message."""
 
     __slots__ = ("last_fault", "values")
 
@@ -120,7 +121,7 @@ class Counters:
         self.last_fault = FrameFault.NONE
 
     def add(self, fault: FrameFault, count: int = 1) -> None:
-        """Count a fault and remember it as the last one."""
+        """Count a fault, and store it as the last one."""
         self.last_fault = fault
         signal = self.SIGNAL_OF.get(fault)
         if signal is not None:
@@ -131,8 +132,8 @@ class Counters:
         return {**self.values, "LastFault": int(self.last_fault)}
 
 
-# A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
-# than one in six for long, are an overrun; it ends with the count at 0, after 50 punctual ticks.
+# A late tick adds five to the count, a punctual one takes one away. Ten late ticks in a row, or
+# more than one in six for long, are an overrun. It ends at the count 0, after 50 punctual ticks.
 LATE_WEIGHT = 5
 LATE_LIMIT = 50
 
@@ -151,11 +152,11 @@ class OverrunDetector:
         self._overrun = False
 
     def copy_state(self, before: Self) -> None:
-        """Continue where another one has ended."""
+        """Copy the state of the detector before a reload."""
         self.late, self._overrun = before.late, before._overrun
 
     def tick(self, *, late: bool) -> bool:
-        """Count a tick; return whether there is an overrun. Called while ``late`` is not 0."""
+        """Count a tick; return whether there is an overrun. Punctual ticks at 0 need no call."""
         if late:
             self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self.late == LATE_LIMIT

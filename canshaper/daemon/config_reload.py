@@ -1,6 +1,6 @@
-"""Reads a deployment in a process of its own, so that the control loop never waits for it.
+"""Reads a deployment in a forked process, so that the control loop never waits for it.
 
-The process may take only so much memory and time: docs/decisions.md#the-loop-waits-for-no-one.
+Memory and time of that process are limited: docs/decisions.md#the-loop-waits-for-no-one.
 """
 
 import os
@@ -16,26 +16,26 @@ from typing import BinaryIO, NoReturn
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 
-# Ten times what the largest deployment takes that is allowed (canshaper.config.source and
-# canshaper.machine say how large), on a PC that is ten times as slow as today's.
+# Ten times the need of the largest allowed deployment (limits in canshaper.config.source and
+# canshaper.machine), on a PC that is ten times as slow as today's.
 MOST_CPU_S = 20
-MOST_S = 60.0  # by the clock: it runs behind the loop and all else
-MOST_BYTES = 140 << 20  # more than the daemon has, which it shares with it
+MOST_S = 60.0  # wall time: the loop and other programs run first
+MOST_BYTES = 140 << 20  # beyond the memory of the daemon, which it shares
 
 
 class ConfigReload:
-    """A deployment that is being read.
+    """A deployment that a forked process reads.
 
     Args:
-        load: reads and checks the deployment; called in the other process.
+        load: reads and checks the deployment; called in the forked process.
 
     Raises:
-        OSError: there can be no process now.
+        OSError: no process can be forked now.
     """
 
     def __init__(self, load: Callable[[], Deployment]) -> None:
         self._until_s = time.monotonic() + MOST_S
-        # In memory; it takes everything at once, unlike a pipe.
+        # A file in memory takes any amount at once; a pipe would block.
         self._file = os.fdopen(os.memfd_create("deployment"), "w+b")
         try:
             self._pid = os.fork()
@@ -46,7 +46,7 @@ class ConfigReload:
             _read(load, self._file)
 
     def result(self) -> Deployment | str | None:
-        """The deployment, or why there is none, line by line; None while it is being read."""
+        """Return the deployment, or why it is refused (text of lines); None while it is read."""
         done, status = os.waitpid(self._pid, os.WNOHANG)
         if not done:
             if time.monotonic() < self._until_s:
@@ -65,18 +65,18 @@ class ConfigReload:
         return result
 
     def end(self) -> None:
-        """Give it up; not after a result."""
+        """Kill the process; not allowed after a result."""
         os.kill(self._pid, signal.SIGKILL)
         os.waitpid(self._pid, 0)
         self._file.close()
 
 
 def _read(load: Callable[[], Deployment], file: BinaryIO) -> NoReturn:
-    """The other process: leaves the daemon's buses and log alone."""
+    """Read the deployment in the forked process, which must not touch the buses and the log."""
     status = 1
     try:
         _bound()
-        with suppress(OSError):  # with the loop's priority it could keep it from the processor
+        with suppress(OSError):  # at the priority of the loop, it could hold up the loop
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         file.write(pickle.dumps(_result(load)))
         file.flush()
@@ -101,5 +101,5 @@ def _result(load: Callable[[], Deployment]) -> Deployment | str:
         return str(error)
     except MemoryError:
         return f"its reader took more than {MOST_BYTES >> 20} MB"
-    except Exception as error:  # a fault of ours in reading must not end what runs
+    except Exception as error:  # an error of this program in reading must not end the daemon
         return f"{type(error).__name__}: {error}"

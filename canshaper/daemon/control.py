@@ -1,4 +1,4 @@
-"""Requests of clients of the control socket: which are allowed, and who asked for what."""
+"""Answers the requests of clients of the control socket, and logs who asked for a change."""
 
 import logging
 import re
@@ -20,11 +20,11 @@ class Control:
     """The control socket of a deployment.
 
     Args:
-        server: its socket.
-        controller: the machine.
-        recorder: takes the numbers that were changed.
-        black_box: takes requests for a file.
-        reporter: knows state, counters and lateness.
+        server: listening socket.
+        controller: controller whose numbers may be changed.
+        recorder: records the changed numbers, and rehearses faults.
+        black_box: writes a file on request.
+        reporter: reports state, counters and lateness.
     """
 
     def __init__(
@@ -40,16 +40,16 @@ class Control:
         self._adjuster = Adjuster(controller)
 
     def serve(self, now_ns: int) -> None:
-        """Answer one request, where one waits."""
+        """Answer one request, if one waits."""
         self._server.serve(self._answer, now_ns)
 
     def close(self) -> None:
-        """End; the path of the socket is free again."""
+        """Close the socket and remove its path."""
         self._server.close()
 
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
         values = request.get("set", {})
-        if by := str(request.get("by", "")):  # no text of theirs looks like a field of ours
+        if by := str(request.get("by", "")):  # must not look like another field of the log
             peer = f"by={re.sub(r'[^a-zA-Z0-9/_.@-]+', '_', by)[:60]} {peer}"
         known = {"set", "black_box", "by", "status", "fault"}
         if request.keys() - known or not isinstance(values, dict):
@@ -84,9 +84,12 @@ def open_control(
     black_box: BlackBox,
     reporter: Reporter,
 ) -> Control | None:
-    """Open the control socket that a file has; None where it cannot: the machine works without."""
+    """Open the control socket of a deployment; log a failure and return None.
+
+    The machine works without a control socket.
+    """
     control = deployment.config.control
-    assert control is not None  # asked for such deployments only
+    assert control is not None  # called for such deployments only
     path = control.path(deployment.path)
     try:
         server = ControlServer(path, int(control.mode, 8))

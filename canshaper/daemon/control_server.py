@@ -1,4 +1,4 @@
-"""The daemon's end of the control socket: never waits, and takes one request a tick at most."""
+"""The daemon's end of the control socket: it never blocks, and takes one request a tick at most."""
 
 import json
 import os
@@ -10,44 +10,45 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-# An answer; a deployment with a hundred adjustable numbers takes a tenth of it.
+# Largest answer; one for a hundred adjustable numbers takes a tenth of it.
 MOST_BYTES = 65536
-# A request: to read and refuse nonsense of this size costs the loop a tenth of a millisecond
+# Largest request: to read and refuse one of this size takes the loop a tenth of a millisecond
 # (benchmarks/control.py).
 MOST_REQUEST = 4096
 MOST_CLIENTS = 4
-# A client that asks nothing for so long is closed, to leave room for others.
+# A client that is silent for so long is closed, so that others can connect.
 SILENT_NS = 10_000_000_000
-# Between two requests: a slider that is dragged must not keep the loop busy.
+# Least time between two requests: someone who drags a slider must not keep the loop busy.
 LEAST_BETWEEN_NS = 50_000_000
 _PEER = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
-# Takes a request and who asks; gives the answer. Raises ValueError with what is wrong.
+# Function of a request and of a text that names the client. It returns the answer, and raises
+# ValueError for a wrong request.
 Answer = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
 
 
 class ControlServer:
-    """Listens at a path; each message is one JSON object, each gets one in return.
+    """Listens at a path. Each message is one JSON object, and the answer is one JSON object.
 
     Args:
-        path: where the socket appears; its directory has to be there.
-        mode: file mode of the socket: who may write to it may change the machine's numbers.
+        path: path of the socket; its directory must exist.
+        mode: file mode of the socket. Whoever may write to it may change numbers of the machine.
 
     Raises:
-        OSError: there can be no socket, or another daemon answers at this path.
+        OSError: the socket cannot be made, or another daemon answers at this path.
     """
 
     def __init__(self, path: Path, mode: int) -> None:
         self._path = path
         self._clients: dict[int, socket.socket] = {}
-        self._spoke_ns: dict[int, int] = {}  # when a client came, or asked last
+        self._spoke_ns: dict[int, int] = {}  # time of the last request, or of the connection
         self._not_before_ns = 0
         self._socket = _listening(path, mode)
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
 
     def serve(self, answer: Answer, now_ns: int) -> None:
-        """Take what waits: a new client, and one request of the client that asked longest ago."""
+        """Accept a new client, and answer one request: that of the client served longest ago."""
         if now_ns < self._not_before_ns:
             return
         waiting = {number for number, _ in self._poll.poll(0)}
@@ -60,10 +61,10 @@ class ControlServer:
                 continue
             client = self._clients[number]
             try:
-                data = client.recv(MOST_REQUEST + 1)  # of a longer message the rest is lost
+                data = client.recv(MOST_REQUEST + 1)  # the rest of a longer one is lost
                 if data:
                     client.send(_answered(data, answer, _peer(client)), socket.MSG_DONTWAIT)
-            except OSError:  # gone, or does not read its answers
+            except OSError:  # the client is gone, or does not read its answers
                 data = b""
             if not data:
                 self._drop(number)
@@ -73,7 +74,7 @@ class ControlServer:
             return
 
     def close(self) -> None:
-        """End; the path is free again."""
+        """Close all clients and the socket, and remove its path."""
         for number in [*self._clients]:
             self._drop(number)
         self._socket.close()
@@ -102,7 +103,7 @@ def _listening(path: Path, mode: int) -> socket.socket:
     try:
         if _is_dead(path):
             path.unlink()
-        before = os.umask(0o777 & ~mode)  # at no moment may somebody else open it
+        before = os.umask(0o777 & ~mode)  # no one else may open it at any moment
         try:
             one.bind(str(path))
         finally:
@@ -115,7 +116,7 @@ def _listening(path: Path, mode: int) -> socket.socket:
 
 
 def _is_dead(path: Path) -> bool:
-    """Whether a socket is there that no one listens at: left by a daemon that was killed."""
+    """Return whether a killed daemon left a socket at this path, at which no one listens."""
     if not path.is_socket():
         return False
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK) as one:
@@ -138,7 +139,7 @@ def _answered(data: bytes, answer: Answer, peer: str) -> bytes:
     try:
         if len(data) > MOST_REQUEST:
             raise ValueError(f"expected a request of {MOST_REQUEST} bytes at most, got more")
-        # A number of a thousand digits is infinite like every other that is too large.
+        # As floats, numbers that are too large become infinite instead of slow.
         request = json.loads(data, parse_int=float)
         if not isinstance(request, dict):
             raise ValueError('expected {} or {"set": {KEY: VALUE}}, got no object')

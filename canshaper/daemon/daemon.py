@@ -1,4 +1,4 @@
-"""The daemon: buses, controller and loop together; signals."""
+"""The daemon: it connects buses, controller and loop, and handles signals."""
 
 import logging
 import os
@@ -15,7 +15,7 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.follow import tick_follower
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
@@ -42,22 +42,22 @@ if TYPE_CHECKING:
 log = logging.getLogger("canshaper")
 
 INTERNAL_ERROR = "INTERNAL_ERROR"
-# States in which no one receives our frames, or we receive none.
+# States of a bus on which no node receives our frames, or we receive none.
 OFF_BUS = AWAY | {BusState.BUS_OFF, BusState.NOT_CONFIRMED}
 
 
 class Daemon:
-    """Runs a deployment until it is asked to stop.
+    """Runs a deployment until a signal stops it.
 
     Args:
-        load: reads the deployment, at the start and, in another process, at every SIGHUP.
-            One that only listens sends no valve frame.
-        folder: where black boxes are written; None for nowhere.
+        load: reads the deployment, at the start and, in a forked process, at every SIGHUP. The
+            daemon sends no valve frame for a deployment that only listens.
+        folder: folder for the files of the black box; None writes none.
 
     Raises:
         ConfigError: the deployment is not valid.
-        BusError: a bus cannot be opened, and no service manager has started us: under one the
-            daemon waits until it can be.
+        BusError: a bus cannot be opened, and no service manager started the daemon. Under a service
+            manager the daemon waits until the bus can be opened.
     """
 
     def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
@@ -68,7 +68,7 @@ class Daemon:
         self._reloads = Reloads(load, self._reporter.refused)
         self._black_box = BlackBox(folder)
         deployment = load()
-        program_sha256()  # kept from now on: to read the program takes longer than a tick
+        program_sha256()  # cached from now on: to read the program takes longer than a tick
         self._ports = opened_ports(deployment, self._on_fault, self._manager)
         self._line = opened_line(deployment, self._on_fault)
         self._standstill = Standstill(deployment)
@@ -76,22 +76,22 @@ class Daemon:
         self._use(deployment)
 
     def run(self) -> None:
-        """Run until SIGTERM or SIGINT; then every valve is sent neutral and the buses close.
+        """Run until SIGTERM or SIGINT, then send every valve neutral and close the buses.
 
         Raises:
-            InternalError: a part of the program raised something, after the same end.
+            InternalError: a part of the program raised an exception; the end was the same.
         """
         failure = ""
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else its reader's end is lost
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # if ignored, ``waitpid`` fails
         names = ",".join(self._controller.axes)
         if self._controller.deployment.listen_only:
             log.warning("listen-only=yes valves=none: nothing is sent but status")
         refuse_huge_pages()
         log.info("memory=%s", f"not-locked ({why})" if (why := lock_memory()) else "locked")
         self._collector.freeze()
-        # Most valves want to see it before they listen to anything else.
+        # Most valves accept other commands only after a neutral one.
         valves = self._send_neutral(wait=True)
         self._black_box.begin(boottime_ns())
         log.info(
@@ -109,7 +109,7 @@ class Daemon:
             self._manager.stopping()
             try:
                 valves = self._send_neutral(wait=True)
-            except Exception as error:  # the first failure is the one to report
+            except Exception as error:  # the first failure is reported
                 valves, failure = "not-sent", failure or f"reason={INTERNAL_ERROR} {raised(error)}"
             if failure:
                 log.critical("failed %s", failure)
@@ -128,24 +128,33 @@ class Daemon:
     # -- one tick ------------------------------------------------------------------------------
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        """Take all waiting frames, tick the axes, send, then housekeeping."""
+        """Receive all waiting frames, tick the axes and send, then do the housekeeping.
+
+        Args:
+            now_ns: time of the tick.
+            missed: deadlines missed since the last tick.
+            late_ns: lateness of the tick.
+
+        Returns:
+            Whether the loop continues; False ends it, for good or for a new deployment.
+        """
         io_cycle(self._recorder, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
         self._reporter.late(late_ns)
         self._housekeeping(now_ns)
-        # Refused or not, a reload has taken its time as all else has: the next tick sees it.
+        # A reload takes time, refused or not; the next tick counts it as lateness.
         ready = self._reloads.ready if self._controller.neutral else None
         applied = ready and not self._stop and self._apply(ready)
         return not (self._stop or applied)
 
     def _wait(self, seconds: float) -> None:
         """Pass frames on until the next deadline, in a gateway."""
-        assert self._line is not None  # asked of a gateway only
+        assert self._line is not None  # called for a gateway only
         self._line.wait(seconds, self._recorder, self._ports, self._standstill)
 
     def _housekeeping(self, now_ns: int) -> None:
-        """Report what changed; everything that may take time comes after the frames are out."""
+        """Report changes, and do all work that may take time, after the frames are sent."""
         controller = self._controller
         self._manager.ping(now_ns)
         self._reporter.events()
@@ -165,11 +174,11 @@ class Daemon:
             self._control.serve(now_ns)
         if self._reporter.status(now_ns, self._trouble):
             self._send_identity()
-            flush()  # a reader that was slow may be back
+            flush()  # a slow reader of the log may read again
         self._collector.pause(now_ns)
 
     def _trouble(self) -> list[str]:
-        """Entries that the status line of the service begins with."""
+        """Return the entries with which the status line of the service begins."""
         trouble = [f"black box not written: {fault}"] if (fault := self._black_box.fault) else []
         return trouble + ["tick plain"] * bool(self._follower and not self._follower.follows)
 
@@ -179,17 +188,17 @@ class Daemon:
         if before:
             self._recorder.reloads()
         self._controller = Controller(deployment)
-        guarded = Guarded(self._controller)
+        gated = GatedController(self._controller)
         if before:
             self._controller.carry_over(before)
-            guarded.carry_over(self._guarded)
-        self._guarded: Guarded = guarded
+            gated.carry_over(self._gated)
+        self._gated: GatedController = gated
         kind, control = Recorder, deployment.config.control
         if control and control.rehearse_faults:
             from canshaper.daemon.rehearsal.rehearsal import Rehearsal
 
             kind = Rehearsal
-        self._recorder = self._black_box.around(guarded, self._controller, kind)
+        self._recorder = self._black_box.around(gated, self._controller, kind)
         self._reporter.use(self._controller, self._ports)
         self._control: Control | None = None
         if control:
@@ -201,9 +210,12 @@ class Daemon:
         self._follower = tick_follower(deployment, self._controller)
 
     def _apply(self, deployment: Deployment) -> bool:
-        """Replace the deployment, if its buses can be opened; whether a loop has to begin.
+        """Replace the deployment if its buses can be opened.
 
-        Called with every axis neutral and behind a tick, so a bus may take its time.
+        Every axis is neutral and the tick is over, so to open a bus may take time.
+
+        Returns:
+            Whether the deployment was replaced, and so the loop has to begin again.
         """
         self._manager.reloading()
         self._reloads.ready = None
@@ -239,22 +251,26 @@ class Daemon:
         return True
 
     def _read(self, waited: Iterable[Frame]) -> None:
-        """Frames of a bus that is opened again: old by now, but bad news among them counts."""
-        self._guarded.stalled()
+        """Receive frames that waited during a reload; they are too old to move an axis."""
+        self._gated.stalled()
         now_ns = boottime_ns()
         for frame in waited:
-            self._guarded.receive(frame, now_ns)
+            self._gated.receive(frame, now_ns)
 
     # -- ends ----------------------------------------------------------------------------------
 
     def _send_neutral(self, *, wait: bool = False) -> str:
-        """Send every valve neutral; ``wait`` a moment for the frames to get onto the buses.
+        """Send every valve neutral.
+
+        Args:
+            wait: whether to wait a moment until the frames are on their buses.
 
         Returns:
-            What is known of these frames: see ``seen_sent``; ``not-sent`` where one was not.
+            ``not-sent`` if a frame was not sent; otherwise ``sent``, or the result of ``seen_sent``
+            after a wait.
 
         Raises:
-            Exception: what kept a frame from being made, after all others were sent.
+            Exception: a neutral frame could not be made; all others were sent first.
         """
         sent = send_neutral(self._ports, self._recorder.neutral_frames())
         events = self._controller.events
@@ -272,9 +288,9 @@ class Daemon:
         )
 
     def _send_identity(self) -> None:
-        """Send the digest of what runs, where there is a message for it."""
+        """Send the digest of program and deployment, if the file has a message for it."""
         frame = self._controller.status.identity(self._controller.silent_buses)
-        passes = frame and self._guarded.passes(frame, boottime_ns())
+        passes = frame and self._gated.passes(frame, boottime_ns())
         if frame and passes and not self._ports[frame.bus].send(frame):
             self._recorder.send_failed(frame)
 
@@ -290,7 +306,7 @@ class Daemon:
             self._stop = True
 
     def _leave_at_once(self, number: int) -> NoReturn:
-        """End at the second signal to stop: try neutral once more, and wait for nothing."""
+        """End at the second signal: send every valve neutral once more, and exit without a wait."""
         for frame in self._recorder.neutral_frames():
             self._ports[frame.bus].send(frame)
         self._reporter.events()

@@ -1,8 +1,8 @@
-"""Draws the deadlines to a moment after the frames of a joystick, so that they need not wait.
+"""Moves the deadlines to just after the frames of a joystick, so that no frame waits for a tick.
 
-The filter is designed for its tick: it stays within ``MOST`` of it. Nothing but the time of frames
-that passed every check is looked at; without one the deadlines stay where they are. So they do with
-a joystick whose cycle is not that of its DBC file: the deadlines could never keep up with it.
+The filter is designed for a fixed tick, so a period stays within ``MOST`` of it. Only frames that
+passed every check count. Without such frames the deadlines are not moved. Nor are they moved if the
+cycle of the joystick differs too much from its DBC file: they could never keep up with it.
 """
 
 import logging
@@ -13,32 +13,32 @@ from canshaper.machine.joysticks import follow_fault
 
 log = logging.getLogger("canshaper")
 
-# Largest part by which a period may be shorter or longer than the tick.
+# Largest relative difference between a period and the tick.
 MOST = 0.01
-# From the joystick's frame to the deadline: the frame may come so late and is still read.
+# Time from a joystick frame to the deadline, so that a frame that is late by less is still read.
 AFTER_NS = 900_000
-# Its cycle is measured over so many frames; jitter of a frame hardly shows in their mean.
+# Number of frames over which the cycle is measured; their mean hardly shows the jitter of one.
 MEASURED = 50
-# Largest error of the cycle: while it is followed, and until it is followed again.
+# Largest relative error of the cycle to continue to follow a joystick, and to follow it again.
 OFF, AGAIN = 0.9 * MOST, 0.5 * MOST
-# Frames of other joysticks that come so soon after another are waited for.
+# A deadline waits for a frame of another joystick that comes so soon after the previous frame.
 CLUSTER_NS = 1_000_000
 
 
 class TickFollower:
-    """Where the next deadline shall be.
+    """Moves the next deadline towards the frames of a joystick.
 
     Args:
-        deployment: one with ``tick``.
-        controller: its inputs know when their last good frames came.
+        deployment: a deployment with ``tick``.
+        controller: its inputs know when their last good frames arrived.
 
     Attributes:
-        follows: whether the cycle of the joystick is one that can be followed.
+        follows: whether the deadlines follow the joystick: its cycle is near that of the DBC file.
     """
 
     def __init__(self, deployment: Deployment, controller: Controller) -> None:
         tick = deployment.config.tick
-        assert tick is not None  # asked for such deployments only
+        assert tick is not None  # called for such deployments only
         self._period_ns = deployment.config.tick_ms * 1_000_000
         self._most_ns = round(MOST * self._period_ns)
         cycles = {
@@ -46,21 +46,21 @@ class TickFollower:
             for name, joystick in deployment.joysticks.items()
         }
         cycle_ns = cycles.pop(tick.follow)
-        # With several frames a tick, the nearest of them is followed.
+        # If several frames come in a tick, the deadline follows the nearest one.
         self._apart_ns = min(cycle_ns, self._period_ns)
         self._name, self.follows = tick.follow, True
         self._joystick = controller.joysticks[tick.follow]
         self._others = [controller.joysticks[n] for n, ns in cycles.items() if ns == cycle_ns]
         self._cycle_ns = cycle_ns
         self._followed_ns: int | None = None
-        self._frames, self._cycles, self._span_ns = 0, 0, 0  # since the cycle was measured last
+        self._frames, self._cycles, self._span_ns = 0, 0, 0  # since the last measured cycle
         self._news = ""
 
     def __call__(self, deadline_ns: int) -> int:
-        """How much later the next deadline shall be, ns; negative for earlier.
+        """Return by how many ns to move the next deadline; negative for earlier.
 
         Args:
-            deadline_ns: where it would be.
+            deadline_ns: time of that deadline.
         """
         came_ns = self._joystick.received_ns
         if came_ns is None or came_ns == self._followed_ns:
@@ -76,7 +76,7 @@ class TickFollower:
         return max(-self._most_ns, min(self._most_ns, error_ns))
 
     def _measure(self, passed_ns: int) -> None:
-        """Measure the cycle by the time between two frames, in which others may be lost."""
+        """Add the time between two frames to the measured cycle; frames between may be lost."""
         self._frames += 1
         self._cycles += max(1, round(passed_ns / self._cycle_ns))
         self._span_ns += passed_ns
@@ -95,12 +95,12 @@ class TickFollower:
         )
 
     def news(self) -> str:
-        """Return a line for the log where following has begun or ended."""
+        """Return a line for the log if ``follows`` changed since the last call; else empty."""
         news, self._news = self._news, ""
         return news
 
     def _last_of_cluster(self, came_ns: int) -> int:
-        """When the last of the frames came that stand next to each other from this one on."""
+        """Return the arrival of the last frame in the cluster that begins with this frame."""
         cycle_ns = self._cycle_ns
         offsets = [
             (other_ns - came_ns) % cycle_ns
@@ -116,9 +116,9 @@ class TickFollower:
 
 
 def tick_follower(deployment: Deployment, controller: Controller) -> TickFollower | None:
-    """Make the follower of a joystick; None where the ticks stay where they are.
+    """Make the follower of a joystick; None if the file has none, or the joystick has no times.
 
-    The command line may have put a bus on an interface that does not say when frames came.
+    The command line may have put its bus on an interface that does not stamp frames.
     """
     tick = deployment.config.tick
     if tick is None:

@@ -1,4 +1,4 @@
-"""The daemon in the line: it waits for frames, not only for its deadline, and passes them on."""
+"""The daemon as an inline gateway: between two deadlines it waits for frames and passes them on."""
 
 import errno
 import logging
@@ -24,20 +24,21 @@ from canshaper.protocols.gateway.rules import excluded, passing_rules
 
 log = logging.getLogger("canshaper")
 
-# Foreign frames that are passed on before the joysticks are looked at again.
+# Most frames of others that are passed on before the joysticks are read again.
 MOST_AT_ONCE = 8
-# Rounds that find nothing to take though a socket has something: frames of no use, or an error.
+# Most rounds in which a socket is readable but gives no frame: useless frames, or an error.
 MOST_EMPTY = 10
+# Time between two checks of the kernel's rules.
 CHECK_NS = 10_000_000_000
 
 
 class Bridge:
-    """Passes the frames of others on, in both directions and in their order.
+    """Passes the frames of other nodes on, in both directions and in order.
 
     Args:
-        buses: both, of SocketCAN.
-        excluded: the frames that do not pass.
-        on_fault: called with every frame that could not be passed on.
+        buses: the two buses of SocketCAN.
+        excluded: patterns of the frames that do not pass.
+        on_fault: called for every frame that could not be passed on.
 
     Raises:
         BusError: an interface cannot be opened.
@@ -83,7 +84,7 @@ class Bridge:
         self.sockets = opened
 
     def pass_on(self) -> int:
-        """Pass on the waiting frames, but only a few; return how many there were."""
+        """Pass on some of the waiting frames; return how many."""
         if not self.sockets:
             self._reopen()
         count = 0
@@ -97,7 +98,7 @@ class Bridge:
                     if error.errno in GONE or (self._matched and error.errno == errno.ENETDOWN):
                         self._gone()
                         return count
-                    break  # down: reported by the port of this bus
+                    break  # down: the port of this bus reports it
                 count += 1
                 try:
                     destination.send(data)
@@ -113,7 +114,7 @@ class Bridge:
         now_ns = time.monotonic_ns()
         if now_ns >= self._not_before_ns:
             self._not_before_ns = now_ns + REOPEN_NS
-            with suppress(OSError, WrongDeviceError):  # reported by the port of this bus
+            with suppress(OSError, WrongDeviceError):  # the port of this bus reports it
                 self._open()
 
     def close(self) -> None:
@@ -124,10 +125,10 @@ class Bridge:
 
 
 class InlineGateway:
-    """Forwarding of an inline gateway by the daemon, and its check of the kernel's rules.
+    """An inline gateway: it forwards frames, or checks the rules by which the kernel does.
 
     Args:
-        deployment: one with a gateway.
+        deployment: a deployment with a gateway.
         on_fault: called with every fault.
 
     Raises:
@@ -158,8 +159,14 @@ class InlineGateway:
     ) -> None:
         """Pass on incoming frames until a deadline; frames of the joysticks first.
 
-        What comes later is left to the tick, which knows whether the loop stood still: it must not
-        leave with the velocities from before.
+        Frames that come later are left to the tick, which knows whether the loop stood still: such
+        frames must not leave with the velocities of the last tick.
+
+        Args:
+            seconds: time until the deadline.
+            processor: receives the frames of the ports.
+            ports: ports by name of their bus.
+            standstill: clock of the loop, and time when the wait ends early.
         """
         clock = standstill.clock
         until_ns = clock() + round(seconds * 1e9)
@@ -180,13 +187,13 @@ class InlineGateway:
             )
 
     def pass_others(self) -> int:
-        """Pass on a few frames of others, where that is our part; how many there were."""
+        """Pass on some frames of others, unless the kernel does; return how many."""
         return self._bridge.pass_on() if self._bridge else 0
 
     def check(self, now_ns: int, *, neutral: bool) -> None:
-        """Log when the rules of the kernel are not those that they should be.
+        """Log when the rules of the kernel differ from those of the deployment.
 
-        Looked at now and then, and only while nothing moves: it takes a part of a tick.
+        The check takes a part of a tick, so it is rare, and made only while no axis moves.
         """
         if not self._kernel or not self._real or not neutral or now_ns < self._check_ns:
             return
@@ -197,13 +204,13 @@ class InlineGateway:
             log.log(level, "gateway=%s", fault or "rules-right")
 
     def close(self) -> None:
-        """Pass nothing on any more."""
+        """Close the sockets; no frame is passed on any more."""
         if self._bridge:
             self._bridge.close()
 
 
 def rules_fault(expected: list[Rule]) -> str:
-    """Return the faults of the kernel's rules while the daemon runs; empty without any."""
+    """Return the faults of the kernel's rules as a part of a log line; empty if they are right."""
     try:
         present = between({rule.source for rule in expected}, rules())
     except GatewayError as error:

@@ -1,6 +1,6 @@
-"""The log of the daemon: one line per event on standard error, and never a wait for its reader.
+"""The log of the daemon: one line per event on standard error, without a wait for its reader.
 
-A blocked pipe, a full disk or a reader that has gone would otherwise stop the control loop.
+Otherwise a blocked pipe, a full disk or a closed reader would stop the control loop.
 """
 
 import logging
@@ -11,20 +11,21 @@ from collections import deque
 from canshaper.errors import printable
 
 STANDARD_ERROR = 2
-# Lines kept for a reader that is slow for a moment; more are dropped and counted.
+# Most lines kept for a slow reader; further lines are dropped and counted.
 MOST_LINES = 200
-# A pipe that says it is writable takes that much without blocking (POSIX: PIPE_BUF, 4096 on Linux).
+# Bytes that a writable pipe takes without blocking (POSIX: PIPE_BUF, 4096 on Linux).
 MOST_BYTES = select.PIPE_BUF
-# Priorities of syslog(3), which the journal reads from the start of a line.
+# Priorities of syslog(3), which the journal reads at the start of a line.
 PRIORITY = {logging.DEBUG: "<7>", logging.INFO: "<6>", logging.WARNING: "<4>"}
 
 
 class JournalHandler(logging.Handler):
-    """Writes to a file descriptor only what it takes at once.
+    """Writes lines to a file descriptor, as far as that takes them at once.
 
     Args:
-        fd: where to write.
-        journal: whether the journal of systemd reads it: priorities instead of times.
+        fd: file descriptor to write to.
+        journal: whether the journal of systemd reads it; lines then begin with a priority instead
+            of a time.
     """
 
     def __init__(self, fd: int, *, journal: bool) -> None:
@@ -39,23 +40,23 @@ class JournalHandler(logging.Handler):
         self.setFormatter(logging.Formatter(line))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue the record, and write what can be written now."""
+        """Queue the record, and write as many lines as the descriptor takes now."""
         try:
             text = self.format(record)
-        except Exception as error:  # a wrong call of some library must not end the loop
+        except Exception as error:  # a wrong logging call of a library must not end the loop
             text = f"{record.msg!r} ({error})"
         self._add(text, record.levelno)
         self.flush()
 
     def flush(self) -> None:
-        """Write lines while they are accepted at once; where writing fails, all are lost."""
+        """Write lines while the descriptor takes them at once; if writing fails, drop all lines."""
         while self._lines and self._writable():
             line = self._lines[0]
             try:
                 written = os.write(self._fd, line)
             except BlockingIOError:
                 return
-            except OSError:  # disk full, reader gone
+            except OSError:  # the disk is full, or the reader is gone
                 self._dropped += len(self._lines)
                 self._lines.clear()
                 return
@@ -71,7 +72,7 @@ class JournalHandler(logging.Handler):
         if len(self._lines) >= MOST_LINES:
             self._dropped += 1
             return
-        # Text of others, a peer's name or a piece of a file, must not look like a line of ours.
+        # A client's name or a part of a file in the text must not look like a line of its own.
         text = printable(text.replace("\n", " | "))
         if self._journal:
             text = PRIORITY.get(level, "<3>") + text
@@ -82,9 +83,10 @@ class JournalHandler(logging.Handler):
 
 
 def _own_terminal(fd: int) -> int:
-    """A terminal that says it is writable may take one byte; opened again, it can refuse the rest.
+    """Return a non-blocking descriptor of the same terminal; any other descriptor as it is.
 
-    To set the flag on the descriptor we were given would set it for the shell, too.
+    A writable terminal may take one byte and block at the next. To set O_NONBLOCK on the descriptor
+    that we were given would set it for the shell, too.
     """
     try:
         if os.isatty(fd):
@@ -95,7 +97,7 @@ def _own_terminal(fd: int) -> int:
 
 
 def set_up() -> JournalHandler:
-    """Let the daemon log to standard error; what is no event of ours from warnings on."""
+    """Let the daemon log its events to standard error, and warnings of other packages."""
     handler = JournalHandler(STANDARD_ERROR, journal=_is_journal(STANDARD_ERROR))
     logging.basicConfig(level=logging.WARNING, handlers=[handler])
     logging.getLogger("canshaper").setLevel(logging.INFO)
@@ -103,7 +105,7 @@ def set_up() -> JournalHandler:
 
 
 def _is_journal(fd: int) -> bool:
-    """Whether systemd has connected the descriptor to its journal (systemd.exec(5))."""
+    """Return whether systemd has connected a descriptor to its journal (systemd.exec(5))."""
     try:
         info = os.fstat(fd)
     except OSError:  # closed

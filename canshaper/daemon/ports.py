@@ -1,4 +1,4 @@
-"""The open buses of a daemon, from one deployment to the next."""
+"""Opens, closes and replaces the buses of a daemon, and sends their last neutral frames."""
 
 import logging
 import time
@@ -18,26 +18,27 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("canshaper")
 
-# How often buses are tried that cannot be opened at the start.
+# Time between two attempts to open the buses at the start.
 WAIT_S = 0.5
-# How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
+# Longest time in which neutral frames are sent again to a full queue: two ticks of the slowest
+# loop.
 NEUTRAL_TRIES_S = 0.1
-# Until what was sent last has left a queue of some frames, also on a bus with other traffic.
+# Time in which a queue of some frames empties, also on a bus with other traffic.
 ON_THE_BUS_S = 0.1
 
 
 def open_ports(
     deployment: Deployment, opened: Mapping[Bus, Port], on_fault: Callable[[FrameFault], None]
 ) -> dict[str, Port]:
-    """Ports of a deployment by name, those among them that are open already included.
+    """Return the ports of a deployment by name of the bus; open only those that are not open yet.
 
     Args:
-        deployment: one that only listens gets ports that send no valve frame.
-        opened: what is open.
+        deployment: the deployment; if it only listens, its ports send no valve frame.
+        opened: open ports by section of the bus.
         on_fault: called with every fault of a bus.
 
     Raises:
-        BusError: a bus cannot be opened, or is another device; what is open stays as it is.
+        BusError: a bus cannot be opened, or is another device; the ports of ``opened`` stay open.
     """
     ports: dict[str, Port] = {}
     try:
@@ -62,8 +63,11 @@ def opened_ports(
 ) -> dict[str, Port]:
     """Open the buses of a deployment at the start; under a service manager, wait for them.
 
-    A restart for each try would load the program each time, and take the processor from the
+    Restarts instead would load the program at each attempt, and take processor time from the
     instance of another machine.
+
+    Raises:
+        BusError: a bus cannot be opened, and there is no service manager.
     """
     said = ""
     while True:
@@ -80,12 +84,12 @@ def opened_ports(
 
 
 def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Port]:
-    """Return the ports that were not open before."""
+    """Return those of ``ports`` that are not in ``opened``."""
     return [port for port in ports.values() if port not in opened.values()]
 
 
 def waiting(ports: Iterable[Port]) -> list[Frame]:
-    """Return the frames that wait in ports."""
+    """Read all frames that wait in ports."""
     return [frame for port in ports for frame in (*port.frames(), *port.background())]
 
 
@@ -95,18 +99,17 @@ def taken_over(
     deployment: Deployment,
     read: Callable[[list[Frame]], None],
 ) -> list[Frame] | None:
-    """Go over to the ports of another deployment: those that it does not have are closed.
+    """Change to the ports of another deployment, and close those that it does not have.
 
     Args:
-        ports: its ports by name.
-        opened: the ports before.
+        ports: ports of the other deployment by name of the bus.
+        opened: ports so far, by section of the bus.
         deployment: the other deployment.
-        read: gets what waits in ports that are closed.
+        read: called with the frames that wait in ports before they are closed.
 
     Returns:
-        What waits in new ports, without our own frames from the ports before: they cannot know
-        them for ours, and they would look like a second sender of every valve's id. None where no
-        port is new.
+        Frames that wait in new ports; None without a new port. Frames with our ids are left out:
+        the ports so far sent them, but to a new port they look like those of a second sender.
     """
     if closed := [port for port in opened.values() if port not in ports.values()]:
         read(waiting(closed))
@@ -127,7 +130,7 @@ def taken_over(
 def opened_line(
     deployment: Deployment, on_fault: Callable[[FrameFault], None]
 ) -> "InlineGateway | None":
-    """Open the gateway that forwards frames, if this machine stands in a line.
+    """Open the inline gateway of a deployment; None if it has none, or only listens.
 
     Raises:
         BusError: an interface cannot be opened.
@@ -140,13 +143,13 @@ def opened_line(
 
 
 def close_ports(ports: Iterable[Port]) -> None:
-    """Close them."""
+    """Close ports."""
     for port in ports:
         port.close()
 
 
 def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> bool:
-    """Send neutral frames, for a while again where a queue is full; what was not sent is logged.
+    """Send neutral frames; try again for a while if a queue is full, and log what was not sent.
 
     Returns:
         Whether all were sent.
@@ -164,15 +167,15 @@ def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> bool:
 
 
 def seen_sent(ports: Iterable[Port], receive: Callable[[Frame], object]) -> str:
-    """Wait a moment for valve frames that were all sent to be confirmed.
+    """Wait a moment until the valve frames that were sent are confirmed.
 
     Args:
-        ports: the buses.
-        receive: called with what comes meanwhile.
+        ports: ports of the buses.
+        receive: called with every frame that comes meanwhile.
 
     Returns:
-        ``neutral`` where each frame is on its bus, ``not-confirmed`` where one is not, ``sent``
-        where a bus does not say so.
+        ``neutral`` if every frame is on its bus, ``not-confirmed`` if one is not, ``sent`` if a bus
+        confirms no frames.
     """
     until = time.monotonic() + ON_THE_BUS_S
     while True:

@@ -1,4 +1,4 @@
-"""Requests of a control loop to interpreter and kernel: memory, priority, rights."""
+"""Prepares interpreter and kernel for a control loop: memory, priority, capabilities."""
 
 import ctypes
 import gc
@@ -12,7 +12,7 @@ log = logging.getLogger("canshaper")
 # sys/mman.h and linux/prctl.h
 MCL_CURRENT, MCL_FUTURE = 1, 2
 PR_SET_THP_DISABLE = 41
-# linux/capability.h; to read and write files of others, to lock memory, to set a priority.
+# linux/capability.h: access to files of other users, locked memory, priorities.
 CAP_CHOWN, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_FOWNER = 0, 1, 2, 3
 CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
 NEEDED = CAP_CHOWN, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_FOWNER, CAP_IPC_LOCK, CAP_SYS_NICE
@@ -20,48 +20,48 @@ CAPABILITY_VERSION_3 = 0x20080522
 
 
 class Collector:
-    """The garbage collector under control: never by itself, and never over the whole heap.
+    """Runs the garbage collector only in pauses of the loop, and never over the whole heap.
 
-    What is there at the start is frozen; what the loop leaves behind is little and looked through
-    in a pause of the loop.
+    Objects that exist at the start are frozen. The loop leaves few objects behind, which are
+    collected in a pause of the loop.
     """
 
-    # The loop makes no cycles, only faults do, some kB each.
+    # Time between two collections. The loop makes no cycles; only faults do, some kB each.
     PERIOD_NS = 5_000_000_000
 
     def __init__(self) -> None:
         self._next_ns = 0
 
     def freeze(self) -> None:
-        """Collect what is not frozen yet, and let it be from now on.
+        """Collect the objects that are not frozen, then freeze the rest, and stop the collector.
 
-        To look through what was frozen before would take longer than a tick. So a reload must
-        leave no cycles of the old deployment behind; the end of its references ends it.
+        To examine the frozen objects again would take longer than a tick. So the old deployment of
+        a reload must contain no cycles, and is freed with its last reference.
         """
         gc.collect()
         gc.freeze()
         gc.disable()
 
     def pause(self, now_ns: int) -> None:
-        """Collect what came since the start, now and then, while the loop has time."""
+        """Collect the objects made since the start, if the last time was long enough ago."""
         if now_ns >= self._next_ns:
             self._next_ns = now_ns + self.PERIOD_NS
             gc.collect()
-            gc.disable()  # a library may have switched it on
+            gc.disable()  # a library may have enabled it
 
 
 def refuse_huge_pages() -> None:
-    """Keep the kernel from joining pages of this process to huge ones.
+    """Keep the kernel from merging pages of this process into huge pages.
 
-    Its khugepaged does that behind every process's back, 2 MiB at a time: on the same processor it
-    cannot be interrupted meanwhile, by no priority, and on another one it keeps the process from
-    its memory. A kernel without huge pages has nothing to refuse.
+    Its thread khugepaged merges them 2 MiB at a time. On the same processor no priority interrupts
+    that; on another processor it blocks the memory of the process meanwhile. A kernel without huge
+    pages ignores the request.
     """
     ctypes.CDLL(None).prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0)
 
 
 def take_priority(priority: int) -> None:
-    """Run this thread by SCHED_FIFO from now on, not its children; log why where it may not."""
+    """Run this thread, but not its children, under SCHED_FIFO; log why if that is not permitted."""
     try:
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(0, policy, os.sched_param(priority))
@@ -70,10 +70,10 @@ def take_priority(priority: int) -> None:
 
 
 def drop_capabilities() -> None:
-    """Give up the rights of root that a control loop does not need.
+    """Give up the capabilities of root that a control loop does not need.
 
-    With those over the network the kernel would look for a module for each interface that is
-    missing; to set up a bus or a route is not the daemon's.
+    With those for the network, the kernel would search for a module for each missing interface.
+    The daemon sets up no bus and no route.
     """
     status = Path("/proc/self/status").read_text(encoding="ascii")
     permitted = int(status.partition("CapPrm:")[2].split()[0], 16)
@@ -83,9 +83,9 @@ def drop_capabilities() -> None:
 
 
 def lock_memory() -> str | None:
-    """Keep all memory of the process in RAM; None, or why it could not be done.
+    """Keep all memory of the process in RAM; return None, or why that failed.
 
-    Not tried below an unlimited RLIMIT_MEMLOCK: memory needed later would then be refused.
+    It is not tried under a limited RLIMIT_MEMLOCK: the kernel would refuse memory needed later.
     """
     soft, _hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if soft != resource.RLIM_INFINITY and os.geteuid() != 0:

@@ -1,4 +1,4 @@
-"""A deployment read again while the loop goes on, in a process of its own."""
+"""Steps of a reload: a forked process reads the deployment while the loop continues."""
 
 import logging
 from collections.abc import Callable
@@ -10,14 +10,14 @@ log = logging.getLogger("canshaper")
 
 
 class Reloads:
-    """Steps of a reload, none of which the loop waits for.
+    """Reload of a deployment, in steps for which the loop does not wait.
 
     Args:
-        load: reads the deployment; called in another process.
-        refuse: called with why a reload changes nothing.
+        load: reads the deployment; called in a forked process.
+        refuse: called with the reason of a refused reload.
 
     Attributes:
-        ready: the deployment that was read, and is good; None where there is none.
+        ready: valid deployment that was read and waits to be applied; None without one.
     """
 
     def __init__(self, load: Callable[[], Deployment], refuse: Callable[[str], object]) -> None:
@@ -29,22 +29,22 @@ class Reloads:
         self._waiting_logged = False
 
     def request(self) -> None:
-        """Begin one at the next step; a signal handler may call it."""
+        """Begin a reload at the next step; a signal handler may call this."""
         self._requested = True
 
     def step(self, *, neutral: bool) -> None:
-        """Go a step towards the deployment as its files are now.
+        """Take one step: begin to read, or take the result into ``ready``, or refuse.
 
-        Nothing is begun or taken while something moves: a new process costs a tick a millisecond,
-        and what was read may need modules that are not loaded yet.
+        No step is taken while an axis moves: a fork costs a tick a millisecond, and the deployment
+        may need modules that are not loaded yet.
 
         Args:
-            neutral: nothing moves.
+            neutral: whether every axis is neutral.
         """
         if not (self._requested or self._reading or self.ready):
             return
         if self._requested and neutral:
-            self.end()  # of files that may have changed since
+            self.end()  # the files may have changed since it began
             self._requested, self.ready = False, None
             try:
                 self._reading = ConfigReload(self._load)
@@ -62,7 +62,7 @@ class Reloads:
         self._waiting_logged = waiting
 
     def end(self) -> None:
-        """End what is being read, if something is."""
+        """Stop reading, if a process reads."""
         if self._reading:
             self._reading.end()
             self._reading = None

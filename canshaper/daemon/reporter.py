@@ -1,4 +1,4 @@
-"""Reports of the daemon: the journal, and the service manager's line."""
+"""Reports of the daemon: lines of the log, and the status line of the service manager."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -16,15 +16,15 @@ from canshaper.shaping.states import State
 log = logging.getLogger("canshaper")
 
 SECOND_NS = 1_000_000_000
-# Lines of one bus in a second at most.
+# Most lines on one bus in a second.
 MOST_BUS_LINES = 4
 
 
 class Reporter:
-    """Says what changed: after every tick, and once a second in one line.
+    """Logs changes after every tick, and renews the status line once a second.
 
     Args:
-        manager: the service manager, which shows the line.
+        manager: service manager, which shows the status line.
     """
 
     def __init__(self, manager: ServiceManager) -> None:
@@ -36,7 +36,7 @@ class Reporter:
         self._bus_lines_ns = 0
 
     def use(self, controller: Controller, ports: Mapping[str, Port]) -> None:
-        """Report of these from now on."""
+        """Report on this controller and these ports from now on."""
         self._controller = controller
         self._ports = ports
         self._bus_states = dict.fromkeys(ports, BusState.UP)
@@ -44,13 +44,13 @@ class Reporter:
         self._bus_lines = dict.fromkeys(ports, 0)
 
     def events(self) -> None:
-        """Log what the axes said in this tick."""
+        """Log the events of this tick."""
         for event in self._controller.events:
             tripped = isinstance(event, StateEvent) and event.transition.new is State.TRIPPED
             log.log(logging.WARNING if tripped else logging.INFO, "%s", event.text)
 
     def buses(self, now_ns: int) -> None:
-        """Log every bus whose state changed; of one that changes all the time now and then one."""
+        """Log every bus whose state changed, at most ``MOST_BUS_LINES`` a second for each bus."""
         if now_ns >= self._bus_lines_ns:
             self._bus_lines_ns = now_ns + SECOND_NS
             self._bus_lines = dict.fromkeys(self._bus_lines, 0)
@@ -64,25 +64,25 @@ class Reporter:
                 log.log(level, "bus=%s state=%s%s", name, state.value, why)
 
     def faults(self, now_ns: int) -> None:
-        """Log the fault of a frame when it is another one, at most one a second."""
+        """Log the last fault of a frame if it is another one, at most one a second."""
         counters = self._controller.counters
         fault = counters.last_fault
         if fault is not self._logged_fault and now_ns >= self._log_again_ns:
             self._logged_fault = fault
-            if fault is not FrameFault.NONE:  # the counters of a reload begin without a fault
-                self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
+            if fault is not FrameFault.NONE:  # after a reload the counters have no fault
+                self._log_again_ns = now_ns + SECOND_NS  # alternating faults must not flood the log
                 log.warning("fault=%s counts=%s", fault.name, counters.values)
 
     def late(self, late_ns: int) -> None:
-        """Take the lateness of a tick."""
+        """Note the lateness of a tick; the status line shows the largest one."""
         self._latest_ns = max(self._latest_ns, late_ns)
 
     def status(self, now_ns: int, trouble: Callable[[], list[str]]) -> bool:
-        """Renew the service manager's line once a second; whether it was time.
+        """Renew the status line once a second; return whether it was time.
 
         Args:
             now_ns: time of the tick.
-            trouble: makes the entries that stand first in it, when it is time.
+            trouble: returns the entries that stand first in the line; called when it is time.
         """
         if now_ns < self._status_ns:
             return False
@@ -98,11 +98,11 @@ class Reporter:
         return True
 
     def hold_status(self) -> None:
-        """Leave what the service manager shows for a second."""
+        """Leave the status line unchanged for a second."""
         self._status_ns = boottime_ns() + SECOND_NS
 
     def numbers(self) -> dict[str, Any]:
-        """Return state, counters and lateness, as plain data for a program that watches."""
+        """Return state, counters and lateness as plain data for a client."""
         controller = self._controller
         return {
             "digest": controller.deployment.identity.digest,
@@ -110,8 +110,8 @@ class Reporter:
                 name: {
                     "state": one.axis.state.name,
                     "reason": one.reason.name,
-                    "joystick": one.axis.command,
-                    "setpoint": one.axis.sent,
+                    "joystick": one.axis.demand,
+                    "setpoint": one.axis.output.setpoint,
                     "sway_deg": one.sway_deg,
                     "set": one.active_set,
                 }
@@ -123,7 +123,7 @@ class Reporter:
         }
 
     def refused(self, why: str) -> None:
-        """Log why a reload changes nothing."""
+        """Log why a reload is refused, line by line."""
         lines = why.splitlines()
         for line in lines:
             log.error("reload=refused %s", line)
@@ -131,7 +131,7 @@ class Reporter:
         self.hold_status()
 
     def identity(self) -> None:
-        """Log the hashes of what runs: a machine that was signed off is compared with these."""
+        """Log the hashes of program and deployment; compare them with the accepted machine."""
         deployment = self._controller.deployment
         for line in deployment.identity.lines():
             log.info("identity %s", line)
@@ -143,7 +143,7 @@ class Reporter:
             log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
 
     def _summary(self, trouble: list[str]) -> str:
-        """Axes, buses, lateness of the last second, deadlines missed."""
+        """Return the status line: axes, buses, lateness of the last second, missed deadlines."""
         axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
         buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
         late = f"late {self._latest_ns / 1000:.0f} us"
@@ -153,6 +153,6 @@ class Reporter:
 
 
 def flush() -> None:
-    """Write out what the journal's handlers hold."""
+    """Let the handlers of the log write the lines that they hold."""
     for handler in logging.getLogger().handlers:
         handler.flush()

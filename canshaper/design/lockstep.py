@@ -4,12 +4,13 @@ The loop runs the daemon's own controller and passes all data in the same frames
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Protocol, TypedDict, Unpack
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import DriveError
 from canshaper.gate.cycle import FrameProcessor, Standstill, io_cycle
 from canshaper.machine.deployment import Deployment
@@ -58,10 +59,8 @@ class PlantPort:
         sends: frozenset[Key] | None = None,
     ) -> None:
         self.arrived_ns = 0
-        self._sends = sends
-        self._received = received
-        self._plant = plant
-        self._on_frame = on_frame
+        self._plant, self._on_frame = plant, on_frame
+        self._received, self._sends = received, sends
         self._waiting: list[Frame] = []
         self._time_s = 0.0
 
@@ -129,10 +128,8 @@ class LockStep:
         *,
         received: Received | None = None,
     ) -> None:
-        self.time_ms = 0
-        self._tick_ms = deployment.config.tick_ms
-        self.processor = processor
-        self._joysticks = joysticks
+        self.time_ms, self._tick_ms = 0, deployment.config.tick_ms
+        self.processor, self._joysticks = processor, joysticks
         self._port = PlantPort(plant, received, on_frame, _sends(deployment))
         self._ports = dict.fromkeys(deployment.config.buses, self._port)
         self._standstill = Standstill(deployment)
@@ -141,9 +138,8 @@ class LockStep:
     def step(self) -> None:
         """Run one tick, and let time pass until the next one."""
         time_ms, tick_ms = self.time_ms, self._tick_ms
-        hands = self._joysticks
-        frames = [frame for hand in hands for frame in hand.frames_of_tick(time_ms, tick_ms)]
-        self._port.begin(time_ms, frames)
+        frames = [one.frames_of_tick(time_ms, tick_ms) for one in self._joysticks]
+        self._port.begin(time_ms, [*chain.from_iterable(frames)])
         io_cycle(self.processor, self._ports, time_ms * 1_000_000, 0, self._standstill)
         self._port.end(tick_ms / 1000.0)
         self.time_ms = time_ms + tick_ms
@@ -201,8 +197,7 @@ class Simulation:
     Args:
         deployment: the machine; its buses are not opened.
         script: the strokes of the operator.
-        on_frame: called with every frame and its time in s; None if nobody listens: then the
-            plant sends only frames that the controller receives.
+        on_frame: see ``PlantPort``; without it the plant sends only what the controller receives.
         options: see ``DriveOptions``.
 
     Attributes:
@@ -233,9 +228,8 @@ class Simulation:
             self.plant = PlantNode(
                 driven, parameters, machine, sway, unit=unit, listeners=listeners
             )
-            hands: list[Joysticks] = [
-                JoystickNode(driven, script, bypass=options.get("bypass", False))
-            ]
+            hand = JoystickNode(driven, script, bypass=options.get("bypass", False))
+            hands: list[Joysticks] = [hand]
             for other in cranes(deployment):
                 if other != crane:
                     still = Script("still", (), script.duration_s)
@@ -244,9 +238,9 @@ class Simulation:
             raise DriveError(str(error)) from None
         if disturb := options.get("disturb"):
             hands = [*map(disturb, hands)]
-        guarded = Guarded(self.controller)
+        gated = GatedController(self.controller)
         self._lock_step = LockStep(
-            deployment, guarded, self.plant, hands, on_frame, received=deployment.routing.received
+            deployment, gated, self.plant, hands, on_frame, received=deployment.routing.received
         )
         self._loads = [*options.get("loads", ())]
         self._end_ms = round(script.duration_s * 1000.0)

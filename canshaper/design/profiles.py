@@ -62,9 +62,9 @@ def choosing(name: str) -> Callable[[Controller], None]:
     """Return a function that fixes a new controller's profile; the load still sets its gains."""
 
     def choose(controller: Controller) -> None:
-        for runner in controller.axes.values():
-            if runner.chooser:
-                runner.chooser.profile = Chosen(name)
+        for control in controller.axes.values():
+            if control.chooser:
+                control.chooser.profile = Chosen(name)
 
     return choose
 

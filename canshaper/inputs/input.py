@@ -13,21 +13,21 @@ Key = tuple[Hashable, ...]
 
 
 class Part(Protocol):
-    """A part of a controller with a state of its own.
+    """Part of a controller whose state a reload carries over.
 
-    It copies values only: a reference to the part before would keep all of that controller.
+    It copies values only: a reference to the old part would keep the whole old controller.
     """
 
     def copy_state(self, before: Any, /) -> None:
-        """Copy the state of the same part of the controller before."""
+        """Copy the state of the same part of the old controller."""
 
 
 def carry_over(before: Mapping[Key, Part], parts: Mapping[Key, Part]) -> None:
     """Copy the state of each part from the part with the same key and type; others start new.
 
     Args:
-        before: parts of the controller that ran before, by what they are on the machine.
-        parts: those of the one that follows it.
+        before: parts of the old controller, by their keys.
+        parts: parts of the new controller.
     """
     for key, part in parts.items():
         same = before.get(key)
@@ -35,7 +35,7 @@ def carry_over(before: Mapping[Key, Part], parts: Mapping[Key, Part]) -> None:
             part.copy_state(same)
 
 
-# A member by way of its class takes ten times as long as a name, for every frame.
+# Python finds a name of the module ten times as fast as a member of an enumeration.
 GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
 Raw = dict[str, Any]
 """Raw values of a frame, by signal."""
@@ -56,13 +56,13 @@ class MessageInput(Receiver, Part, Protocol):
 
 
 class Input(ABC):
-    """State of one received message.
+    """One received message: checks its frames, and keeps the last good one.
 
-    Its age begins with the arrival of its frame. A release or a press of the emergency stop counts
-    when the frame is read: these events are numbered, not dated, so none is too old to be seen.
+    The age of a frame counts from its arrival. A release of enable or a press of the emergency stop
+    is counted when its frame is read, and has no age: the next tick sees it, however late that is.
 
     Attributes:
-        raw: raw values of the last frame that counted.
+        raw: raw values of the last good frame.
     """
 
     def __init__(self, bound: BoundInput) -> None:
@@ -78,7 +78,7 @@ class Input(ABC):
         self.raw: Raw = {}
 
     def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
-        """Receive a frame, or return its fault; only a good one counts."""
+        """Receive a frame, and return its fault; only a frame without a fault counts."""
         if len(data) != self._length:
             return FrameFault.WRONG_LENGTH
         raw = self._decode(data)
@@ -105,12 +105,12 @@ class Input(ABC):
 
     @abstractmethod
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take a frame with the right checksum; ``raw`` still has the frame before.
+        """Take a frame with the right checksum; ``self.raw`` is still that of the frame before.
 
         Args:
             raw: its raw values.
-            arrived_ns: when it arrived.
-            accepted: whether it may be used. A switch may say something without that.
+            arrived_ns: monotonic time of its arrival.
+            accepted: whether its sequence is right too. A release of a switch counts without that.
 
         Returns:
             The fault of its content.
@@ -118,7 +118,7 @@ class Input(ABC):
 
     @property
     def received_ns(self) -> int | None:
-        """When the last frame arrived that passed every check; None where none counts."""
+        """Arrival of the last good frame, monotonic time; None where none counts."""
         return self._received_ns
 
     def invalidate(self) -> None:
@@ -126,12 +126,12 @@ class Input(ABC):
         self._received_ns = self._last_frame_ns = None
 
     def copy_state(self, before: Self) -> None:
-        """Continue the sequence of the same message; its values have to come again to count."""
+        """Continue the sequence of the same message; only new frames give values again."""
         self._sequence.copy_state(before._sequence)
         self._last_frame_ns, self._refused_ns = before._last_frame_ns, before._refused_ns
 
     def lost(self, now_ns: int) -> Reason | None:
-        """Reason for which the message is lost; None while its last good frame is fresh."""
+        """Return why the message is lost; None while its last good frame is fresh."""
         if self._received_ns is not None and now_ns - self._received_ns <= self._timeout_ns:
             return None
         if self._refused_ns is not None and now_ns - self._refused_ns <= self._timeout_ns:
@@ -140,18 +140,18 @@ class Input(ABC):
 
 
 class Switch:
-    """Switch that has to agree, in a message that may carry other signals.
+    """Enable switch, in a message that may carry other signals. It agrees while it is on.
 
     Args:
-        source: the message.
+        source: input of its message.
         signal: its signal.
-        on: raw value that agrees.
+        on: raw value with which it agrees.
 
     Attributes:
-        agrees: the signal, and that value.
+        agrees: the signal, and the raw value with which it agrees.
         releases: number of frames of right length and checksum in which it did not agree.
-        released: whether it is released: since any frame that shows a release, until an accepted
-            frame shows that it agrees.
+        released: whether it is released: from any frame that shows a release to the next accepted
+            frame in which it agrees.
     """
 
     def __init__(self, source: Input, signal: str, on: int) -> None:
@@ -159,8 +159,8 @@ class Switch:
         self.agrees = signal, on
         self.releases = 0
         self.released = False
-        self._agreed = False  # in the last frame that counts
-        self._doubted = 0  # number of the last release in a frame that does not
+        self._agreed = False  # in the last accepted frame
+        self._doubted = 0  # number of the last release in a frame that was not accepted
 
     def on_frame(self, raw: Raw, accepted: bool) -> None:
         """Take a frame: any frame can show a release, only an accepted one ends it."""
@@ -177,15 +177,15 @@ class Switch:
             self.released = False
 
     def doubted(self, releases: int) -> bool:
-        """Whether only frames that were not accepted have shown a release.
+        """Return whether only frames that were not accepted have shown a release.
 
         Args:
-            releases: their number at the last call.
+            releases: ``self.releases`` at the last call.
         """
         return self._agreed and (self.released or self._doubted > releases)
 
     def lost(self, now_ns: int) -> Reason | None:
-        """Why it is not known; None while its message is fresh."""
+        """Return why it is not known; None while its message is fresh."""
         return self._source.lost(now_ns)
 
 
@@ -207,7 +207,7 @@ class SwitchInput(Input):
         return GOOD
 
     def copy_state(self, before: Self) -> None:
-        """A switch that is released stays so until a frame that counts says otherwise."""
+        """Keep a switch released until an accepted frame says otherwise."""
         super().copy_state(before)
         released = {one.agrees: one.released for one in before.switches.values()}
         for switch in self.switches.values():

@@ -1,4 +1,4 @@
-"""State of one joystick: its last good frame, and the input that an axis may use."""
+"""One joystick: its last good frame, and the checked input that it gives an axis."""
 
 from typing import Protocol, Self
 
@@ -11,22 +11,22 @@ _new = tuple.__new__  # CommandInput(...) in half the time
 
 
 class CommandSource(Protocol):
-    """Source of the joystick command of an axis."""
+    """Source of an axis' input: a joystick, or a measurement in its place."""
 
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> tuple[CommandInput, int]:
-        """Return the input that the axis may use now, and the releases: see ``JoystickInput``."""
+        """Return the input of the axis, and the releases; see ``JoystickInput.command``."""
 
 
 class JoystickInput(Input):
-    """Receives the frames of one joystick; answers what an axis may use of them at a moment.
+    """Receives the frames of one joystick, and gives each axis its checked input.
 
     Attributes:
-        pressed: the switch to press, where it is in another message.
-        releases: number of frames that showed its own switch released, accepted or not.
+        pressed: the enable switch to press, if it is in another message; else None.
+        releases: number of frames that showed its own enable switch released, accepted or not.
         presses: how often its button for the next profile was pressed.
-        commands: its velocities in the last frame that counted, or why there is none, by signal.
+        commands: velocity of each signal in the last good frame, or the reason why it has none.
     """
 
     def __init__(self, joystick: BoundJoystick) -> None:
@@ -43,18 +43,18 @@ class JoystickInput(Input):
         self._frozen_ns = round(config.stuck_s * 1e9)
         self._changed_ns: dict[str, int] = {}
         self.releases = self.presses = 0
-        self._next_held = True  # what is held when it is first seen was not pressed
+        self._next_held = True  # a button that is held when first seen was not pressed
         self._released = False
-        self._doubted = 0  # number of the last release in a frame that does not count
+        self._doubted = 0  # number of the last release in a frame that was not accepted
 
     def watch(self, signal: str) -> Switch:
-        """Watch another switch in its message, which enables it or another joystick."""
+        """Return another switch in its message, which enables this or another joystick."""
         return self._switches.setdefault(signal, Switch(self, signal, 1))
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Note when each deflection last changed; a code that is no measurement is a fault.
+        """Take enable, buttons and velocities; a code that is no velocity is a fault.
 
-        Any frame can show a released enable, however short; only an accepted one ends it.
+        Any frame can show a release of enable; only an accepted one ends it.
         """
         for switch in self._switches.values():
             switch.on_frame(raw, accepted)
@@ -82,7 +82,7 @@ class JoystickInput(Input):
         return GOOD if valid else FrameFault.INVALID_SIGNAL
 
     def _press(self, code: int, arrived_ns: int) -> None:
-        """Count a press whose beginning was seen; one held after a gap does not count."""
+        """Count a press of the profile button, unless it began in a gap of the frames."""
         received_ns = self._received_ns
         if received_ns is None or arrived_ns - received_ns > self._timeout_ns:
             self._next_held = True
@@ -90,7 +90,7 @@ class JoystickInput(Input):
         self._next_held = code != 0  # nor does a code that is neither on nor off end a press
 
     def copy_state(self, before: Self) -> None:
-        """An enable that is released stays so until a frame that counts says otherwise."""
+        """Keep enable released until an accepted frame says otherwise."""
         super().copy_state(before)
         self._released = before._released
         released = {signal: one.released for signal, one in before._switches.items()}
@@ -102,31 +102,32 @@ class JoystickInput(Input):
     ) -> tuple[CommandInput, int]:
         """Return the input of the axis that this signal drives, and how often enable was released.
 
-        A release counts when it is read, however long ago its frame arrived; all that has an age is
-        as old as its arrival.
+        A release counts when its frame is read, however old the frame is. All else is as old as the
+        arrival of its frame.
 
         Args:
-            signal: name of its velocity signal.
+            signal: name of the velocity signal.
             now_ns: monotonic time.
-            releases: as they were at the last tick of this axis.
+            releases: number of releases at the last tick of this axis.
             trip: a cause for neutral at once, handed through.
-            neutral_band: |joystick| up to which it counts as neutral and may stand still forever.
+            neutral_band: largest |joystick| that counts as neutral, where it may stand still
+                forever.
         """
         pressed = self.pressed
         known = self.releases if pressed is None else pressed.releases
         now_released = self._released if pressed is None else pressed.released
         released = now_released or known > releases
         if pressed is not None and (gone := pressed.lost(now_ns)):
-            # Not known is not enabled; that it is known again is no press.
+            # A lost switch does not enable, and its return is no press.
             return CommandInput(fault=gone, enabled=False, reset=True, trip=trip), known
         received_ns = self._received_ns
         if received_ns is None or now_ns - received_ns > self._timeout_ns:
             lost = self.lost(now_ns)
-            # Seen released is more than lost: an immediate stop, not the shaped one.
+            # A release that was seen outranks the loss: neutral at once, not a shaped stop.
             released = known > releases or (
                 now_released and (pressed is not None or lost is Reason.JOYSTICK_UNTRUSTED)
             )
-            # What the switches did meanwhile is not known; one that is held was not pressed.
+            # The switches are not known meanwhile: one that is on at the return was not pressed.
             return CommandInput(fault=lost, enabled=not released, reset=True, trip=trip), known
         raw = self.raw
         command = self.commands[signal]
@@ -137,7 +138,7 @@ class JoystickInput(Input):
             fault: Reason | None = command
         elif released:
             fault = None
-        elif enable != 1:  # nor 0, which is released
+        elif enable != 1:  # it is not 0 either, which is a release
             fault = Reason.SWITCH_INVALID
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
             fault = Reason.JOYSTICK_FROZEN
@@ -148,7 +149,7 @@ class JoystickInput(Input):
         else:
             doubted = pressed.doubted(releases)
         if released and doubted:
-            fault = Reason.JOYSTICK_UNTRUSTED  # it moves nothing, and is no press
+            fault = Reason.JOYSTICK_UNTRUSTED  # it moves nothing, and its end is no press
         elif fault is None:
             return CommandInput(command, enabled=False, reset=reset, trip=trip), known
         return CommandInput(fault=fault, enabled=not released, reset=reset, trip=trip), known

@@ -8,20 +8,20 @@ from canshaper.inputs.input import GOOD, Input, Raw, Switch
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason
 
-# How long another sender must be silent before a trip for it can be reset: ten periods of a slow
-# valve message.
+# Time for which another sender must be silent before a trip for it can be reset: ten periods of a
+# slow valve message.
 FOREIGN_NS = 1_000_000_000
 Interlock = Callable[[bool, int], Reason | None]
-"""Called with whether the axis is neutral, and the time; why it may not move, or None."""
+"""Takes whether the axis is neutral, and the time; returns why it may not move, or None."""
 
 
 class EnableGate:
     """Interlock by the switches that enable a joystick, except the one to press.
 
-    When they agree again, that is no press: it resets nothing.
+    That they agree again is no press: it resets nothing.
 
     Args:
-        switches: those that have to be on.
+        switches: switches that all have to agree.
     """
 
     def __init__(self, switches: Sequence[Switch]) -> None:
@@ -41,10 +41,10 @@ class EnableGate:
 
 
 class EmergencyStopInput(Input):
-    """The emergency stop of a deployment.
+    """Receives the message of the emergency stop.
 
     Attributes:
-        presses: how often it was seen pressed.
+        presses: number of frames that showed it pressed.
     """
 
     def __init__(self, bound: BoundInput, signal: str) -> None:
@@ -63,20 +63,20 @@ class EmergencyStopInput(Input):
         return GOOD
 
     def copy_state(self, before: Self) -> None:
-        """A stop that is pressed stays so until a frame that counts says otherwise."""
+        """Keep the stop pressed until an accepted frame says otherwise."""
         super().copy_state(before)
         self._pressed = before._pressed
 
     def stops(self, now_ns: int) -> bool:
-        """Whether nothing may move now: it is pressed, or lost."""
+        """Return whether it is pressed or lost, so that nothing may move."""
         return self._pressed or self.lost(now_ns) is not None
 
     def stop(self, now_ns: int, presses: int) -> Reason | None:
-        """Why nothing may move now, or None.
+        """Return why nothing may move now, or None.
 
         Args:
             now_ns: monotonic time.
-            presses: their number at the last call.
+            presses: ``self.presses`` at the last call.
         """
         if self._pressed or self.presses > presses:
             return Reason.EMERGENCY_STOP
@@ -90,7 +90,7 @@ class StopCauses:
         interlocks: they have to agree before the axis may move; of several the first one counts.
         trip: cause for which the next tick trips the axis, neutral at once and latched; None
             without one. A later cause may replace it.
-        invalid: whether its input was lost since the last tick, though it may be back by now.
+        invalid: whether its input was lost since the last tick, even if it is back by now.
         foreign_ns: arrival of the last frame of another sender with the id of its valve.
     """
 
@@ -107,12 +107,12 @@ class StopCauses:
         self.foreign_ns = now_ns
 
     def see(self, emergency: EmergencyStopInput) -> None:
-        """Trip for a press that came since the last tick, though it may be over by now."""
+        """Trip for a press since the last tick of the axis, even if it is over by now."""
         if emergency.presses != self._presses:
             self.trip = self.trip or Reason.EMERGENCY_STOP
 
     def copy_state(self, before: Self) -> None:
-        """Trip for what the same axis has not acted on before a reload."""
+        """Take over the causes on which the axis had not acted before a reload."""
         self.trip = before.trip or self.trip
         self.foreign_ns = before.foreign_ns or self.foreign_ns
 
@@ -123,7 +123,7 @@ class StopCauses:
 
         Args:
             now_ns: monotonic time.
-            emergency: the emergency stop, where there is one.
+            emergency: the emergency stop, or None.
             neutral: whether the axis is neutral.
         """
         trip, fault = self.trip, None

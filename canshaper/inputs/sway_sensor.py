@@ -1,4 +1,4 @@
-"""Measurements of sway: one message, and what each axis reads of it."""
+"""Measurements of sway: their message, and the signal that each axis reads from it."""
 
 import math
 from typing import Protocol
@@ -10,8 +10,8 @@ from canshaper.machine.sway_sensor import BoundSwaySensor, SensorMessage
 
 GOOD_MERIT = 0
 """Figure of merit of SSI: within the specification of the sensor. 1 is degraded, 2 an error."""
-# No grapple swings by a whole turn, nor with one in a second. A signal without a range may say so,
-# and the observer would keep it for hours.
+# Largest measurement that counts, rad or rad/s: no grapple swings by a whole turn, nor with one a
+# second. A signal without a range may carry more, and the observer would remember it for hours.
 MOST = 2.0 * math.pi
 
 
@@ -19,8 +19,9 @@ class SwaySensorInput(Input):
     """A message with measurements for one axis or several.
 
     Attributes:
-        number: frames that counted so far.
-        values: of the last one, by signal, in the unit of the DBC; None for a code without value.
+        number: number of good frames so far.
+        values: values of the last one by signal, in the unit of the DBC; None for a code without
+            a value.
     """
 
     def __init__(self, bound: SensorMessage) -> None:
@@ -50,7 +51,7 @@ class SwaySensorInput(Input):
 
 
 class SensorNode(Protocol):
-    """Node of a sensor."""
+    """Node that sends the measurements of a sensor."""
 
     @property
     def works(self) -> bool:
@@ -61,11 +62,11 @@ class SwaySignal:
     """Signal of a sway sensor, as one axis reads it.
 
     Args:
-        message: the message.
+        message: input of its message.
         bound: sway sensor of the axis.
 
     Attributes:
-        node: its node, where it is known.
+        node: node of the sensor, or None where it is not known.
     """
 
     def __init__(self, message: SwaySensorInput, bound: BoundSwaySensor) -> None:

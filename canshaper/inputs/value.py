@@ -22,15 +22,15 @@ LARGEST = sys.float_info.max
 
 
 class MeasuredSignal:
-    """A signal with a range: an error code is no value, nor what lies outside, or is no number.
+    """A signal with a range. An error code, a number out of the range and a NaN are no values.
 
     Args:
         signal: the signal of the DBC.
-        low: smallest value that is one.
-        high: largest.
+        low: smallest valid value.
+        high: largest valid value.
 
     Attributes:
-        name: of the signal.
+        name: name of the signal.
     """
 
     __slots__ = ("_high", "_low", "_offset", "_scale", "_special", "name")
@@ -41,24 +41,24 @@ class MeasuredSignal:
         self._low, self._high = low, high
 
     def value(self, raw: Raw) -> float | None:
-        """Its value by the raw values of a message, in the DBC's unit; None where it is none."""
+        """Return its value from the raw values of a message, in the DBC's unit, or None."""
         code = raw[self.name]
         value: float = code * self._scale + self._offset
         return value if code not in self._special and self._low <= value <= self._high else None
 
 
 class Value:
-    """The value of one signal of a message that arrives with others.
+    """Last value of one signal, in a message that may carry others.
 
     Args:
         signal: the signal.
-        low: smallest value that is one.
-        high: largest.
-        timeout_ms: age at which it is no longer known.
+        low: smallest valid value.
+        high: largest valid value.
+        timeout_ms: age from which the value is no longer known.
 
     Attributes:
-        value: the last one that counted, in the unit of the DBC.
-        measured_ns: when it arrived; None when there is none.
+        value: last valid value, in the unit of the DBC.
+        measured_ns: arrival of that value; None while there is none.
     """
 
     def __init__(self, signal: Signal, low: float, high: float, timeout_ms: int) -> None:
@@ -77,14 +77,14 @@ class Value:
         return GOOD
 
     def fresh(self, now_ns: int) -> float | None:
-        """The value; None while it is not known."""
+        """Return the value; None while there is none that is fresh."""
         if self.measured_ns is None or now_ns - self.measured_ns > self._timeout_ns:
             return None
         return self.value
 
 
 class PositionInput(Input):
-    """A message with measured positions, of which several parts of a machine may read one each.
+    """A message with measured positions; several parts of a machine may each read one of them.
 
     Args:
         bound: its message.
@@ -95,7 +95,7 @@ class PositionInput(Input):
         self._values: list[Value] = []
 
     def read(self, bound: BoundValue[Position]) -> Value:
-        """Return a position that is read from now on; outside its DBC range it does not count."""
+        """Return a position that each frame updates, within the range of its signal in the DBC."""
         low, high = bound.signal.minimum, bound.signal.maximum
         assert low is not None and high is not None  # checked with the deployment
         value = Value(bound.signal, low, high, bound.config.timeout_ms)
@@ -120,8 +120,8 @@ class ValueInput(Value, Input):
     Args:
         bound: its message.
         signal: the signal.
-        low: smallest value that is one; by default every number.
-        high: largest.
+        low: smallest valid value; by default every number is valid.
+        high: largest valid value.
     """
 
     def __init__(
@@ -153,17 +153,17 @@ OWN = "normal"
 
 
 class ProfileChoice(Protocol):
-    """Says which profile is chosen."""
+    """The operator's choice of a profile."""
 
     def name(self, now_ns: int) -> str:
-        """Name of the profile; "" for the axis' own filter."""
+        """Return the name of the chosen profile; "" for the axis' own filter."""
 
 
 class ProfileSwitch:
-    """A switch or display that repeats the code of the choice.
+    """Choice by a switch or display that sends the code of the profile in every frame.
 
     Args:
-        value: the code.
+        value: signal of the code.
         codes: codes of the profiles by name.
     """
 
@@ -172,17 +172,17 @@ class ProfileSwitch:
         self._names = {float(code): name for name, code in codes.items()}
 
     def name(self, now_ns: int) -> str:
-        """Name by the code; the axis' own filter for any other code, and after silence."""
+        """Return the name of the code; "" for any other code, and while it is silent."""
         code = self._value.fresh(now_ns)
         return "" if code is None else self._names.get(code, "")
 
 
 class ProfileButtons:
-    """Buttons of joysticks: each press chooses the next profile, behind the last one the first.
+    """Choice by buttons of joysticks: each press chooses the next profile, in a circle.
 
     Args:
-        joysticks: those that have such a button.
-        names: the profiles in their order; it begins with the axis' own filter.
+        joysticks: joysticks that have such a button.
+        names: the profiles in their order, beginning with "", the axis' own filter.
     """
 
     def __init__(self, joysticks: Sequence[JoystickInput], names: Sequence[str]) -> None:
@@ -190,7 +190,7 @@ class ProfileButtons:
         self._names = tuple(names)
 
     def name(self, _now_ns: int) -> str:
-        """Name by the presses so far; a joystick that is lost changes nothing."""
+        """Return the name after all presses so far; a lost joystick changes nothing."""
         presses = sum(joystick.presses for joystick in self._joysticks)
         return self._names[presses % len(self._names)]
 
@@ -207,7 +207,7 @@ class Following(Enum):
     """Nothing was received yet, and it is not late."""
     YES = "following"
     NO = "not-following"
-    """The spool is elsewhere than any command of the last moments asked for."""
+    """The spool is where no setpoint of the settling time asks it to be."""
     LOST = "lost"
 
 
@@ -216,10 +216,10 @@ class Feedback(ValueInput):
 
     Args:
         bound: its message.
-        period_s: time between two commands.
+        period_s: time between two setpoints, seconds.
 
     Attributes:
-        following: what it says.
+        following: state of the valve by its feedback.
     """
 
     def __init__(self, bound: BoundValue[FeedbackConfig], period_s: float) -> None:
@@ -228,7 +228,7 @@ class Feedback(ValueInput):
         self._full = config.full if config.full is not None else float(signal.maximum or 0.0)
         self._tolerance = config.tolerance_pct / 100.0
         self._commands = deque([0.0], maxlen=1 + math.ceil(config.settle_ms / 1000.0 / period_s))
-        self._waited_for_ns: int | None = None  # the first one, since then
+        self._waited_for_ns: int | None = None  # when the wait for the first frame began
         self.following = Following.UNKNOWN
 
     @property
@@ -237,13 +237,13 @@ class Feedback(ValueInput):
         return self.value / self._full
 
     def check(self, sent: float, now_ns: int) -> bool:
-        """Compare with recent commands and this one; return whether ``following`` has changed.
+        """Compare feedback and recent setpoints; return whether ``following`` has changed.
 
         Args:
-            sent: the command as a part of full, without the deadband of the valve.
+            sent: the setpoint of this tick as a part of full, without the deadband of the valve.
             now_ns: monotonic time.
         """
-        # What the valve shows now may answer any of the commands of its settling time.
+        # The feedback of now may answer any setpoint of the settling time.
         self._commands.append(sent)
         before = self.following
         if self._waited_for_ns is None:
@@ -258,7 +258,7 @@ class Feedback(ValueInput):
         return self.following is not before
 
     def copy_state(self, before: Self) -> None:
-        """A valve that does not follow is still reported until its feedback says otherwise."""
+        """Keep ``following``, so that a reload does not report the same state again."""
         super().copy_state(before)
         self.following = before.following
 

@@ -1,1 +1,1 @@
-"""The axis in C99 for machines without a PC: tables from a deployment, and what runs them here."""
+"""The controller of one machine in C99, for machines without a PC: export, tables, library."""

@@ -1,6 +1,7 @@
-"""A random drive of any deployment: joystick frames, most of them good, some wrong in every way.
+"""A random drive of any deployment, and the inner state of its controller: to compare Python and C.
 
-It needs no simulated crane. The same seed gives the same drive.
+A drive has joystick frames, most of them good, some with a fault. It needs no simulated crane. The
+same seed gives the same drive.
 """
 
 import random
@@ -10,26 +11,32 @@ from typing import Any, Protocol
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.velocity import VelocitySignal
+from canshaper.controller.axis_control import AxisControl
+from canshaper.controller.controller import Controller
+from canshaper.controller.couplings import MotionControl
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
 from canshaper.protocols.interface import MessageKey
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.limit_aware import LimitAware
+from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 
-# A thousandth of a tick: a frame is read a little later than it arrives.
+# Time from the arrival of a frame to the next tick.
 READ_NS = 1_000
 BEGIN_NS = 1_000_000_000
 
 
 @dataclass
 class Tick:
-    """One tick of a drive: what has come since the one before.
+    """One tick of a drive: what happened since the tick before.
 
     Attributes:
-        now_ns: its time.
-        missed: ticks that were left out before it.
-        frames: what arrived, in order, each ``READ_NS`` before the tick.
-        stalled: the loop stood still before it.
-        failed: frame of a valve that did not leave in the tick before, or None.
+        now_ns: time of the tick.
+        missed: number of ticks that were left out before it.
+        frames: received frames in order, each ``READ_NS`` before the tick.
+        stalled: the loop stood still before the tick.
+        failed: valve frame of the tick before that could not be sent, or None.
     """
 
     now_ns: int
@@ -41,12 +48,12 @@ class Tick:
 
 @dataclass
 class _Hand:
-    """An operator's hand on one joystick, and what its sender is at."""
+    """An operator's hand on one joystick, and the state of the joystick's sender."""
 
     wanted: dict[str, float]
     held: dict[str, float] = field(default_factory=dict)
-    silent: int = 0  # messages that are still left out
-    resting: int = 0  # ticks in neutral after a tap
+    silent: int = 0  # number of messages still to leave out
+    resting: int = 0  # ticks still to rest in neutral
     count: int = 0
     enable: int = 1
     reset: int = 0
@@ -54,23 +61,23 @@ class _Hand:
 
 
 class Driven(Protocol):
-    """A controller, in whatever language."""
+    """A controller in any language."""
 
     def stalled(self) -> None:
-        """Take note that the loop stood still."""
+        """Note that the loop stood still."""
 
     def send_failed(self, frame: Frame, /) -> None:
-        """Take note that a frame of a valve did not leave."""
+        """Note that a valve frame could not be sent."""
 
     def receive(self, frame: Frame, now_ns: int, /) -> object:
-        """Take a frame that was received."""
+        """Take a received frame."""
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]:
         """Return the frames to send now."""
 
 
 def play(tick: Tick, controller: Driven) -> list[Frame]:
-    """Give a tick of a drive to a controller, and return the frames that leave."""
+    """Give a tick of a drive to a controller; return the frames that it sends."""
     if tick.stalled:
         controller.stalled()
     if tick.failed is not None:
@@ -81,7 +88,7 @@ def play(tick: Tick, controller: Driven) -> list[Frame]:
 
 
 def valve_keys(deployment: Deployment) -> list[MessageKey]:
-    """Bus and id of each valve message, in the order of their axes."""
+    """Return bus and id of each valve message, in the order of the axes."""
     return list(dict.fromkeys(axis.valve.message.key for axis in deployment.axes.values()))
 
 
@@ -90,8 +97,8 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
 
     Args:
         deployment: the machine.
-        seed: of the drive.
-        ticks: how many.
+        seed: seed of the drive.
+        ticks: number of ticks.
     """
     source = random.Random(seed)
     tick_ns = deployment.config.tick_ms * 1_000_000
@@ -126,13 +133,13 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
 
 
 def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -> list[Frame]:
-    """Frames of one joystick in a tick: one, none or two."""
+    """Return the frames of one joystick in a tick: none, one or two."""
     config = bound.config
     if hand.silent > 0:
         hand.silent -= 1
         return []
     hand.count += 1
-    if source.random() < 0.001:  # what the switches do meanwhile is not seen
+    if source.random() < 0.001:  # the switches change while no message comes
         hand.silent, hand.enable = source.randint(1, 15), source.choice((0, 1, 1))
         hand.count += source.randint(0, 9)
         return []
@@ -148,7 +155,7 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
     hand.reset ^= source.random() < 0.01
     raw: dict[str, Any] = {}
     for one in bound.velocities:
-        assert isinstance(one, VelocitySignal)  # no other one is exported
+        assert isinstance(one, VelocitySignal)  # an export has no other kind
         signal = bound.message.get_signal_by_name(one.name)
         raw[one.name] = round((hand.held[one.name] * one.full - one.offset) / one.scale)
         if source.random() < 0.001:
@@ -167,7 +174,7 @@ def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -
 
 
 def _move(source: random.Random, hand: _Hand) -> None:
-    """Move a joystick as an operator does: strokes, taps with a pause behind them, a jerk."""
+    """Move a joystick as an operator does: strokes, taps with a pause after them, a jerk."""
     hand.resting = max(0, hand.resting - 1)
     if source.random() < 0.004:
         hand.resting = source.randint(20, 150)
@@ -183,13 +190,13 @@ def _move(source: random.Random, hand: _Hand) -> None:
 
 
 def _frame(bound: BoundInput, raw: dict[str, Any]) -> Frame:
-    """A frame of a message; signals that are not given are 0."""
+    """Return a frame of a message; signals without a value are 0."""
     whole = dict.fromkeys((signal.name for signal in bound.message.signals), 0)
     return Frame(*bound.key, bound.layout.encode(whole | raw))
 
 
 def _strange_frames(source: random.Random, deployment: Deployment) -> list[Frame]:
-    """Frames that no one knows; and seldom one with the id of a valve."""
+    """Return frames with unknown ids; seldom one with the id of a valve message."""
     frames, bus = [], next(iter(deployment.config.buses))
     if source.random() < 0.01:
         frames.append(Frame(bus, source.randint(0x500, 0x6FF), False, source.randbytes(8)))
@@ -197,3 +204,83 @@ def _strange_frames(source: random.Random, deployment: Deployment) -> list[Frame
         axis = source.choice([*deployment.axes.values()])
         frames.append(Frame(*axis.valve.message.key, bytes(axis.valve_message.length)))
     return frames
+
+
+# fmt: off
+NAMES = (
+    "state", "reason", "stopping", "was_enabled", "was_reset", "angle", "rate", "twin_angle",
+    "twin_rate", "unlimited", "value", "slope", "offset", "joins", "bypassed", "steps", "setpoint",
+    "path", "applied", "commanded", "command", "ramp", "own_ramp", "carry", "dropped_at", "ran",
+    "side", "due", "left", "no_run_on", "crossed", "added_left", "rested", "asked", "unattended",
+    "recent_low", "recent_high", "demanded_low", "demanded_high", "added",
+)
+# fmt: on
+# The C stops counting ticks here: no counter overflows while a machine rests for years.
+MOST_TICKS = 1_000_000_000
+
+
+def rows(controller: Controller) -> list[list[float]]:
+    """Return one row for each axis, then one for each motion."""
+    return [*map(_axis_row, controller.axes.values()), *map(_motion_row, controller.motions)]
+
+
+def _axis_row(control: AxisControl) -> list[float]:
+    axis = control.axis
+    states, transfer, stage = axis._states, axis._transfer, axis._stage
+    shaper, sway, output, small = transfer._shaper, axis.sway, axis.output, stage._small
+    twin = shaper._twin if isinstance(shaper, LimitAware) else None
+    value = shaper._command if isinstance(shaper, Gff) else 0.0
+    if isinstance(shaper, FirstOrder | SCurve):
+        value = shaper._value
+    row: list[float] = [
+        states.state,
+        states.reason,
+        states._stopping,
+        states._was_enabled,
+        states._was_reset,
+        sway.angle if sway else 0.0,
+        sway.rate if sway else 0.0,
+        twin.angle if twin else 0.0,
+        twin.rate if twin else 0.0,
+        shaper._unlimited if isinstance(shaper, LimitAware) else 0.0,
+        value,
+        shaper._slope if isinstance(shaper, SCurve) else 0.0,
+        transfer.offset,
+        transfer._joins,
+        transfer._bypassed,
+        output.steps,
+        output.setpoint,
+        output.path,
+        output.applied,
+        output.commanded,
+        axis.demand,
+        stage.ramp,
+        stage._own_ramp,
+        stage._carry,
+        stage._dropped_at,
+        stage._ran,
+        stage._side,
+        small._due,
+        small._left,
+        max(stage._no_run_on, -MOST_TICKS),
+        min(stage._crossed, MOST_TICKS),
+        max(axis.added_time._left, -MOST_TICKS),
+        min(axis.added_time._rested, MOST_TICKS),
+        axis.added_time.asked,
+        axis.added_time.unattended,
+        stage._recent.low,
+        stage._recent.high,
+        stage._demanded.low,
+        stage._demanded.high,
+        control.added,
+    ]
+    return [float(one) for one in row]
+
+
+def _motion_row(control: MotionControl) -> list[float]:
+    motion = control._motion
+    radius = motion._radius_m
+    row = [motion._weight, -1.0 if radius is None else radius]
+    for one in (motion._slew, motion._near_far):
+        row += [one.added, one.reached, one.way, one.ahead_s, one.joins] if one else [0.0] * 5
+    return [float(one) for one in row]

@@ -1,7 +1,7 @@
-"""``canshaper export --fmu``: the C as a co-simulation unit of FMI 3.0, for another's simulation.
+"""``canshaper export --fmu``: the C as a co-simulation unit of FMI 3.0, for other simulation tools.
 
-Written of the standard's text: https://fmi-standard.org/docs/3.0. The unit of the controller takes
-what a hand does to its joysticks, and makes frames of it; that of the plant is in ``campaign``.
+Source: https://fmi-standard.org/docs/3.0. The unit of the controller takes demands and switches,
+and makes the joystick frames itself; the unit of the plant is in ``campaign``.
 """
 
 import hashlib
@@ -17,14 +17,20 @@ from xml.sax.saxutils import quoteattr
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.export import check_exported
-from canshaper.native.library import C_FILES, FLAGS, FMU_FILES, compile_library
-from canshaper.native.source import sizes_source, tables_source
+from canshaper.native.library import (
+    C_FILES,
+    FLAGS,
+    FMU_FILES,
+    compile_library,
+    sizes_source,
+    tables_source,
+)
 from canshaper.native.tables import tables
 from canshaper.shaping.states import Reason, State
 from canshaper.shipped import version
 
 _SHOWN = 'factor="57.29577951308232"/>'
-# What a unit is made of, and how it is shown.
+# Elements of a unit of measurement: its base units, and the unit to show it in.
 UNITS = {
     "1": "<BaseUnit/>",
     "m": '<BaseUnit m="1"/>',
@@ -62,13 +68,13 @@ _MODEL = """\
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of a unit.
+    """A variable of a co-simulation unit.
 
     Attributes:
-        name: of it; "" for a place that this machine does not use.
+        name: name of the variable; "" for a place that this machine does not use.
         text: its description.
         unit: one of ``UNITS``, or State or Reason; "" for a switch.
-        start: at the start.
+        start: its initial value.
     """
 
     name: str
@@ -77,7 +83,7 @@ class Variable:
     start: float = 0.0
 
     def element(self, reference: int, kind: str) -> str:
-        """Its element of modelDescription.xml; ``kind``: what is said of its causality."""
+        """Return its element of modelDescription.xml; ``kind``: attributes of its causality."""
         if self.unit in UNITS:
             own, of = f'variability="discrete" start="{self.start!r}" unit="{self.unit}"', "Float64"
         elif self.unit:
@@ -90,15 +96,15 @@ class Variable:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of co-simulation.
+    """A co-simulation unit.
 
     Attributes:
         kind: controller or plant.
-        text: description of it.
-        inputs: by value reference, from 1 on.
-        outputs: the ones behind them.
-        sources: its C by file name, besides that of FMI.
-        header: what its C needs of this machine, in ``cs_unit.h``.
+        text: its description.
+        inputs: variables with the value references 1, 2, ...
+        outputs: variables with the references after those.
+        sources: its C by file name, without the C of FMI.
+        header: numbers of this machine for its C, in ``cs_unit.h``.
     """
 
     kind: str
@@ -113,7 +119,7 @@ def controller_unit(deployment: Deployment) -> Unit:
     """Return the controller of a deployment as a unit.
 
     Raises:
-        ConfigError: the C has no part for something.
+        ConfigError: the C does not support something of the deployment.
     """
     numbers = tables(deployment)
     inputs, outputs, moved = list[Variable](), list[Variable](), dict[tuple[str, str], list[str]]()
@@ -158,7 +164,7 @@ def write_fmu(unit: Unit, deployment: Deployment, out: Path) -> str:
     """Write a unit into a folder.
 
     Returns:
-        For which platform it has a binary, or why it has none, for a person.
+        A line for the user: the platform of its binary, or why it has none.
 
     Raises:
         ConfigError, UsageError: see ``check_exported``.
@@ -201,7 +207,7 @@ def write_fmu(unit: Unit, deployment: Deployment, out: Path) -> str:
         except NativeError as error:
             said = f"without a binary, its sources are to be compiled: {error}"
     with zipfile.ZipFile(path, "w") as archive:
-        for key, content in files.items():  # without times: the same machine makes the same file
+        for key, content in files.items():  # without times: the same machine gives the same file
             archive.writestr(zipfile.ZipInfo(key), content, zipfile.ZIP_DEFLATED)
     return f"{path}: FMI 3.0, co-simulation, {unit.kind}, {said}"
 

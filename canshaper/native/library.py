@@ -1,10 +1,11 @@
-"""The C, compiled with the tables of a deployment by the compiler of this machine.
+"""The C with the tables of a deployment: as source, compiled and loaded on this machine.
 
-Nothing of it is needed to run a crane: it drives campaigns, and judges the C. A build whose
-arithmetic is not that of the tables is refused when it is loaded.
+Campaigns drive it, and tests compare it with the controller in Python; a crane does not need it. A
+library whose arithmetic differs from Python's is refused when it is loaded.
 """
 
 import ctypes
+import math
 import os
 import shutil
 import subprocess
@@ -12,26 +13,96 @@ import tempfile
 from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from canshaper.codec.frame import Frame
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
-from canshaper.native.drive import valve_keys
-from canshaper.native.source import sizes_source, tables_source
-from canshaper.native.states import NAMES
+from canshaper.native.drive import NAMES, valve_keys
 from canshaper.native.tables import Numbers, tables
 from canshaper.shipped import PACKAGE
 
+# Members that point to an array, and the type of its elements.
+ARRAYS = {
+    "joystick": "cs_joystick_config",
+    "valve": "cs_valve_config",
+    "axis": "cs_axis_config",
+    "motion": "cs_motion_config",
+    "runs": "cs_run",
+    "curve_command": "cs_real",
+    "curve_speed": "cs_real",
+    "codes": "cs_code",
+}
+_TABLES = """\
+/* Numbers of one machine. No line of this is code. */
+#include <math.h>
+
+#include "canshaper.h"
+
+#define R(x) ((cs_real)(x))
+
+const cs_config cs_tables = {};
+"""
+
+
+def sizes_source(tables: Numbers) -> str:
+    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
+    axes = tables["axis"]
+    sizes = {
+        "CS_JOYSTICKS": len(tables["joystick"]),
+        "CS_NUMBERS": max(len(one["number"]) for one in tables["joystick"]),
+        "CS_VALVES": len(tables["valve"]),
+        "CS_AXES": len(axes),
+        "CS_MOTIONS": max(1, len(tables["motion"])),
+        "CS_TAPS": max(1, *(one.get("taps_n", 0) for one in axes)),
+        "CS_WINDOW": max(one["tail"] for one in axes) + 1,
+    }
+    rows = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
+    return f"/* Sizes of what changes, as cs_tables.c needs them. */\n{rows}"
+
+
+def tables_source(tables: Numbers) -> str:
+    """Return ``cs_tables.c``: the constant ``cs_tables``."""
+    plural = {"joystick": "joysticks", "valve": "valves", "axis": "axes", "motion": "motions"}
+    counts = {f"{many}_n": len(tables[one]) for one, many in plural.items()}
+    return _TABLES.replace("{}", _value(tables | counts))
+
+
+def _value(one: Any, key: str = "") -> str:
+    """Return a number, struct or array as an initialiser; a struct omits members that are 0."""
+    if isinstance(one, dict):
+        members = [
+            f".{name} = {_value(value, name)}"
+            for name, value in one.items()
+            if value not in (0, [], {}) or str(value) == "-0.0"
+        ]
+        return f"{{{', '.join(members)}}}"
+    if isinstance(one, list):
+        kind = f"(const {ARRAYS[key]}[])" if key in ARRAYS else ""
+        first, following = ("\n    ", ",\n    ") if isinstance(one[0], dict) else ("", ", ")
+        return f"{kind}{{{first}{following.join(map(_value, one))}}}"
+    if isinstance(one, bool):
+        return "true" if one else "false"
+    return real(one) if isinstance(one, float) else str(one)
+
+
+def real(value: float) -> str:
+    """Return a number as exact C; the macro ``R`` converts it to the precision of the build."""
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
+    return f"R({value.hex()})"
+
+
 C_FILES = PACKAGE / "native" / "c"
 FMU_FILES = C_FILES.with_name("fmu")
-# Never -ffast-math, never contracted: equality to the last bit hangs on them.
+# Equality to the last bit needs these: no -ffast-math, no contraction.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math")
 COMPILERS = ("cc", "gcc", "clang")
 MOTION_ROW = 12
 
 
 def compiler() -> list[str]:
-    """Return the command of the C compiler: that of CC, or the first that is there.
+    """Return the command of the C compiler: that of CC, or the first one of ``COMPILERS`` here.
 
     Raises:
         NativeError: there is none.
@@ -48,7 +119,7 @@ def compiler() -> list[str]:
 
 
 def has_compiler() -> bool:
-    """Whether a C compiler is here."""
+    """Whether this machine has a C compiler."""
     try:
         return bool(compiler())
     except NativeError:
@@ -56,13 +127,13 @@ def has_compiler() -> bool:
 
 
 def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -> Path:
-    """Compile the C with these tables into a shared library in a folder.
+    """Compile the C with these tables into a shared library.
 
     Args:
         numbers: see ``tables``.
-        folder: it gets the library, and the tables as source.
-        more: flags of the compiler besides the usual ones, and C files.
-        sources: where the C stands.
+        folder: folder for the library, and for the tables as source.
+        more: more flags of the compiler, and more C files.
+        sources: folder of the C.
 
     Raises:
         NativeError: there is no compiler, or it fails.
@@ -76,7 +147,7 @@ def build(numbers: Numbers, folder: Path, *more: str, sources: Path = C_FILES) -
 
 
 def compile_library(files: Iterable[Path], library: Path, *more: str) -> None:
-    """Compile C into a shared library; ``more``: flags besides the usual ones, and C files.
+    """Compile C files into a shared library; ``more``: more flags of the compiler and C files.
 
     Raises:
         NativeError: there is no compiler, or it fails.
@@ -91,7 +162,7 @@ def compile_library(files: Iterable[Path], library: Path, *more: str) -> None:
 
 
 def _content(numbers: Numbers, sources: Path, more: Iterable[str]) -> str:
-    """Hash of all that a library is made of."""
+    """Return the hash of everything that determines a library."""
     version = subprocess.run([*compiler(), "--version"], capture_output=True, check=False).stdout
     folders = [sources, *(Path(m[2:]) for m in more if m.startswith("-I"))]
     files = [file for folder in folders for file in sorted(folder.rglob("*.[ch]"))]
@@ -115,13 +186,13 @@ class NativeLibrary:
 
     Args:
         deployment: the machine.
-        more: flags of the compiler besides the usual ones, and C files.
-        sources: where the C stands.
-        cache: a folder that keeps what is compiled; without it is compiled every time.
+        more: more flags of the compiler, and more C files.
+        sources: folder of the C.
+        cache: folder that keeps compiled libraries; None to compile every time.
 
     Raises:
-        ConfigError: the C has no part for something of the deployment.
-        NativeError: it cannot be compiled, or its arithmetic is another one.
+        ConfigError: the C does not support something of the deployment.
+        NativeError: the C cannot be compiled, or its arithmetic differs from Python's.
     """
 
     def __init__(
@@ -141,7 +212,7 @@ class NativeLibrary:
                 library = build(numbers, Path(folder), *more, sources=sources)
             else:
                 library = cache / f"{_content(numbers, sources, more)}.so"
-                if not library.exists():  # another process that compiles it too makes the same
+                if not library.exists():  # a second process would make the same
                     build(numbers, Path(folder), *more, sources=sources).replace(library)
             self.c = ctypes.CDLL(str(library))
         self.c.cs_arithmetic.restype = ctypes.c_bool
@@ -151,7 +222,7 @@ class NativeLibrary:
 
 
 class NativeController:
-    """The controller in C, with the interface of ``Controller`` as far as it has it."""
+    """The controller in C, with the part of ``Controller``'s interface that ``Driven`` names."""
 
     def __init__(self, library: NativeLibrary) -> None:
         self._c, self._buses = library.c, library.buses
@@ -164,7 +235,7 @@ class NativeController:
         self._c.cs_init(self._state, self._tables)
 
     def receive(self, frame: Frame, arrived_ns: int) -> None:
-        """Take a frame that was received."""
+        """Take a received frame."""
         bus, can_id, extended, data = frame
         length, at = len(data), ctypes.c_int64(arrived_ns)
         number = self._buses.index(bus)
@@ -173,7 +244,7 @@ class NativeController:
         )
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        """Run every axis that is due, and return the frames of the valves."""
+        """Run every axis that is due; return the valve frames to send."""
         now = ctypes.c_int64(now_ns)
         count = self._c.cs_tick(self._state, self._tables, now, missed, self._out)
         frames: Iterable[_CFrame] = self._out[:count]
@@ -182,15 +253,15 @@ class NativeController:
         ]
 
     def stalled(self) -> None:
-        """Distrust every input: the loop stood still."""
+        """Note that the loop stood still: no input is trusted until it comes again."""
         self._c.cs_stalled(self._state, self._tables)
 
     def send_failed(self, frame: Frame) -> None:
-        """Take note that the frame of a valve did not leave."""
+        """Note that a valve frame could not be sent."""
         self._c.cs_send_failed(self._state, self._tables, self._valves.index(frame[:3]))
 
     def rows(self) -> list[list[float]]:
-        """Inner state: a row for each axis, then one for each motion; see ``states.py``."""
+        """Return the inner state: a row for each axis, then for each motion; see ``drive.rows``."""
         rows = []
         for axis in range(self._axes):
             self._c.cs_inspect_axis(self._state, axis, self._row)

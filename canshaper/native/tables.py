@@ -1,9 +1,8 @@
-"""From a deployment to the constant tables of the C in ``c/``: numbers only, no code.
+"""Constant tables of the C in ``c/`` from a deployment: numbers only, no code.
 
-The numbers are read off the objects that the controller runs, so that no rule is computed twice.
-What the C has no part for is refused by the key of the file, all of it at once. Status messages,
-feedback of the valves and numbers that may be changed at run time are left out: no valve frame
-hangs on them.
+The numbers are read from the objects that the controller runs, so that no rule is computed twice.
+Every key of the file that the C does not support is refused, all in one error. Status messages,
+valve feedback and numbers that change at run time are left out: valve frames do not need them.
 """
 
 import math
@@ -18,9 +17,9 @@ from canshaper.codec.message import SequenceChecker
 from canshaper.codec.signals import find_signal, special_codes
 from canshaper.codec.velocity import VelocitySignal
 from canshaper.config.source import Place
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.motion import MotionRunner
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.couplings import MotionControl
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -33,7 +32,7 @@ from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 from canshaper.shaping.transfer import Off
 
 Numbers = dict[str, Any]
-"""A struct of the tables, by the names of its members; of an absent member 0."""
+"""A struct of the tables: values by member; an absent member is 0."""
 Refusals = Iterator[tuple[Place, str]]
 _PROTECTED = ("checksum", "e2e", "multiplexor", "source")
 NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
@@ -48,7 +47,7 @@ NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
     ("motion", "*"): ("luffing",),
     ("motion", "*", "radius"): _PROTECTED,
 }
-"""Keys of the file for which the C has no part, by their sections."""
+"""Keys of the file that the C does not support, by their sections."""
 KINDS: dict[type, str] = {
     Off: "CS_OFF",
     Fir: "CS_FIR",
@@ -57,17 +56,17 @@ KINDS: dict[type, str] = {
     FirstOrder: "CS_FIRST_ORDER",
     SCurve: "CS_S_CURVE",
 }
-"""Filters of the C, by their classes here."""
-MOST_BITS = 24  # of a number in a frame: more is not exact in float
+"""Filters of the C, by their classes in Python."""
+MOST_BITS = 24  # most bits of a signal: more are not exact in float
 NONE = -1
-UNLIMITED_TICKS = 2_000_000_000  # more than the C ever counts
+UNLIMITED_TICKS = 2_000_000_000  # no limit: the C counts less
 
 
 def tables(deployment: Deployment) -> Numbers:
     """Return the tables of a deployment, as the struct ``cs_config``.
 
     Raises:
-        ConfigError: all keys for which the C has no part.
+        ConfigError: names every key that the C does not support.
     """
     controller = Controller(deployment)
     problems = [deployment.source.problem(*one) for one in _refused(deployment, controller)]
@@ -75,20 +74,20 @@ def tables(deployment: Deployment) -> Numbers:
         raise ConfigError(problems)
     buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
     axes = controller.axes
-    last = {runner.valve.key: runner for runner in axes.values()}
+    last = {control.valve.key: control for control in axes.values()}
     return {
         "tick_ns": deployment.config.tick_ms * 1_000_000,
         "joystick": [_joystick(deployment, name, buses) for name in joysticks],
-        "valve": [_valve(runner, buses) for runner in last.values()],
+        "valve": [_valve(control, buses) for control in last.values()],
         "axis": [
             {
-                **_wiring(runner, deployment, joysticks),
-                "valve": [*last].index(runner.valve.key),
-                "sends": last[runner.valve.key] is runner,
-                **_filter(runner.axis),
-                **_limits(runner.axis),
+                **_wiring(control, deployment, joysticks),
+                "valve": [*last].index(control.valve.key),
+                "sends": last[control.valve.key] is control,
+                **_filter(control.axis),
+                **_limits(control.axis),
             }
-            for runner in axes.values()
+            for control in axes.values()
         ],
         "motion": [
             _motion(deployment, name, one, list(axes), buses)
@@ -98,7 +97,7 @@ def tables(deployment: Deployment) -> Numbers:
 
 
 def _refused(deployment: Deployment, controller: Controller) -> Refusals:
-    """Yield what the C has no part for: where, and what was expected."""
+    """Yield each place that the C does not support, and what was expected there."""
     for pattern, keys in NOT_EXPORTED.items():
         for place, section in _sections((), deployment.config, pattern):
             for key in keys:
@@ -127,7 +126,7 @@ def _refused(deployment: Deployment, controller: Controller) -> Refusals:
 
 
 def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Place, Any]]:
-    """Yield the sections that a pattern fits, * for every name, with their places."""
+    """Yield the sections that match a pattern, with their places; * matches every name."""
     if not pattern:
         yield place, section
     elif section is not None:
@@ -151,8 +150,7 @@ def _unreadable(place: Place, message: Message, names: Iterable[str | None]) -> 
 
 
 def _field(message: Message, name: str | None) -> Numbers:
-    signal = find_signal(message, name) if name else None
-    if signal is None:
+    if not name or (signal := find_signal(message, name)) is None:
         return {}
     numbers = {n: getattr(signal, n) for n in ("start", "length", "is_signed")}
     return {**numbers, "motorola": signal.byte_order == "big_endian"}
@@ -199,13 +197,13 @@ def _joystick(deployment: Deployment, name: str, buses: list[str]) -> Numbers:
 
 
 def _velocities(deployment: Deployment, joystick: str) -> dict[str, VelocitySignal]:
-    """The numbers of a joystick, each once though several axes may read it."""
+    """Return the velocity signals of a joystick, each once though several axes may read it."""
     every = deployment.joysticks[joystick].velocities
     return {one.name: one for one in every if isinstance(one, VelocitySignal)}
 
 
-def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
-    sent = runner.bound.valve.message
+def _valve(control: AxisControl, buses: list[str]) -> Numbers:
+    sent = control.bound.valve.message
     data = sent.fields.layout.encode(dict(sent.start))
     return {
         **_key(sent.key, len(data), buses),
@@ -215,13 +213,13 @@ def _valve(runner: AxisControl, buses: list[str]) -> Numbers:
     }
 
 
-def _wiring(runner: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
-    """From which joystick an axis gets its demand, and where its setpoint goes."""
-    bound, command, valve = runner.bound, runner.bound.config.command, runner.bound.valve
+def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) -> Numbers:
+    """Return which joystick gives an axis its demand, and where its setpoint goes."""
+    bound, command, valve = control.bound, control.bound.config.command, control.bound.valve
     return {
         "joystick": joysticks.index(command.joystick),
         "number": [*_velocities(deployment, command.joystick)].index(command.signal),
-        "period_ticks": runner.period_ticks,
+        "period_ticks": control.period_ticks,
         "setpoint": _field(bound.valve_message, bound.config.valve.signal),
         "zero": valve._zero,
         "sign": valve._sign,
@@ -229,7 +227,7 @@ def _wiring(runner: AxisControl, deployment: Deployment, joysticks: list[str]) -
 
 
 def _filter(axis: ShapedAxis) -> Numbers:
-    """Sway model and filter of an axis."""
+    """Return sway model and filter of an axis."""
     transfer, sway = axis._transfer, axis.sway
     shaper = transfer._shaper
     numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis._tick_s, "fade": transfer._fade}
@@ -251,7 +249,7 @@ def _filter(axis: ShapedAxis) -> Numbers:
 
 
 def _limits(axis: ShapedAxis) -> Numbers:
-    """Limits of an axis, and what a motion may add to it."""
+    """Return limits of an axis, and what a motion may add to it."""
     stage, limits = axis._stage, axis._stage.limits
     numbers: Numbers = {
         "neutral_band": axis._neutral_band,
@@ -275,10 +273,10 @@ def _limits(axis: ShapedAxis) -> Numbers:
 
 
 def _motion(
-    deployment: Deployment, name: str, runner: MotionRunner, axes: list[str], buses: list[str]
+    deployment: Deployment, name: str, control: MotionControl, axes: list[str], buses: list[str]
 ) -> Numbers:
     """Return the members of ``cs_motion_config``."""
-    bound, motion = deployment.motions[name], runner._motion
+    bound, motion = deployment.motions[name], control._motion
     config, near_far = bound.config, bound.config.near_far
     members = [one for one in (motion._slew, motion._near_far) if one]
     same = ("full_speed", "period_s", "stiffness", "damping", "lag_s", "farthest", "fall_per_s")
@@ -286,8 +284,8 @@ def _motion(
         "slew": axes.index(config.slew),
         "near_far": axes.index(near_far) if near_far else NONE,
         "path_m": motion._path_m,
-        "circle_m": runner._circle_m or 0.0,
-        "tick_s": runner._tick_s,
+        "circle_m": control._circle_m or 0.0,
+        "tick_s": control._tick_s,
         "moving": [
             {**{n: getattr(one, n) for n in same}, "bounded": one.farthest < math.inf}
             for one in members

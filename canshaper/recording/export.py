@@ -18,8 +18,7 @@ from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import Key
 from canshaper.recording.form import AXIS, EXTRAS, POSE, Channel, Group, Row, Writer, install
-from canshaper.recording.history import History
-from canshaper.recording.listen import ReceivedFrame
+from canshaper.recording.listen import History, ReceivedFrame
 from canshaper.recording.ticks import STATE_CHANGE, Result, Tick
 from canshaper.shaping.states import Reason, State
 from canshaper_sim.axes import ROTATOR

@@ -1,4 +1,7 @@
-"""Read-only access to the buses of a deployment: this module cannot send."""
+"""Read-only access to the buses of a deployment, and the history of its status messages.
+
+This module cannot send.
+"""
 
 import select
 import socket
@@ -6,6 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -17,15 +21,18 @@ from canshaper.bus.packet import (
     FD_SIZE,
     FDF,
     SO_TIMESTAMPNS,
-    Packet,
     stamp_ns,
+    unpack,
 )
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import MOST_FAILURES, open_python_can, waiting
 from canshaper.bus.socketcan import dropped_frames, open_sockets
 from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
+from canshaper.codec.status import LAST_FAULT, StatusCodec
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.routing import Key
 
 # Frames read from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
@@ -162,20 +169,18 @@ def _raw(one: socket.socket, bus: str, channel: str) -> Iterator[ReceivedFrame]:
     """Yield the waiting frames of a SocketCAN socket."""
     with suppress(BlockingIOError):
         while True:
-            yield _of_socket(*one.recvmsg(FD_SIZE, ANCILLARY_BYTES)[:2], bus, channel)
-
-
-def _of_socket(data: bytes, ancillary: Any, bus: str, channel: str) -> ReceivedFrame:
-    """Return the frame in a packet of SocketCAN."""
-    stamp = stamp_ns(ancillary)
-    time_ns = time.time_ns() if stamp is None else stamp
-    word, payload, flags = Packet.unpack(data)
-    if word & ERR_FLAG:
-        can_id = ERR_FLAG | word & EFF_MASK
-        return ReceivedFrame(time_ns, bus, channel, can_id, True, payload, "error")
-    can_id, extended = id_of(word)
-    remote = "remote" if word & RTR_FLAG else ""
-    return ReceivedFrame(time_ns, bus, channel, can_id, extended, payload, remote, flags)
+            packet, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
+            if (parts := unpack(packet)) is None:
+                continue
+            stamp = stamp_ns(ancillary)
+            time_ns = time.time_ns() if stamp is None else stamp
+            word, data, flags = parts
+            if word & ERR_FLAG:
+                can_id = ERR_FLAG | word & EFF_MASK
+                yield ReceivedFrame(time_ns, bus, channel, can_id, True, data, "error")
+                continue
+            kind = "remote" if word & RTR_FLAG else ""
+            yield ReceivedFrame(time_ns, bus, channel, *id_of(word), data, kind, flags)
 
 
 def _python_can(message: can.Message, bus: str, channel: str) -> ReceivedFrame:
@@ -190,3 +195,97 @@ def _python_can(message: can.Message, bus: str, channel: str) -> ReceivedFrame:
     elif message.is_fd:
         flags = FDF | (BRS if message.bitrate_switch else 0)
     return ReceivedFrame(time_ns, bus, channel, can_id, extended, bytes(message.data), kind, flags)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisStatus:
+    """Status of one axis, as received.
+
+    Attributes:
+        time_ns: time of reception.
+        values: decoded fields by name.
+        shown: the same fields as texts for people.
+    """
+
+    time_ns: int
+    values: dict[str, Any]
+    shown: dict[str, str]
+
+    @property
+    def state(self) -> str:
+        """Name of the state, or its number if it is unknown."""
+        return self.shown["State"]
+
+    @property
+    def reason(self) -> str:
+        """Name of the reason, or its number if it is unknown."""
+        return self.shown["Reason"]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryEvent:
+    """One line for people: a new state, or a changed counter."""
+
+    time_ns: int
+    text: str
+
+
+class History:
+    """Takes frames; keeps the last status of each axis and the service, and notes every change.
+
+    Attributes:
+        axes: last status by axis.
+        counters: last counters of the service by name.
+        last_fault: name of the service's last fault.
+        counted_ns: time of the last counters; None before the first.
+        changes: every change, oldest first.
+    """
+
+    MOST_CHANGES = 100_000
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.axes: dict[str, AxisStatus] = {}
+        self.counters: dict[str, int] = {}
+        self.last_fault = ""
+        self.counted_ns: int | None = None
+        self.changes: list[HistoryEvent] = []
+        self._axes = {a.status.message.key: n for n, a in deployment.axes.items() if a.status}
+        self._codecs: dict[Key, StatusCodec[Any]] = {
+            axis.status.message.key: axis.status for axis in deployment.axes.values() if axis.status
+        }
+        if deployment.status:
+            self._codecs[deployment.status.message.key] = deployment.status
+
+    def receive(self, frame: ReceivedFrame) -> str | None:
+        """Take a data frame; return the axis if it is an axis' status, else None."""
+        key = (frame.bus, frame.can_id, frame.extended)
+        codec = self._codecs.get(key)
+        if codec is None or (values := codec.decode(frame.data)) is None:
+            return None
+        shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
+        if name := self._axes.get(key):
+            self._axis(name, AxisStatus(frame.time_ns, values, shown))
+        else:
+            self._counters(values, shown[LAST_FAULT.name], frame.time_ns)
+        return name
+
+    def _axis(self, name: str, status: AxisStatus) -> None:
+        last = self.axes.get(name)
+        self.axes[name] = status
+        if last is None or (last.state, last.reason) != (status.state, status.reason):
+            was = f" from={last.state}" if last else ""
+            text = f"axis={name} state={status.state}{was} reason={status.reason}"
+            self._note(status.time_ns, text)
+
+    def _counters(self, values: dict[str, int], fault: str, time_ns: int) -> None:
+        self.counted_ns = time_ns
+        counters = {name: count for name, count in values.items() if name != LAST_FAULT.name}
+        for name, count in counters.items():
+            last = self.counters.get(name)
+            if last is not None and count != last:
+                self._note(time_ns, f"{name}={count} was={last} last_fault={fault}")
+        self.counters, self.last_fault = counters, fault
+
+    def _note(self, time_ns: int, text: str) -> None:
+        if len(self.changes) < self.MOST_CHANGES:
+            self.changes.append(HistoryEvent(time_ns, text))

@@ -9,7 +9,7 @@ from canshaper.blackbox.state import States
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import BoxError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import TimedFrame
@@ -64,7 +64,7 @@ class Player:
         if box.header.get("listen_only"):
             deployment = deployment.listening()
         controller = Controller(deployment)
-        self._states = States(Guarded(controller), controller)
+        self._states = States(GatedController(controller), controller)
 
     def run(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
         """Yield every tick, with all frames received and sent since the tick before.
@@ -96,8 +96,8 @@ class Player:
 class _Played:
     """A controller that receives the recorded calls of the daemon to its own controller."""
 
-    def __init__(self, guarded: Guarded, controller: Controller, buses: list[str]) -> None:
-        self._guarded, self._controller, self._buses = guarded, controller, buses
+    def __init__(self, gated: GatedController, controller: Controller, buses: list[str]) -> None:
+        self._gated, self._controller, self._buses = gated, controller, buses
         self._adjuster = Adjuster(controller)
         self._rows = rows_of(controller)
         controller.events.clear()  # the daemon has logged them
@@ -161,7 +161,7 @@ class _Played:
         return Frame(bus, record.number, record.extended, record.payload)
 
     def _tick(self, record: Record) -> None:
-        for frame in self._guarded.tick(record.time_ns, record.number):
+        for frame in self._gated.tick(record.time_ns, record.number):
             while (call := self._next_of(WITHIN)) is not None:
                 self._call(call)
             self._compare(frame)
@@ -170,11 +170,11 @@ class _Played:
         if record.kind in OF_A_FRAME:
             self._call_with(self._frame(record), record)
             return
-        guarded, controller, kind = self._guarded, self._controller, record.kind
+        gated, controller, kind = self._gated, self._controller, record.kind
         if kind == Kind.STALLED:
-            guarded.stalled()
+            gated.stalled()
         elif kind == Kind.NEUTRAL:
-            for frame in guarded.neutral_frames():
+            for frame in gated.neutral_frames():
                 self._compare(frame)
         elif kind == Kind.OFF_BUS:
             controller.on_bus_off(self._buses[record.number])
@@ -185,19 +185,19 @@ class _Played:
             if record.number == record.length:  # that was the last part
                 values, self._text = json.loads(self._text), b""
                 self._adjuster.change(values)
-                guarded.set(values)
+                gated.set(values)
         else:
             raise ValueError(f"expected a known kind of record, got {kind}")
 
     def _call_with(self, frame: Frame, record: Record) -> None:
-        guarded, kind = self._guarded, record.kind
+        gated, kind = self._gated, record.kind
         if kind == Kind.RX:
             self._received.append((record.time_ns, frame))
-            if (passed := guarded.receive(frame, record.time_ns)) is not None:
+            if (passed := gated.receive(frame, record.time_ns)) is not None:
                 self._compare(passed)
         elif kind == Kind.TX:
             self._differs(Difference(frame[:3], None, frame.data))
         elif kind == Kind.FAILED:
-            guarded.send_failed(frame)
+            gated.send_failed(frame)
         else:
-            guarded.withhold(frame)
+            gated.withhold(frame)

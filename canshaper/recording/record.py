@@ -19,8 +19,7 @@ from canshaper.errors import LogError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.export import exporting
 from canshaper.recording.form import EXTRAS
-from canshaper.recording.history import History
-from canshaper.recording.listen import Listener, ReceivedFrame
+from canshaper.recording.listen import History, Listener, ReceivedFrame
 
 HISTORY, LOG = "history.txt", "recording.log"
 # A bundle that someone sends may be made to fill the disk. A log of candump packs 5 to 30 times,

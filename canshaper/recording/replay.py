@@ -151,11 +151,11 @@ class Replay:
         for tick in clocked(self._frames(Sorter(self._deployment)), tick_ns):
             result = stepper.step(tick)
             for name in [*waiting]:
-                runner = controller.axes[name]
-                if runner.axis.state is State.READY:
+                control = controller.axes[name]
+                if control.axis.state is State.READY:
                     del waiting[name]
                 else:
-                    waiting[name][runner.reason] += 1
+                    waiting[name][control.reason] += 1
             yield tick, result
 
     def check_joysticks(self) -> None:

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
+from canshaper.controller.axis_control import LEAST_RADIUS_M
 from canshaper.controller.parameter_sets import profile_by_number
-from canshaper.controller.runner import LEAST_RADIUS_M
 from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.inputs.value import PositionInput, Value
 from canshaper.machine.deployment import Deployment

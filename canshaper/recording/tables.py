@@ -10,6 +10,7 @@ from base64 import b64decode
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import Decimal
 from operator import itemgetter
+from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from canshaper.codec.frame import Frame
@@ -55,6 +56,18 @@ def is_log(header: str) -> bool:
     """Return whether this first line of a table is that of a log of frames, or nearly one."""
     of_kvaser = header.strip().startswith(("CSV CAN data", "Kvaser Memorator Log"))
     return of_kvaser or "arbitration_id" in header or Table.of(header) is not None
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a file is a table of numbers rather than a log of CAN frames.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
+        return False
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        return not is_log(file.readline(10_000))
 
 
 def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:

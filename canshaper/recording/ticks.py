@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from canshaper.codec.frame import Frame
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.gated import GatedController
 from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.machine.routing import Key
 from canshaper.recording.channels import Kind
@@ -100,8 +100,8 @@ def rows_of(controller: Controller) -> Callable[[], dict[str, Row]]:
     return lambda: {name: row() for name, row in rows}
 
 
-def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
-    config, axis = runner.bound.config, runner.axis
+def _row_of(controller: Controller, control: AxisControl) -> Callable[[], Row]:
+    config, axis = control.bound.config, control.axis
     joystick, signal = controller.joysticks[config.command.joystick], config.command.signal
     full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0
 
@@ -110,9 +110,9 @@ def _row_of(controller: Controller, runner: AxisControl) -> Callable[[], Row]:
         sway = axis.sway
         sway_deg = DEGREES * sway.sway_rad(full_speed_m_s) if sway is not None else 0.0
         command = 0.0 if type(command) is Reason else command
-        sent, mode = axis.sent, sway.mode if sway is not None else None
+        sent, mode = axis.output.setpoint, sway.mode if sway is not None else None
         added = sent - axis.output.applied
-        values = command, sent, sway_deg, added, axis.state, runner.active_set, mode
+        values = command, sent, sway_deg, added, axis.state, control.active_set, mode
         return new_row(Row, values)
 
     return row
@@ -205,15 +205,15 @@ class Stepper:
         self._ports = dict.fromkeys(buses, self._port)
         self._standstill = Standstill(controller.deployment)
         self._standstill.clock = lambda: 0  # nothing is ever late here
-        self._guarded = Guarded(controller)
+        self._gated = GatedController(controller)
         self._rows = rows_of(controller)
 
     def step(self, tick: Tick) -> Result:
         """Run one tick, as the daemon does."""
         controller, port = self._controller, self._port
-        first = self._guarded.neutral_frames() if tick.number == 0 else []
+        first = self._gated.neutral_frames() if tick.number == 0 else []
         port.begin(tick, self._standstill.last_ns)
-        io_cycle(self._guarded, self._ports, tick.now_ns, 0, self._standstill)
+        io_cycle(self._gated, self._ports, tick.now_ns, 0, self._standstill)
         events = [event.text for event in controller.events]
         controller.events.clear()
         return Result(first + port.sent, self._rows(), events)

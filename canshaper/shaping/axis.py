@@ -5,10 +5,10 @@ How it works
 The axis does no I/O and reads no clock. In each tick its caller gives it the checked input, and
 reads from ``output`` what the valve frame shall carry:
 
-1. ``act`` finds the output. The state machine takes the input (``state_machine.py``); the filter
-   takes the operator's demand (``transfer.py``); the output stage bounds what the filter asks for
-   (``output.py``). The valve frame can leave now.
-2. ``advance`` lets the sway model swing with that output. It can wait until the frame has left.
+1. ``command`` finds the output. The state machine takes the input (``state_machine.py``), the
+   filter takes the operator's demand (``transfer.py``), and the output stage bounds what the filter
+   asks for (``output.py``). The valve frame can leave now.
+2. ``propagate`` lets the sway model swing with that output. It can wait until the frame has left.
 """
 
 import math
@@ -45,7 +45,7 @@ class ShapedAxis:
         grid_steps: steps of the valve frame from zero to full command.
 
     Attributes:
-        command: demand of the operator in the last tick, [-1, 1], times ``scale``.
+        demand: demand of the operator in the last tick, [-1, 1], times ``scale``.
         output: output of the axis with its parts: one object, which every tick overwrites.
         sway: the sway model.
         sensed: the sway sensor's observer and trust, or None without a sensor.
@@ -69,7 +69,7 @@ class ShapedAxis:
         stop_s: float = 2.0,
         grid_steps: int = 125,
     ) -> None:
-        self.command = 0.0
+        self.demand = 0.0
         self.sway = sway
         self.sensed: SensedSway | None = None
         self.bends = False
@@ -83,16 +83,6 @@ class ShapedAxis:
         self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
         self.output = self._stage.output
         self.added_time = AddedTime(0, self._stage.tail)
-
-    @property
-    def raw(self) -> int:
-        """Command in the valve frame, in steps of its grid (deadband included)."""
-        return self.output.steps
-
-    @property
-    def sent(self) -> float:
-        """Velocity that the steps of the valve frame give, [-1, 1] of full speed."""
-        return self.output.setpoint
 
     @property
     def state(self) -> State:
@@ -110,12 +100,12 @@ class ShapedAxis:
         return self._states.state not in MOVING
 
     def tick(self, joystick: CommandInput, added: float = 0.0) -> Transition | None:
-        """Run a whole tick: ``act`` and ``advance``."""
-        transition = self.act(joystick, added)
-        self.advance()
+        """Run a whole tick: ``command`` and ``propagate``."""
+        transition = self.command(joystick, added)
+        self.propagate()
         return transition
 
-    def act(
+    def command(
         self, joystick: CommandInput, added: float, *, damps: bool = False
     ) -> Transition | None:
         """Take the input of this tick, and find the output.
@@ -157,7 +147,7 @@ class ShapedAxis:
                     demand = self.scale * min(max(held, low), high) if state is ACTIVE else held
             elif state is STOPPING and size > self._neutral_band:
                 stage.stop_against(joystick.command)
-            self.command = demand
+            self.demand = demand
 
             adds = may_add and state is ACTIVE
             path = added if adds or (self.bends and state is ACTIVE) else 0.0
@@ -175,16 +165,16 @@ class ShapedAxis:
             return self.invalidate(old, error)
         return None if state is old else Transition(old, state, states.reason)
 
-    def advance(self) -> None:
-        """Let the sway model swing with the output of ``act``."""
+    def propagate(self) -> None:
+        """Let the sway model swing with the output of ``command``."""
         output = self.output
         if self.sway is not None:
             self.sway.step(output.applied)
         if self.sensed is not None:
-            self.sensed.step(output.applied, self.command, output.path)
+            self.sensed.step(output.applied, self.demand, output.path)
 
     def hold(self, ticks: int) -> Transition | None:
-        """Count missed ticks, in which the valve kept the last output; return as ``act`` does.
+        """Count missed ticks, in which the valve kept the last output; return as ``command`` does.
 
         Missed ticks lengthen neither the run-on nor a stop, and the filter takes the last demand in
         each of them. Only the ramp does not catch up.
@@ -196,8 +186,8 @@ class ShapedAxis:
         try:
             for _ in range(min(ticks, MOST_HELD)):
                 self._transfer.hold(demand)
-                self.advance()
-        except Exception as error:  # as in ``act``
+                self.propagate()
+        except Exception as error:  # as in ``command``
             return self.invalidate(self._states.state, error)
         return None
 
@@ -221,7 +211,7 @@ class ShapedAxis:
             for velocity in past:
                 sway.step(velocity)
         shaper = shaper_for(sway)
-        self._transfer.replace(shaper, self._clamped_demand(), anew=bool(past))
+        self._transfer.replace(shaper, self._clamped_demand(), again=bool(past))
         self._stage.change_filter(spreads=spreads(shaper))
         self.sway = sway
         if self.sensed is not None:
@@ -273,7 +263,7 @@ class ShapedAxis:
 
     def _clamped_demand(self) -> float:
         """Return the last demand as the filter got it, clamped to the maximum."""
-        return within(self.command, -self._stage.limits.maximum, self._stage.limits.maximum, 0.0)
+        return within(self.demand, -self._stage.limits.maximum, self._stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:
         """Trip for an error of the filter, or an output that no frame carries.
@@ -288,7 +278,7 @@ class ShapedAxis:
         if self.output.commanded:
             self._stage.hold_run_on()
         self._stage.rest()
-        self.command = 0.0
+        self.demand = 0.0
         if self.sway is not None:
             self.sway.angle = self.sway.rate = 0.0
         if self.sensed is not None:

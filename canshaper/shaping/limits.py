@@ -122,7 +122,7 @@ class OutputLimits:
         return curve.velocity(command) if curve else without_deadband(command, deadband)
 
 
-class RecentCommand:
+class RecentDemand:
     """Largest and smallest command of the last ``ticks`` ticks, zero included (sliding window).
 
     Amortised constant time: two monotonic queues, of positive and of negative commands.

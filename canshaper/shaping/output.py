@@ -29,14 +29,14 @@ from dataclasses import dataclass
 
 from canshaper.shaping.limits import (
     OutputLimits,
-    RecentCommand,
+    RecentDemand,
     allowed_range,
     on_grid,
     rate_limited,
     within,
 )
-from canshaper.shaping.motion import range_with_added
 from canshaper.shaping.small_strokes import SmallStrokes
+from canshaper.shaping.two_axis_motion import range_with_added
 
 # Largest quantisation error of an added velocity that is carried, full speed times ticks.
 MOST_CARRY = 0.1
@@ -102,8 +102,8 @@ class OutputStage:
         self.ramp = self.largest_added = 0.0
         self._grid_steps, self._tick_s, self._spreads = grid_steps, tick_s, spreads
         self.tail = round(limits.tail_s / tick_s)  # ticks
-        self._recent = RecentCommand(self.tail)
-        self._demanded = RecentCommand(self.tail)  # the same, but no rest ends it
+        self._recent = RecentDemand(self.tail)
+        self._demanded = RecentDemand(self.tail)  # the same, but no rest ends it
         self._no_run_on = 0  # ticks that are left without run-on
         self._ran = 0.0  # how far it has run beyond what was asked, full speed times seconds
         self._side = 1.0  # to which the joystick was deflected last, 1 or -1

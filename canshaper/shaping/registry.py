@@ -41,6 +41,8 @@ def with_entry_points(
                 )
             if kind.name in known:
                 raise ValueError(f"the kind {kind.name!r} is there already")
+            if kind.runs_ahead is None:
+                raise ValueError("expected runs_ahead=True or False for the gate, got neither")
         except Exception as error:  # a module of another package may raise anything
             text = " ".join(f"{type(error).__name__}: {error}".split())
             faults.append((f"package {package}", f"entry point {point.name} of {GROUP}: {text}"))

@@ -47,7 +47,7 @@ class BumplessTransfer:
         self._shaper = shaper
         self._fade = math.exp(-tick_s / BLEND_S)
         self.offset = 0.0
-        self._joins = False  # whether the next command sets the offset
+        self._joins = False  # whether the next demand sets the offset
         self._bypassed = False
 
     def entered(self, state: State, old: State) -> None:
@@ -58,33 +58,33 @@ class BumplessTransfer:
             self._joins = old in MOVING and bypassed is not self._bypassed
             self._bypassed = bypassed
 
-    def unlimited(self, command: float, maximum: float, applied: float, added: float) -> float:
+    def unlimited(self, demand: float, maximum: float, ramp: float, added: float) -> float:
         """Return the reference before limits, without a step from the output before a change.
 
         Args:
-            command: the operator's demand.
+            demand: the operator's demand.
             maximum: largest |velocity| of the axis, which clamps the demand: a filter whose output
                 is cut off would damp nothing.
-            applied: velocity that was sent in the last tick.
+            ramp: ``OutputStage.ramp``: velocity of the last tick, before it was rounded.
             added: velocity that another axis adds in this tick.
         """
-        if abs(command) > maximum:
-            command = math.copysign(maximum, command)
-        output = self._shaper.step(command)
+        if abs(demand) > maximum:
+            demand = math.copysign(maximum, demand)
+        output = self._shaper.step(demand)
         if self._bypassed:
-            output = command
+            output = demand
         if self._joins:
             self._joins = False
-            self.offset = applied - output - added
+            self.offset = ramp - output - added
         elif self.offset:
             self.offset *= self._fade
             if abs(self.offset) < 1e-6:  # far below any frame's resolution
                 self.offset = 0.0
         return output + self.offset
 
-    def hold(self, command: float) -> None:
-        """Count a missed tick with this command."""
-        self._shaper.step(command)
+    def hold(self, demand: float) -> None:
+        """Count a missed tick with this demand."""
+        self._shaper.step(demand)
 
     def prepare(self, least: float, most: float) -> None:
         """Prepare the filter for ``follow`` from least to most."""
@@ -96,16 +96,16 @@ class BumplessTransfer:
         assert isinstance(self._shaper, Following)
         self._shaper.follow(factor)
 
-    def replace(self, shaper: Shaper, command: float, *, anew: bool) -> None:
+    def replace(self, shaper: Shaper, demand: float, *, again: bool) -> None:
         """Continue with another filter.
 
         Args:
             shaper: the new filter.
-            command: the present demand.
-            anew: whether the sway model has been run again from rest by the new mode.
+            demand: the present demand.
+            again: whether the sway model has been run again from rest by the new mode.
         """
-        carry_over(self._shaper, shaper, command)
-        if anew and hasattr(shaper, "swing_anew"):
-            shaper.swing_anew()
+        carry_over(self._shaper, shaper, demand)
+        if again and hasattr(shaper, "swing_again"):
+            shaper.swing_again()
         self._shaper = shaper
         self._joins = True

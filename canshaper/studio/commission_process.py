@@ -16,7 +16,7 @@ from canshaper.commissioning.procedure.bench import Simulated, check_rehearsal
 from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
 from canshaper.commissioning.procedure.procedure import STEPS, Procedure
 from canshaper.commissioning.procedure.state import Outcome, State, read_state
-from canshaper.commissioning.procedure.steps.report import NAME as REPORT
+from canshaper.commissioning.procedure.steps.check import NAME as REPORT
 from canshaper.errors import CanshaperError, UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.report.console import OnProgress

@@ -11,7 +11,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.design.lockstep import LockStep, driven_part
 from canshaper.errors import DriveError
 from canshaper.machine.deployment import Deployment
@@ -56,7 +56,7 @@ class InProcessCrane:
         self.cycle_ms = self._hand.hand.cycle_ms
         self._controller = Controller(deployment)
         self._adjuster = Adjuster(self._controller)
-        self._guarded = Guarded(self._controller)
+        self._gated = GatedController(self._controller)
         self._next: Deployment | None = None
         self._report = report
         self._frames: list[Frame] = []
@@ -66,7 +66,7 @@ class InProcessCrane:
             raise DriveError(str(error)) from None
         self._lock_step = LockStep(
             deployment,
-            self._guarded,
+            self._gated,
             plant,
             [self._hand, *others],
             lambda frame, _time_s: self._frames.append(frame),
@@ -102,13 +102,13 @@ class InProcessCrane:
         self._next = deployment
 
     def _use(self, deployment: Deployment) -> None:
-        before, guarded, self._next = self._controller, self._guarded, None
+        before, gated, self._next = self._controller, self._gated, None
         self._controller = Controller(deployment)
-        self._guarded = Guarded(self._controller)
+        self._gated = GatedController(self._controller)
         self._controller.carry_over(before)
-        self._guarded.carry_over(guarded)
+        self._gated.carry_over(gated)
         self._adjuster = Adjuster(self._controller)
-        self._lock_step.processor = self._guarded
+        self._lock_step.processor = self._gated
 
 
 class HeldHand:

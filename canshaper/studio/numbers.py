@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from canshaper.commissioning import control_client as client
-from canshaper.commissioning.assumed import write_numbers
+from canshaper.commissioning.origins import write_numbers
 from canshaper.config.adjust import Key, value
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig

@@ -15,4 +15,5 @@ KIND = ShaperKind(
     moving_average,
     lambda mode, _tick_s: {"mean over a swing": {"window_s": mode.period_s}},
     (Parameter("window_s", 0.1, 10, "s", "time over which the mean is taken"),),
+    runs_ahead=False,  # it only spreads the demand: the gate allows it 0.4 s of full speed
 )

@@ -5,7 +5,7 @@ joint by joint. Slewing is the same axis in both. An overhead crane moves a trol
 deployment may name its axes differently: its ``coordinates`` map its names to these.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 SLEW: Final = "slew"  # positive: theta1 grows, counter-clockwise from above
@@ -25,6 +25,27 @@ OVERHEAD_AXES: Final = (BRIDGE, TROLLEY, HOIST)
 ALL_AXES: Final = (*TIP_AXES, *JOINT_AXES[1:], *OVERHEAD_AXES)
 WITHOUT_SWAY: Final = (LIFT, HOIST)  # they excite none by themselves
 
+# MESSAGE.SIGNAL in which the simulated crane reports the speed of an axis. JointVelocity has slew
+# too, but a machine moved by its tip need not send that message.
+SPEED_SIGNALS: Final = {
+    SLEW: "TipVelocity.SlewRate",
+    NEAR_FAR: "TipVelocity.RadialSpeed",
+    LIFT: "TipVelocity.VerticalSpeed",
+    LIFT_CYLINDER: "JointVelocity.LiftRate",
+    KNUCKLE: "JointVelocity.KnuckleRate",
+    EXTENSION: "JointVelocity.ExtensionSpeed",
+    BRIDGE: "CraneVelocity.BridgeSpeed",
+    TROLLEY: "CraneVelocity.TrolleySpeed",
+    HOIST: "CraneVelocity.HoistSpeed",
+}
+# The signal of the swing that an axis excites; those of WITHOUT_SWAY have none.
+SWAY_SIGNALS: Final = {
+    SLEW: "GrappleSway.SwayPerpendicular",
+    **dict.fromkeys((NEAR_FAR, LIFT_CYLINDER, KNUCKLE, EXTENSION), "GrappleSway.SwayParallel"),
+    BRIDGE: "LoadSway.SwayBridge",
+    TROLLEY: "LoadSway.SwayTrolley",
+}
+
 # Machines by what their axes move.
 TIP: Final = "tip"
 JOINTS: Final = "joints"
@@ -35,6 +56,12 @@ TOWER_AXES: Final = (SLEW, NEAR_FAR, HOIST)
 LUFFING_AXES: Final = (SLEW, LIFT_CYLINDER, EXTENSION, HOIST)
 # Machines whose load hangs from a rope.
 ON_ROPE: Final = (OVERHEAD, TOWER, LUFFING)
+
+
+def reported_in(message: str, signals: Mapping[str, str]) -> dict[str, str]:
+    """Return the signals of a message, by axis, out of SPEED_SIGNALS or SWAY_SIGNALS."""
+    pairs = ((axis, name.split(".")) for axis, name in signals.items())
+    return {axis: signal for axis, (of, signal) in pairs if of == message}
 
 
 def kind_of(axes: Iterable[str]) -> str:

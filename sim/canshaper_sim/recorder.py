@@ -15,18 +15,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.states import Reason
-from canshaper_sim.axes import (
-    BRIDGE,
-    EXTENSION,
-    HOIST,
-    KNUCKLE,
-    LIFT,
-    LIFT_CYLINDER,
-    NEAR_FAR,
-    SLEW,
-    TROLLEY,
-    kind_of,
-)
+from canshaper_sim.axes import SPEED_SIGNALS, SWAY_SIGNALS, kind_of, reported_in
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import offset_m
 from canshaper_sim.parameters import changed_parameters
@@ -34,19 +23,9 @@ from canshaper_sim.recording import DWELL_S, AxisTrace, CraneTrace, Point, Recor
 
 _Handler = Callable[[bytes, float], None]  # data of the right length, time in s
 
-# Slewing is in both; a machine moved by its tip need not send JointVelocity.
-_SPEED_SIGNALS = {
-    "TipVelocity": {SLEW: "SlewRate", NEAR_FAR: "RadialSpeed", LIFT: "VerticalSpeed"},
-    "JointVelocity": {
-        LIFT_CYLINDER: "LiftRate",
-        KNUCKLE: "KnuckleRate",
-        EXTENSION: "ExtensionSpeed",
-    },
-    "CraneVelocity": {BRIDGE: "BridgeSpeed", TROLLEY: "TrolleySpeed", HOIST: "HoistSpeed"},
-}
-_SWAY_SIGNALS = ACROSS, ALONG = "SwayPerpendicular", "SwayParallel"
-_OVERHEAD_SIGNAL = {BRIDGE: "SwayBridge", TROLLEY: "SwayTrolley"}
-_SWAY_SIGNAL = {SLEW: ACROSS, **dict.fromkeys((NEAR_FAR, LIFT_CYLINDER, KNUCKLE, EXTENSION), ALONG)}
+_SWAY_OF_GRAPPLE = reported_in("GrappleSway", SWAY_SIGNALS)
+_SWAY_OF_LOAD = reported_in("LoadSway", SWAY_SIGNALS)
+_ACROSS_ALONG = tuple(dict.fromkeys(_SWAY_OF_GRAPPLE.values()))
 
 
 def dwell_s(deployment: Deployment) -> float:
@@ -124,7 +103,7 @@ class Recorder:
         for name, rows in self._rows.items():
             columns = [list(column) for column in zip(*rows, strict=True)] or [[], [], [], []]
             joystick, sent, speed, sway = columns
-            swings = self._moves.get(name) in _SWAY_SIGNAL | _OVERHEAD_SIGNAL
+            swings = self._moves.get(name) in SWAY_SIGNALS
             traces[name] = AxisTrace(joystick, sent, speed, sway if swings else None)
         tip, grapple, sway = (
             map(list, zip(*self._crane, strict=True)) if self._crane else ([], [], [])
@@ -164,7 +143,7 @@ class Recorder:
         return receive
 
     def _speed(self, fields: FieldSet) -> _Handler:
-        value, signals = fields.value, _SPEED_SIGNALS[fields.message.name]
+        value, signals = fields.value, reported_in(fields.message.name, SPEED_SIGNALS)
         speeds = [
             (self._now[name], signals[moved], self._full[moved])
             for name, moved in self._moves.items()
@@ -190,7 +169,7 @@ class Recorder:
 
     def _sway(self, fields: FieldSet) -> _Handler:
         rows = [
-            (self._now[name], self._rows[name], _SWAY_SIGNAL.get(self._moves.get(name, ""), ""))
+            (self._now[name], self._rows[name], _SWAY_OF_GRAPPLE.get(self._moves.get(name, ""), ""))
             for name in self._now
         ]
 
@@ -198,7 +177,7 @@ class Recorder:
             if self._start_s is None:
                 return
             raw = fields.layout.decode(data)
-            sways = {signal: fields.value(signal, raw[signal]) for signal in _SWAY_SIGNALS}
+            sways = {signal: fields.value(signal, raw[signal]) for signal in _ACROSS_ALONG}
             self._t_s.append(time_s - self._start_s)
             across, along = sways.values()
             heading, radius_m = self._tip
@@ -233,7 +212,7 @@ class Recorder:
 
     def _load(self, fields: FieldSet) -> _Handler:
         rows = [
-            (self._now[name], self._rows[name], _OVERHEAD_SIGNAL.get(self._moves.get(name, ""), ""))
+            (self._now[name], self._rows[name], _SWAY_OF_LOAD.get(self._moves.get(name, ""), ""))
             for name in self._now
         ]
 
@@ -241,7 +220,7 @@ class Recorder:
             if self._start_s is None:
                 return
             raw = fields.layout.decode(data)
-            sways = {s: fields.value(s, raw[s]) for s in _OVERHEAD_SIGNAL.values()}
+            sways = {s: fields.value(s, raw[s]) for s in _SWAY_OF_LOAD.values()}
             self._t_s.append(time_s - self._start_s)
             along, across = (math.tan(math.radians(angle)) for angle in sways.values())
             x, y, rope = self._hook

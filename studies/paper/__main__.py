@@ -16,6 +16,7 @@ from canshaper.cli.common import (
 )
 from canshaper.report.console import SafeConsole
 from canshaper.shipped import data_directory
+from tools.marks import with_sections
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from studies.paper.study import Study
 
 EXIT_INTERRUPTED = 130
+PAGE = Path(__file__).parents[1] / "README.md"
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -36,6 +38,7 @@ def reproduce(
         metavar="N",
         help="Only this figure, 3, 4, 6, 7 or 8, and no table. May be given several times.",
     ),
+    write: bool = typer.Option(False, "--write", help="Write the tables into studies/README.md."),
 ) -> None:
     """Make the paper's figures again and hold its numbers against ours.
 
@@ -56,16 +59,16 @@ def reproduce(
     """
     console = SafeConsole()
     try:
-        _reproduce(out, figure or [], console)
+        _reproduce(out, figure or [], console, write)
     except KeyboardInterrupt:
         echo("interrupted", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
-def _reproduce(out: Path, chosen: list[int], console: Console) -> None:
+def _reproduce(out: Path, chosen: list[int], console: Console, write: bool) -> None:
     from canshaper.errors import ConfigError
     from studies.paper.study import FIGURES, Study, steps
-    from studies.paper.table import print_paper_table
+    from studies.paper.table import page_sections, print_paper_table
 
     for number in chosen:
         if number not in FIGURES:
@@ -104,6 +107,9 @@ def _reproduce(out: Path, chosen: list[int], console: Console) -> None:
     if table is not None:
         _write(out / "paper.json", table)
         print_paper_table(table, console)
+        if write:
+            text = with_sections(PAGE.read_text("utf-8"), page_sections(table), "measured")
+            PAGE.write_text(text, encoding="utf-8")
         console.print(f"Table: {out / 'paper.json'}")
     for finding, path in drawn:
         console.print(f"{path}: {finding}")

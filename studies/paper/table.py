@@ -1,4 +1,4 @@
-"""The paper's numbers against ours for the terminal; fits 80 columns."""
+"""The paper's numbers against ours: for the terminal, in 80 columns, and for studies/README.md."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -31,6 +31,39 @@ def print_paper_table(data: Mapping[str, Any], console: Console) -> None:
     console.print()
     console.print(f"Drive: {data['drive']}.", highlight=False, style="dim")
     console.print(f"Assumed: {data['assumed']['why']}.", highlight=False, style="dim")
+
+
+def page_sections(data: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Tables of studies/README.md by the names of their marks; bold where the paper's number holds.
+
+    Args:
+        data: content of paper.json, see ``studies.paper.study``.
+    """
+    heads = ["section", "stroke, plane", "filter of", "paper, %"]
+    for plant in ("linear", "real"):
+        heads += [f"{plant} valve: peak", "RMS", "residual"]
+    reductions = [*_head(*heads)]
+    for row in data["reductions"]:
+        note = f" ({row['remark']})" if row["remark"] and row["axis"] != "both" else ""
+        cells = [row["section"], _what(row) + note, row["poles_of"].replace("_", "-")]
+        cells.append(f"> {row['more_than_pct']:g}")
+        for plant, values in row["ours_pct"].items():
+            texts = {metric: f"{value:.0f}" for metric, value in values.items()}
+            holds = row["holds_for"][plant]
+            cells += [f"**{text}**" if m in holds else text for m, text in texts.items()]
+        reductions.append(_line(*cells))
+    keys = ("section", "what", "paper", "ours")
+    others = [_line(*(row[key] for key in keys)) for row in data["others"]]
+    names = ("reductions of make paper", "numbers of make paper")
+    return dict(zip(names, (reductions, [*_head(*keys), *others]), strict=True))
+
+
+def _head(*heads: str) -> tuple[str, str]:
+    return _line(*heads), f"|{'---|' * len(heads)}"
+
+
+def _line(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def _reductions(rows: list[dict[str, Any]]) -> Table:

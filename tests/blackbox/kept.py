@@ -9,7 +9,7 @@ from canshaper.blackbox.file import Box, chunks, read_box
 from canshaper.blackbox.recorder import Recorder
 from canshaper.blackbox.write import header_of
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.deployment import Deployment
 
 
@@ -24,13 +24,13 @@ class Kept(keeper.BlackBox):
         self._fresh = b""
 
     def around(
-        self, guarded: Guarded, controller: Controller, kind: type[Recorder] = Recorder
+        self, gated: GatedController, controller: Controller, kind: type[Recorder] = Recorder
     ) -> Recorder:
         deployment = controller.deployment
         if self._deployment and self._deployment.identity != deployment.identity:
             self._keep()
         self._fresh = pickle.dumps(deployment)
-        return super().around(guarded, controller, kind)
+        return super().around(gated, controller, kind)
 
     def close(self) -> None:
         self._keep()

@@ -13,7 +13,7 @@ from canshaper.blackbox.ring import RECORD, Kind, records
 from canshaper.blackbox.state import States
 from canshaper.cli.app import app
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
@@ -112,7 +112,7 @@ class Hostile:
 def test_a_state_can_call_nothing_of_its_own(tmp_path: Path) -> None:
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     controller = Controller(deployment)
-    states = States(Guarded(controller), controller)
+    states = States(GatedController(controller), controller)
     good = states.save()
     assert type(states.load(good)[1]) is Controller
     for bad in (

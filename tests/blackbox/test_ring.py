@@ -8,7 +8,7 @@ import pytest
 from canshaper.blackbox import keeper, ring
 from canshaper.blackbox.ring import BLOCK, RECORD, Kind, Ring, records
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench
 
@@ -88,7 +88,7 @@ def test_a_short_tick_keeps_a_state_only_while_nothing_moves(
     deployment = replace(deployment, config=config)
     black_box = keeper.BlackBox(None)
     controller = Controller(deployment)
-    black_box.around(Guarded(controller), controller)
+    black_box.around(GatedController(controller), controller)
     black_box.begin(0)
     for tick in range(1, 500):
         black_box.after_tick(tick * 20_000_000, (), neutral=False)

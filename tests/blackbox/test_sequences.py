@@ -12,13 +12,13 @@ import pytest
 from canshaper.blackbox import keeper, state
 from canshaper.blackbox.ring import records
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon import daemon
 from canshaper.machine.binding import load_deployment
 from canshaper.recording import play
 from tests.blackbox.kept import Kept, unpacked
 from tests.faults import variants
-from tests.faults.guarded import Unrefused
+from tests.faults.gated import Unrefused
 from tests.faults.sequence import Sequence
 from tests.faults.shipped import CONFIG, NAMES
 
@@ -85,7 +85,7 @@ def test_no_attribute_of_a_state_is_left_out(name: str) -> None:
     """They are found in the code of the classes; here in what the objects have."""
     controller = Controller(variants.machine(name)[1])
     seen: dict[int, object] = {}
-    held(Guarded(controller), seen)
+    held(GatedController(controller), seen)
     looked_at = Counter[str]()
     for one in seen.values():
         kind = type(one)
@@ -100,7 +100,7 @@ def test_no_attribute_of_a_state_is_left_out(name: str) -> None:
 def test_no_function_of_a_state_holds_on_to_another_controller(name: str) -> None:
     """Functions are kept by number: such a one would ask the parts of the controller before."""
     seen: dict[int, object] = {}
-    held(Guarded(Controller(load_deployment(CONFIG / f"{name}.yaml"))), seen)
+    held(GatedController(Controller(load_deployment(CONFIG / f"{name}.yaml"))), seen)
     assert not [one for one in seen.values() if getattr(one, "__closure__", None)]
 
 

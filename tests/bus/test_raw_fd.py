@@ -9,7 +9,7 @@ import can
 import pytest
 from can.interfaces.socketcan.socketcan import build_can_frame, dissect_can_frame
 
-from canshaper.bus.packet import FDF, Packet
+from canshaper.bus.packet import FDF, pack, unpack
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, UNKNOWN, Line, message
 
@@ -123,8 +123,8 @@ def test_frames_that_come_back_are_confirmed(line: Line) -> None:
 @pytest.mark.parametrize("frame", [message(0x110, b"\1\2"), fd_message(0x7FF, bytes(64))])
 def test_a_packet_is_the_structure_of_the_kernel(frame: can.Message) -> None:
     packed = build_can_frame(frame)
-    packet = Packet.unpack(packed)
-    assert (packet.word, packet.data) == (frame.arbitration_id, bytes(frame.data))
-    assert packet.flags == (packed[5] if frame.is_fd else None)
-    again = packet.pack()
+    packet = unpack(packed)
+    flags = packed[5] if frame.is_fd else None
+    assert packet == (frame.arbitration_id, bytes(frame.data), flags)
+    again = pack(*packet)
     assert (again[:6], again[8:]) == (packed[:6], packed[8:])  # between them the DLC once more

@@ -11,13 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from canshaper.campaign.run import Source, run_campaign
 from canshaper.campaign.store import Store
-from canshaper.cli.app import app
 from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
+from tests.cli.invocation import invoke
 from tests.rigs.files import ROOT
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'canshaper[cluster]'")
@@ -42,15 +41,8 @@ class Nodes:
 
     def worker(self, cwd: Path = ROOT) -> subprocess.Popen[bytes]:
         name = f"worker{len(self.running)}"
-        arguments = (
-            self.address,
-            "--local-directory",
-            str(self._folder),
-            "--nthreads",
-            "1",
-            "--no-nanny",
-        )
-        log = self._start(name, "distributed.cli.dask_worker", *arguments, cwd=cwd)
+        arguments = self.address, "--local-directory", str(self._folder), "--nthreads", "1"
+        log = self._start(name, "distributed.cli.dask_worker", *arguments, "--no-nanny", cwd=cwd)
         self._wait(log, "(Starting established connection)")
         return self.running[-1]
 
@@ -142,7 +134,7 @@ def test_only_workers_of_another_version_end_the_campaign(nodes: Nodes, tmp_path
     copy = another_version(tmp_path / "other")
     nodes.worker(cwd=copy)
     arguments = ["campaign", str(ROBUST), "-n", "16", "--scheduler", nodes.address]
-    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
+    done = invoke(*arguments, "--out", tmp_path / "out")
     assert done.exit_code == 2
     assert "every worker has another version than this program" in done.output
 
@@ -153,7 +145,7 @@ def test_a_scheduler_that_is_not_there_is_reported_in_one_line(
     monkeypatch.setattr("canshaper.campaign.engine.CONNECT_S", 0.5)
     arguments = ["campaign", str(ROBUST), "-n", "16", "--scheduler", "tcp://127.0.0.1:9"]
     arguments += ["--engine", "python"]  # said by name, or a machine without a compiler says so
-    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
+    done = invoke(*arguments, "--out", tmp_path / "out")
     assert done.exit_code == 2
     assert done.output.startswith("tcp://127.0.0.1:9: no scheduler answers: ")
     assert len(done.output.splitlines()) == 1
@@ -170,6 +162,6 @@ def test_an_address_that_is_none_is_reported_before_anything_connects(
 
     monkeypatch.setattr("distributed.Client", connects)
     arguments = ["campaign", str(ROBUST), "-n", "16", "--scheduler", address]
-    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
+    done = invoke(*arguments, "--out", tmp_path / "out")
     expected = f"{address}: expected the address of a scheduler, such as tcp://10.0.0.1:8786\n"
     assert (done.exit_code, done.output) == (2, expected)

@@ -19,6 +19,7 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import dwell_s
 from tests.faults.shipped import NAMES
 from tests.rigs.files import CONFIG, text_of
+from tests.rigs.swing import crane_of
 
 ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
 SENSOR = load_deployment(CONFIG / "forwarder-sensor.yaml")
@@ -128,8 +129,7 @@ def test_any_shipped_deployment_can_be_driven(name: str) -> None:
 def test_what_is_measured_on_the_fly_is_what_the_recorded_drive_shows(seed: int) -> None:
     setting = draw_drive(ROBUST, seed, RANGES)
     recording = drive(ROBUST, setting.script, **setting.options)
-    assert recording.crane is not None
-    recorded = crane_metrics(recording, recording.crane)
+    recorded = crane_metrics(recording, crane_of(recording))
     row = measured_drive(ROBUST, seed, RANGES)
     # The frames have steps of 0.01 deg, 1 mm, and a hundredth of the speed where it stands.
     assert row["residual_deg"] == pytest.approx(recorded.residual_deg, abs=0.02)
@@ -150,15 +150,15 @@ def test_a_frame_that_the_gate_refuses_is_a_broken_promise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert measured_drive(ROBUST, 2, RANGES)["broken"] == 0
-    act = ShapedAxis.act
+    command = ShapedAxis.command
 
     def runs_on(self: ShapedAxis, *arguments: object, **named: object) -> object:
-        transition = act(self, *arguments, **named)  # type: ignore[arg-type]
-        if self.raw and abs(self.raw) < 60:  # a little faster than anybody asked
-            self.output.steps += 3 if self.raw > 0 else -3
+        transition = command(self, *arguments, **named)  # type: ignore[arg-type]
+        if self.output.steps and abs(self.output.steps) < 60:  # a little faster than anybody asked
+            self.output.steps += 3 if self.output.steps > 0 else -3
         return transition
 
-    monkeypatch.setattr(ShapedAxis, "act", runs_on)
+    monkeypatch.setattr(ShapedAxis, "command", runs_on)
     row = measured_drive(ROBUST, 2, RANGES)
     assert row["broken"] > 0
     assert "output=refused" in row["why"]
@@ -171,7 +171,9 @@ def test_late_lost_and_garbled_frames_reach_the_controller_as_such() -> None:
         setting = draw_drive(ROBUST, seed, RANGES)
         if setting.fault and setting.fault not in kinds:
             simulation = Simulation(ROBUST, setting.script, **setting.options)
-            states = {runner.axis.state for _ in simulation.ticks() for runner in _axes(simulation)}
+            states = {
+                control.axis.state for _ in simulation.ticks() for control in _axes(simulation)
+            }
             kinds[setting.fault] = len(states)
     assert {*kinds} == {f"joystick {one}" for one in ("lost", "late", "garbled", "silent")}
     assert max(kinds.values()) > 2  # some stop
@@ -244,9 +246,9 @@ def test_each_sound_drive_is_driven_with_anti_sway_off_too() -> None:
     setting = draw_drive(ROBUST, 3, RANGES)
     row = measured_drive(ROBUST, 3, RANGES)
     assert not setting.fault
-    crane = drive(ROBUST, setting.script, **{**setting.options, "bypass": True})
-    assert crane.crane is not None
-    assert row["raw_deg"] == pytest.approx(crane_metrics(crane, crane.crane).residual_deg, rel=0.02)
+    raw = drive(ROBUST, setting.script, **{**setting.options, "bypass": True})
+    left = crane_metrics(raw, crane_of(raw)).residual_deg
+    assert row["raw_deg"] == pytest.approx(left, rel=0.02)
 
 
 def test_a_drive_that_swings_over_ends_there_and_counts_with_what_it_has_swung(

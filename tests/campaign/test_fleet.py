@@ -5,13 +5,25 @@ from typing import Any
 
 import pytest
 
-from canshaper.campaign import fleet, fleet_filters, fleet_report
-from canshaper.campaign.fleet import BOX, FILE, FLEET, OTHER, Driven, design_fleet
-from canshaper.campaign.fleet_filters import GFF, ROBUST, Candidate, FleetFilter, fitted, swinging
+from canshaper.campaign import fleet, fleet_candidates
+from canshaper.campaign.fleet import design_fleet
+from canshaper.campaign.fleet_candidates import (
+    BOX,
+    FILE,
+    FLEET,
+    GFF,
+    OTHER,
+    ROBUST,
+    Candidate,
+    Driven,
+    FleetFilter,
+    fitted,
+    swinging,
+)
 from canshaper.campaign.measure import measured_drive
 from canshaper.campaign.run import Source
 from canshaper.cli.verbs import compare
-from canshaper.commissioning.filter_file import filter_changes
+from canshaper.commissioning.origins import filter_changes
 from canshaper.commissioning.robust import design_robust
 from canshaper.design.comparison.manoeuvres import with_candidate
 from canshaper.design.parallel import Processes
@@ -48,7 +60,8 @@ def test_a_candidate_is_measured_as_a_campaign_measures_it() -> None:
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """The worst twentieth is one drive of them."""
     monkeypatch.setattr(fleet, "CHOOSING", SEEDS)
-    monkeypatch.setattr(fleet, "JUDGING", range(2_000_000, 2_000_012))
+    for module in (fleet, fleet_candidates):
+        monkeypatch.setattr(module, "JUDGING", range(2_000_000, 2_000_012))
     monkeypatch.setattr(fleet, "_MIDDLES", (0.3,))
     monkeypatch.setattr(fleet, "_RANGES", {ROBUST: (0.1, 0.6), GFF: (0.2,)})
 
@@ -60,7 +73,7 @@ def designs(monkeypatch: pytest.MonkeyPatch) -> list[Candidate]:
 
     def designed(deployment: Deployment, name: str, candidate: Candidate) -> FleetFilter:
         made.append(candidate)
-        return fleet_filters.designed(deployment, name, candidate)
+        return fleet_candidates.designed(deployment, name, candidate)
 
     monkeypatch.setattr(fleet, "designed", designed)
     return made
@@ -104,17 +117,16 @@ def test_gff_keeps_the_run_on_and_stands_next_to_robust_shapers(
 ) -> None:
     """What no poles keep is left out; what is written is what was judged, tail included."""
     monkeypatch.setattr(fleet, "_DURATIONS", (0.8, 1.0))
-    monkeypatch.setattr(fleet_report, "JUDGING", fleet.JUDGING)
     path = machine_file(tmp_path, WITH_GFF)
     deployment = load_deployment(path)
     asked, rows = design_fleet(deployment, GFF, 2.3, Processes(1), lambda _, __=None: None)
     assert [len(own) for own in rows.values()] == [1, 1, 1, 1]  # none settles in 1.84 s
     assert asked.worst_deg == judged(deployment, asked.candidate)
-    fleet_report.write_fleet(deployment, asked.filters, "tune")
+    fleet_candidates.write_fleet(deployment, asked.filters, "tune")
     assert judged(load_deployment(path), None) == asked.worst_deg
     of = load_deployment(path).axes["slew"].config.filter.design()
     assert of and of.objective and of.objective.max_run_on_s == 2.3 and of.objective.third_pole
-    said = fleet_report.verdict(asked, rows)
+    said = fleet_candidates.verdict(asked, rows)
     robust_deg = rows[OTHER][0].worst_deg
     assert f"with robust shapers for the fleet {robust_deg:.1f}" in said
     assert ("buys nothing" in said) == (robust_deg <= asked.worst_deg)
@@ -193,7 +205,7 @@ def test_all_axes_are_written_or_none(tmp_path: Path, monkeypatch: pytest.Monkey
         return changes(deployment, axis, *given, **own)
 
     with monkeypatch.context() as planted:
-        planted.setattr(fleet_report, "filter_changes", fails)
+        planted.setattr(fleet_candidates, "filter_changes", fails)
         assert invoke("robust", str(path), "--fleet", "--write").exit_code == 2
     assert path.read_text(encoding="utf-8") == before
     picture = tmp_path / "front.svg"

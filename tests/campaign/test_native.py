@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from canshaper.campaign import measure, run
 from canshaper.campaign.draw import draw_drive
@@ -13,13 +12,13 @@ from canshaper.campaign.measure import Row, measured_drive
 from canshaper.campaign.native import SOURCES, NativeCrane
 from canshaper.campaign.run import Source, drive_all, run_campaign
 from canshaper.campaign.store import Store
-from canshaper.cli.app import app
 from canshaper.config.desk import Uncertainty
 from canshaper.design.parallel import Processes
 from canshaper.errors import CampaignError, ConfigError, NativeError
 from canshaper.machine.binding import load_deployment
 from canshaper.native.library import FMU_FILES
 from canshaper_sim.strokes import Script
+from tests.cli.invocation import invoke
 from tests.native.judge import needs_compiler
 from tests.rigs.files import CONFIG, machine_file
 
@@ -146,7 +145,7 @@ def test_native_without_a_compiler_is_refused_in_one_line(
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     arguments = ["campaign", str(ROBUST.path), "--engine", "native", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, arguments)
+    done = invoke(*arguments)
     assert done.exit_code == 2
     text = "expected a C compiler (cc, gcc, clang, or CC), got none; apt-get install gcc"
     assert done.output.splitlines() == [text]

@@ -12,20 +12,21 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from canshaper.campaign.engine import Slurm
 from canshaper.campaign.run import Source, run_campaign
 from canshaper.campaign.store import Store
-from canshaper.cli.app import app
 from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
+from tests.cli.invocation import invoke
 
 if find_spec("dask_jobqueue") is None:
     pytest.skip("not installed: pip install 'canshaper[cluster]'", allow_module_level=True)
 
 ROBUST = Path(__file__).resolve().parents[2] / "config" / "forwarder-robust.yaml"
 LIMIT_S = 30.0
+ON_SLURM = "campaign", ROBUST, "--cluster", "slurm"
+TWO_JOBS = *ON_SLURM, "-n", "16", "--processes", "2"
 CONFIG = """\
 ClusterName=one
 SlurmctldHost={host}(127.0.0.1)
@@ -126,8 +127,7 @@ def test_what_slurm_refuses_ends_the_campaign_in_one_line(monkeypatch: pytest.Mo
     import dask
 
     with dask.config.set({"jobqueue.slurm.queue": "night"}):
-        arguments = ["campaign", str(ROBUST), "-n", "16", "--cluster", "slurm", "--processes", "2"]
-        done = CliRunner().invoke(app, arguments)
+        done = invoke(*TWO_JOBS)
     assert done.exit_code == 2
     assert done.output.startswith("slurm: sbatch: error: invalid partition specified: night")
     assert says("squeue", "--noheader") == ""
@@ -141,8 +141,7 @@ def test_a_machine_without_slurm_is_reported_in_one_line(
     for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:
         monkeypatch.delitem(sys.modules, name)
     ctrl_c = signal.getsignal(signal.SIGINT)
-    arguments = ["campaign", str(ROBUST), "-n", "16", "--cluster", "slurm", "--processes", "2"]
-    done = CliRunner().invoke(app, arguments)
+    done = invoke(*TWO_JOBS)
     assert done.exit_code == 2
     engine, slurm = done.output.splitlines()
     assert engine == "engine: python, for want of a C compiler"
@@ -154,7 +153,6 @@ def test_a_machine_without_slurm_is_reported_in_one_line(
 def test_jobs_want_a_number_and_have_a_scheduler_of_their_own(
     tmp_path: Path, more: list[str]
 ) -> None:
-    arguments = ["campaign", str(ROBUST), "--cluster", "slurm", "--out", str(tmp_path), *more]
-    done = CliRunner().invoke(app, arguments)
+    done = invoke(*ON_SLURM, "--out", tmp_path, *more)
     expected = "--cluster: expected --processes, its jobs, and no --scheduler\n"
     assert (done.exit_code, done.output) == (2, expected)

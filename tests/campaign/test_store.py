@@ -17,10 +17,15 @@ def row(seed: int, **values: Any) -> dict[str, Any]:
     return {"seed": seed, "operator": "taps", "residual_deg": 0.5 * seed, "broken": 0, **values}
 
 
-def test_rows_are_read_again_in_the_order_of_their_seeds(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a", ABOUT)
-    store.add([row(3), row(1)])
+def kept(folder: Path, *rows: dict[str, Any]) -> Store:
+    store = Store(folder, ABOUT)
+    store.add(rows)
     store.flush()
+    return store
+
+
+def test_rows_are_read_again_in_the_order_of_their_seeds(tmp_path: Path) -> None:
+    store = kept(tmp_path / "a", row(3), row(1))
     store.add([row(2)])
     store.flush()
     again = Store(tmp_path / "a", ABOUT)
@@ -32,12 +37,8 @@ def test_rows_are_read_again_in_the_order_of_their_seeds(tmp_path: Path) -> None
 
 
 def test_a_drive_is_kept_once(tmp_path: Path) -> None:
-    store = Store(tmp_path, ABOUT)
-    store.add([row(1), row(1)])
-    store.flush()
-    again = Store(tmp_path, ABOUT)
-    again.add([row(1), row(2)])
-    again.flush()
+    kept(tmp_path, row(1), row(1))
+    again = kept(tmp_path, row(1), row(2))
     assert again.columns(["seed"]) == {"seed": [1, 2]}
 
 
@@ -77,27 +78,16 @@ def test_a_measure_that_no_drive_has_yet_fits_to_those_that_have_it(tmp_path: Pa
     assert store.columns()["residual_deg"] == [None, 0.5]
 
 
-def test_another_program_reads_the_folder(tmp_path: Path) -> None:
-    store = Store(tmp_path, ABOUT)
-    store.add([row(1), row(2)])
-    store.flush()
-    assert pq.read_table(tmp_path).num_rows == 2
-
-
 def test_shares_are_merged_and_what_both_have_counts_once(tmp_path: Path) -> None:
     for name, seeds in (("a", (0, 2, 4)), ("b", (1, 3, 4))):
-        share = Store(tmp_path / name, ABOUT)
-        share.add([row(seed) for seed in seeds])
-        share.flush()
+        kept(tmp_path / name, *map(row, seeds))
     whole = Store(tmp_path / "whole", ABOUT)
     assert [whole.merge(tmp_path / name) for name in ("a", "b", "a")] == [3, 2, 0]
     assert whole.columns(["seed"]) == {"seed": [0, 1, 2, 3, 4]}
 
 
 def test_drives_of_another_file_are_refused(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a", ABOUT)
-    store.add([row(1)])
-    store.flush()
+    kept(tmp_path / "a", row(1))
     changed = ABOUT | {"file": "machine.yaml sha256:9"}
     text = "expected drives of file machine.yaml sha256:9, got machine.yaml sha256:1; choose"
     with pytest.raises(CampaignError, match=text):
@@ -112,9 +102,7 @@ def test_a_folder_without_drives_cannot_be_merged(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_cut_off_is_reported(tmp_path: Path) -> None:
-    store = Store(tmp_path, ABOUT)
-    store.add([row(1)])
-    store.flush()
+    kept(tmp_path, row(1))
     path = parts(tmp_path)[0]
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.raises(CampaignError, match=f"{path.name}: "):
@@ -124,9 +112,7 @@ def test_a_file_that_is_cut_off_is_reported(tmp_path: Path) -> None:
 def test_a_disk_that_is_full_leaves_what_was_written_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = Store(tmp_path, ABOUT)
-    store.add([row(1)])
-    store.flush()
+    store = kept(tmp_path, row(1))
 
     def full(_table: object, path: Path) -> None:
         path.write_bytes(b"PAR1 half of")

@@ -5,19 +5,20 @@ The crane of ``pendulum.c`` shares no code with ours. Driving needs fmpy: ``make
 
 import subprocess
 import zipfile
+from functools import partial
 from math import hypot
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner, Result
 
-from canshaper.cli.app import app, main
+from canshaper.cli.app import main
 from canshaper.design.lockstep import Simulation
 from canshaper.errors import DesignError, DriveError
 from canshaper_sim.operator import script_for
 from canshaper_sim.strokes import Script
 from tests.campaign.test_cli import rows
+from tests.cli.invocation import invoke
 from tests.native.judge import needs_compiler
 from tests.rigs.files import CONFIG, read
 
@@ -66,8 +67,7 @@ def unit(
     return path
 
 
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, arguments)], env={"COLUMNS": "120"})
+called = partial(invoke, columns=120)
 
 
 @pytest.fixture
@@ -103,13 +103,13 @@ def test_another_crane_swings_by_itself_and_the_controller_calms_it(tmp_path: Pa
 @pytest.mark.usefixtures("fmpy")
 def test_demo_and_campaign(tmp_path: Path) -> None:
     path = unit(tmp_path)
-    done = invoke("demo", "--plant", path, "--out", tmp_path / "demo")
+    done = called("demo", "--plant", path, "--out", tmp_path / "demo")
     assert done.exit_code == 0 and "lock-step, no bus" in done.output, done.output
-    done = invoke("demo", "--plant", path, "--seed", 3, "--out", tmp_path / "demo")
+    done = called("demo", "--plant", path, "--seed", 3, "--out", tmp_path / "demo")
     assert done.exit_code == 0, done.output
     out = tmp_path / "campaign"
     options = ("-n", 4, "--plant", path, "--out", out)
-    done = invoke("campaign", *options)
+    done = called("campaign", *options)
     assert done.exit_code == 0, done.output
     assert f"engine: python, in one process: the crane is {path}" in done.output
     kept = rows(out)
@@ -117,7 +117,7 @@ def test_demo_and_campaign(tmp_path: Path) -> None:
     assert "length_pct" not in kept[0]  # drawn of a crane that does not drive
     assert all(0.0 < row["residual_deg"] < row["peak_deg"] for row in kept)
     path.write_bytes(path.read_bytes() + b" ")
-    assert invoke("campaign", *options, "--resume").exit_code == 2  # it is another crane
+    assert called("campaign", *options, "--resume").exit_code == 2  # it is another crane
 
 
 @foreign
@@ -159,7 +159,7 @@ def test_other_faults_of_a_unit(tmp_path: Path) -> None:
     "options", [("--processes", "2"), ("--engine", "native"), ("--scheduler", "tcp://10.0.0.1:1")]
 )
 def test_a_campaign_of_a_unit_has_one_process(options: tuple[str, ...], tmp_path: Path) -> None:
-    done = invoke("campaign", "--plant", "crane.fmu", "--out", tmp_path, *options)
+    done = called("campaign", "--plant", "crane.fmu", "--out", tmp_path, *options)
     assert done.exit_code == 2 and "--plant: expected one process of Python" in done.output
 
 

@@ -16,6 +16,7 @@ from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.recorder import Recorder
 from tests.campaign.work import known, source, works
 from tests.rigs.files import CONFIG
+from tests.rigs.swing import crane_of
 
 
 def test_places_are_those_of_the_seed_and_within_reach() -> None:
@@ -75,10 +76,9 @@ def test_a_tip_that_passes_the_target_is_not_there() -> None:
     (move,) = do_work(source(), work, recorder.receive, moves=1)
     slew, radius_m = places(CraneParameters(), work.seed)[1]
     target = radius_m * math.cos(slew), radius_m * math.sin(slew)
-    recording = recorder.recording()
-    assert recording.crane
     end = round((1.5 + move.seconds) / 0.02)
-    inside = [math.dist(tip, target) < 0.21 for tip in recording.crane.tip_m[:end]]
+    tips = crane_of(recorder.recording()).tip_m[:end]
+    inside = [math.dist(tip, target) < 0.21 for tip in tips]
     assert all(inside[-15:])
     assert any(inside[:-25])
     assert not all(inside[-25:])
@@ -88,10 +88,9 @@ def test_between_two_moves_the_joysticks_are_neutral_and_the_swing_is_damped_out
     recorder, work = Recorder(source().load()), works(bypass=True, within=(0.8, math.inf))
     first, _ = do_work(source(), work, recorder.receive, moves=2)
     recording = recorder.recording()
-    assert recording.crane
-    end = round((1.5 + first.seconds) / 0.02)
-    assert max(recording.crane.sway_deg[end - 60 : end]) > 8.0
-    assert max(recording.crane.sway_deg[end + 65 : end + 75]) < 5.0
+    end, sway_deg = round((1.5 + first.seconds) / 0.02), crane_of(recording).sway_deg
+    assert max(sway_deg[end - 60 : end]) > 8.0
+    assert max(sway_deg[end + 65 : end + 75]) < 5.0
     for axis in AXES:
         assert recording.axes[axis].joystick[end + 2 : end + 74] == [0.0] * 72
 

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner, Result
 
 from canshaper.campaign import work_results
 from canshaper.campaign.work import AXES, LOADS, Move, SetUp, Work, do_work
@@ -23,9 +23,9 @@ from canshaper.campaign.work_results import (
     practised,
     table,
 )
-from canshaper.cli.app import app
 from canshaper_sim.operator_model import Operators
 from tests.campaign.work import ROBUST, WITHIN, known, source, works
+from tests.cli.invocation import invoke
 from tests.rigs.files import CONFIG
 
 
@@ -193,8 +193,7 @@ def test_all_work_is_in_its_order_whoever_is_ready_first() -> None:
     assert shown == pytest.approx([1 / 3, 2 / 3, 1.0])
 
 
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(app, ["work", *arguments], env={"COLUMNS": "200"})
+run = partial(invoke, "work", columns=200)
 
 
 @pytest.mark.parametrize(

@@ -12,5 +12,7 @@ SHIPPED = ROOT / "config" / "forwarder.yaml"
 VERBS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 
 
-def invoke(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(one) for one in arguments], prog_name="canshaper")
+def invoke(*arguments: object, columns: int | None = None) -> Any:
+    """Call it; ``columns``: width of the terminal."""
+    words, env = [str(one) for one in arguments], {"COLUMNS": str(columns)} if columns else None
+    return CliRunner().invoke(app, words, prog_name="canshaper", env=env)

@@ -14,7 +14,7 @@ from canshaper.cli.app import app
 from canshaper.commissioning.procedure.files import Files
 from canshaper.commissioning.procedure.rehearsed import kept
 from canshaper.commissioning.procedure.state import State
-from canshaper.commissioning.procedure.steps.report import document
+from canshaper.commissioning.procedure.steps.check import document
 from canshaper.daemon.control_server import ControlServer
 from canshaper.machine.binding import load_deployment
 from tests.faults.rehearsed import slow_file

@@ -69,13 +69,13 @@ from pathlib import Path
 import canshaper.daemon.daemon
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.reloads import Reloads
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
 deployment = load_deployment(Path({str(ROOT / "config")!r}) / "{name}.yaml")
 controller, hand = Controller(deployment), Hand(deployment)
-guarded, reloads = Guarded(controller), Reloads(lambda: deployment, print)
+gated, reloads = GatedController(controller), Reloads(lambda: deployment, print)
 before, moved, sent = {{*sys.modules}}, False, []
 for i in range(200):
     now_ns = i * deployment.config.tick_ms * 1_000_000
@@ -85,16 +85,16 @@ for i in range(200):
     if i > 100:
         frames = [Frame(*frame[:3], frame.data[:-1]) for frame in frames]
     for frame in (*frames, *(sent if i == 95 else ())):
-        guarded.receive(frame, now_ns)
+        gated.receive(frame, now_ns)
     if i == 90:
-        guarded.stalled()
-    sent = [*guarded.tick(now_ns, 3 if i == 80 else 0)]
+        gated.stalled()
+    sent = [*gated.tick(now_ns, 3 if i == 80 else 0)]
     moved |= not controller.neutral
     if not controller.neutral:
         reloads.request()
         reloads.step(neutral=False)
     [event.text for event in controller.events]
-guarded.neutral_frames()
+gated.neutral_frames()
 print(moved, sorted({{*sys.modules}} - before))
 """
     assert python(code) == "True []"

@@ -20,10 +20,10 @@ def test_the_distance_is_what_the_axis_travels(changed_rig: Make) -> None:
     rig = changed_rig().moving()
     rig.run(250, Slew=1000)
     axis = rig.controller.axes["slew"].axis
-    way_s = axis.sent * 0.02
+    way_s = axis.output.setpoint * 0.02
     for _ in range(150):
         rig.run(1)
-        way_s += axis.sent * 0.02
+        way_s += axis.output.setpoint * 0.02
     slew = next(one for one in stopping(rig.deployment) if one.name == "slew")
     assert slew.travel.release == pytest.approx(way_s, abs=1e-3)
     assert slew.cell(slew.travel.release) == f"{4.8 * way_s:.2f} m  {way_s * 28.648:.0f} deg"
@@ -36,7 +36,7 @@ def test_a_lost_joystick_is_counted_from_its_last_frame(changed_rig: Make) -> No
     way_s = 0.0
     for _ in range(150):
         rig.tick()
-        way_s += axis.sent * 0.02
+        way_s += axis.output.setpoint * 0.02
     slew = next(one for one in stopping(rig.deployment) if one.name == "slew")
     assert way_s <= slew.travel.lost + 1e-9
     assert slew.travel.lost == pytest.approx(way_s, abs=0.021)  # of the last tick before silence

@@ -14,7 +14,7 @@ import mujoco
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.strokes import Script
@@ -197,7 +197,7 @@ def drive(
     """
     crane = crane or TwinCrane()
     twin, controller = Twin(crane), Controller(deployment)
-    guarded, hand = Guarded(controller), JoystickNode(deployment, script, bypass=bypass)
+    gated, hand = GatedController(controller), JoystickNode(deployment, script, bypass=bypass)
     tilt: list[float] = []
     sent: dict[str, list[float]] = {axis: [] for axis in FULL}
     for tick in range(round(script.duration_s * 1000.0 / TICK_MS)):
@@ -212,13 +212,13 @@ def drive(
                 data = round(kg).to_bytes(2, "little") + b"\0"
                 frames.append(Frame("crane", LOAD_ID, False, data))
         for frame in frames:
-            guarded.receive(frame, now_ns)
-        for _, can_id, _, data in guarded.tick(now_ns):
+            gated.receive(frame, now_ns)
+        for _, can_id, _, data in gated.tick(now_ns):
             if axis := VALVES.get(can_id):
                 raw = int.from_bytes(data[:1], "little", signed=True)
                 twin.valves[axis].command = raw / 125.0
         for axis, values in sent.items():
-            values.append(controller.axes[axis].axis.sent)
+            values.append(controller.axes[axis].axis.output.setpoint)
         controller.events.clear()
         tilt.append(twin.step())
     return Driven(tilt, sent)

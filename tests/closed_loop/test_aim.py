@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from canshaper.controller.status import AimPoint
+from canshaper.controller.status_messages import AimPoint
 from canshaper.design.lockstep import Simulation
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import AXES, SCRIPTS, random_script

@@ -25,6 +25,7 @@ from tests.closed_loop.test_motion import tilt_deg
 from tests.closed_loop.test_pump import shipped
 from tests.closed_loop.test_twin import OPERATORS
 from tests.rigs.files import text_of
+from tests.rigs.swing import crane_of
 
 RADII_M = [round(5.1 + 0.2 * i, 1) for i in range(11)]
 PULSE = Script("pulse", (Stroke("near_far", 0.5, 3.0, 1.0, 0.1),), 9.5)
@@ -103,9 +104,7 @@ def test_the_ends_of_slew(tmp_path: Path) -> None:
     mean, worst = left_deg(deployment, strokes)
     assert mean <= 0.15  # far from its ends: 0.05 to 0.15
     assert worst <= 0.2
-    crane = drive(deployment, strokes[2][0]).crane
-    assert crane is not None
-    x_m, y_m = crane.tip_m[-1]
+    x_m, y_m = crane_of(drive(deployment, strokes[2][0])).tip_m[-1]
     assert 38.5 < math.degrees(math.atan2(y_m, x_m)) <= 40.0
 
 

@@ -8,9 +8,7 @@ import statistics
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.design.lockstep import Simulation, drive
 from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.binding import load_deployment
@@ -20,8 +18,10 @@ from canshaper.report.stroke_metrics import crane_metrics
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
+from tests.cli.invocation import invoke
 from tests.closed_loop.test_twin import TIMINGS
 from tests.rigs.files import machine_file
+from tests.rigs.swing import crane_of
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n    limits: {"
@@ -142,8 +142,7 @@ def test_filters_are_compared_with_the_motion_on_both_or_off_both(name: str, mot
     if not motion:
         deployment = dataclasses.replace(deployment, motions={})
     recording = drive(deployment, SCRIPTS["demo"])
-    assert recording.crane is not None
-    crane = crane_metrics(recording, recording.crane)
+    crane = crane_metrics(recording, crane_of(recording))
     dips = [axis_metrics(recording, axis).dip or 0.0 for axis in ("slew", "near_far")]
     left, run_on_m, dip = ALIKE[name, motion]
     assert crane.residual_deg == pytest.approx(left, abs=0.05)
@@ -187,7 +186,7 @@ def test_near_far_is_moved_no_farther_than_check_says(
     """The bound is small here, so that it holds the tip back all the time."""
     own = "    near_far: near_far\n"
     file = machine_file(tmp_path, name, (own, f"{own}    max_path_m: {path_m}\n"))
-    printed = CliRunner().invoke(app, ["check", str(file)]).stdout
+    printed = invoke("check", file).stdout
     [bound_m] = [float(m) for m in re.findall("by up to .* m/s, (.*?) m in or out", printed)]
     farthest_m = 0.0
     for seed in range(3):
@@ -196,10 +195,11 @@ def test_near_far_is_moved_no_farther_than_check_says(
         way_m, moves = 0.0, []
         for time_ms in simulation.ticks():
             if time_ms > 5500:  # its own stroke is over
-                way_m += near_far.sent * 0.02  # at 1 m/s full speed
+                way_m += near_far.output.setpoint * 0.02  # at 1 m/s full speed
                 farthest_m = max(farthest_m, abs(way_m))
                 moves.append(
-                    near_far.raw or simulation.controller.axes["slew"].axis.output.commanded
+                    near_far.output.steps
+                    or simulation.controller.axes["slew"].axis.output.commanded
                 )
             if not any(moves[-1:]):
                 way_m = 0.0

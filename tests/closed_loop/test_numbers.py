@@ -84,8 +84,8 @@ def test_fast_poles_on_a_slow_valve_need_the_limit_aware_filter(tmp_path: Path) 
     assert residual_left_pct(variant(tmp_path, tuned)) <= 5.0
 
     def ordinary(controller: Controller) -> None:
-        runner = controller.axes["near_far"]
-        axis = runner.axis
+        control = controller.axes["near_far"]
+        axis = control.axis
         assert axis.sway is not None
         peer = OrdinaryGff(axis.sway.mode, *PAPER_SLEW, axis.sway.tick_s)
         axis.retune(axis.sway.mode, lambda _sway: peer)

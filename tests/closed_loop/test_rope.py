@@ -24,6 +24,7 @@ from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
 from tests.rigs.files import CONFIG, read
 from tests.rigs.overhead import FILE, changed
+from tests.rigs.swing import crane_of, last_swing, swing_from
 
 OWN = RopeFilter("the file's", {})
 
@@ -34,9 +35,7 @@ def residual_deg(file: Path, error_pct: float, strokes: Sequence[Stroke], rope_m
     overhead = replace(CraneParameters().overhead, rope_m=rope_m, rope_error_pct=error_pct)
     parameters = CraneParameters(overhead=overhead)
     recording = drive(read(file), Script("one", tuple(strokes), end_s + 4.0), parameters=parameters)
-    assert recording.crane is not None
-    swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
-    return max(deg for time_s, deg in swing if time_s >= end_s)
+    return swing_from(recording, end_s)
 
 
 def test_both_axes_while_the_load_is_hoisted() -> None:
@@ -107,13 +106,9 @@ def test_a_load_under_a_multicopter(script: str) -> None:
     else:
         played = script_for(deployment, script)
         played = replace(played, duration_s=max(s.end_s for s in played.strokes) + 10.0)
-    left = []
-    for bypass in (True, False):
-        recording = drive(deployment, played, bypass=bypass)
-        assert recording.crane is not None
-        left.append(max(recording.crane.sway_deg[-round(4.0 / 0.02) :]))
-    assert left[0] > 4.0
-    assert left[1] < 0.1 * left[0]
+    raw, shaped = (last_swing(drive(deployment, played, bypass=one), 4.0) for one in (True, False))
+    assert raw > 4.0
+    assert shaped < 0.1 * raw
 
 
 def test_what_a_file_says_of_its_crane_is_simulated(tmp_path: Path) -> None:
@@ -155,9 +150,9 @@ def test_axes_may_have_any_name(tmp_path: Path) -> None:
     assert max(recording.axes["long_travel"].speed) == pytest.approx(1.0, abs=0.01)
     assert max(recording.axes["long_travel"].sway_deg or []) > 0.3
     assert recording.axes["main_hoist"].sway_deg is None
-    assert recording.crane is not None
-    assert 2.0 < recording.crane.tip_m[-1][0] < 6.0
-    assert recording.crane.tip_m[-1][1] == 0.0
+    x_m, y_m = crane_of(recording).tip_m[-1]
+    assert 2.0 < x_m < 6.0
+    assert y_m == 0.0
     assert recording.dwell_s == 10.0
 
 

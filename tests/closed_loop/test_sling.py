@@ -10,14 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.strokes import Script, Stroke
+from tests.cli.invocation import invoke
 from tests.rigs.overhead import FILE, changed
 from tests.sim.test_sling import modes
 
@@ -48,9 +47,7 @@ def machine(directory: Path, sling_m: float, ratio: float) -> Path:
 
 
 def robust(file: Path, *words: str) -> tuple[int, str]:
-    done = CliRunner().invoke(
-        app, ["robust", str(file), "--axis", "bridge", "--range", "5", *words]
-    )
+    done = invoke("robust", file, "--axis", "bridge", "--range", "5", *words)
     return done.exit_code, " ".join(done.output.split())
 
 
@@ -116,7 +113,7 @@ def test_identify_finds_both_modes(
     drive(load_deployment(file), script, on_frame=note, bypass=True)
     log.write_text("\n".join(lines) + "\n", encoding="utf-8")
     signal = ("--file", str(file), "--signal", "bridge=LoadSway.SwayBridge")
-    done = CliRunner().invoke(app, ["identify", str(log), *signal, *about, "--out", str(tmp_path)])
+    done = invoke("identify", log, *signal, *about, "--out", tmp_path)
     said = " ".join(done.output.split())
     matches = [re.search(p, said) for p in (r"period_s: ([\d.]+)", r"--second ([\d.]+),")]
     periods_s = [float(one[1]) for one in matches if one]

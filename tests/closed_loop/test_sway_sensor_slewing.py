@@ -18,6 +18,7 @@ from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
 from canshaper_sim.sway_sensor import SwaySensor
 from tests.rigs.files import machine_file
+from tests.rigs.swing import last_swing
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder-sensor.yaml"
 
@@ -37,9 +38,7 @@ def drive_both(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: 
 
 def tilt_deg(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> float:
     """Largest tilt of the grapple in the last three seconds."""
-    recording = drive_both(deployment, strokes, length_pct)
-    assert recording.crane is not None
-    return max(recording.crane.sway_deg[-150:])
+    return last_swing(drive_both(deployment, strokes, length_pct))
 
 
 @pytest.mark.slow
@@ -177,8 +176,6 @@ def test_ten_degrees_along_the_boom_at_the_start_of_a_slew(
     left = []
     for deployment in (load_deployment(FILE), watching(tmp_path)):
         script, swing = Script("slew", strokes, 15.0), Sway(theta6_rad=math.radians(10.0))
-        recording = lock_step(deployment, script, sway=swing)
-        assert recording.crane is not None
-        left.append(max(recording.crane.sway_deg[-150:]))
+        left.append(last_swing(lock_step(deployment, script, sway=swing)))
     print(", ".join(f"{one:.2f}" for one in left))
     assert left[0] < most_deg < left[1]

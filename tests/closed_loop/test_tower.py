@@ -19,6 +19,7 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recording import Recording
 from canshaper_sim.strokes import Script, Stroke
 from tests.rigs.files import CONFIG, machine_file, read
+from tests.rigs.swing import crane_of, swing_from
 
 FILE = CONFIG / "tower-crane.yaml"
 OWN, OFF = RopeFilter("the file's", {}), RopeFilter("off", {}, bypass=True)
@@ -36,9 +37,8 @@ def driven(deployment: Deployment, radius_m: float, rope_m: float = 30.0) -> Rec
 
 def judged_m(recording: Recording, rope_m: float) -> float:
     """How far the load of the straight line is from the trolley at most, from END_S on, m."""
-    assert recording.crane is not None
     omega_2, steps = 9.81 / rope_m, 4
-    path = list(zip(recording.t_s, recording.crane.tip_m, strict=True))
+    path = list(zip(recording.t_s, crane_of(recording).tip_m, strict=True))
     x, v, most = complex(*path[0][1]), 0j, 0.0
     for (before_s, a), (now_s, b) in pairwise(path):
         step_s = (now_s - before_s) / steps
@@ -50,15 +50,9 @@ def judged_m(recording: Recording, rope_m: float) -> float:
     return most
 
 
-def left(recording: Recording) -> float:
-    assert recording.crane is not None
-    swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
-    return max(deg for time_s, deg in swing if time_s >= END_S)
-
-
 def test_slew_and_trolley_are_one_motion_of_the_measured_rope() -> None:
     recording = driven(read(FILE), 40.0)
-    assert left(recording) < 0.05
+    assert swing_from(recording, END_S) < 0.05
     assert math.degrees(judged_m(recording, 30.0) / 30.0) < 0.15
 
 
@@ -68,8 +62,9 @@ def test_without_the_motion_more_is_left() -> None:
     deployment = read(FILE)
     config = deployment.config.model_copy(update={"motion": {}})
     apart = driven(replace(deployment, config=config, motions={}), 40.0)
-    assert left(apart) > 1.0
-    assert math.degrees(judged_m(apart, 30.0) / 30.0) == pytest.approx(left(apart), abs=0.3)
+    left = swing_from(apart, END_S)
+    assert left > 1.0
+    assert math.degrees(judged_m(apart, 30.0) / 30.0) == pytest.approx(left, abs=0.3)
 
 
 @pytest.mark.slow
@@ -95,13 +90,11 @@ def test_with_a_length_signal_that_is_wrong(error_pct: float) -> None:
         axes = read(FILE).by_coordinate
         script = Script("wrong", work.strokes, end_s + 8.0).moving(axes)
         recording = drive(read(FILE), script, parameters=CraneParameters(tower=tower))
-        assert recording.crane is not None
-        swing = zip(recording.t_s, recording.crane.sway_deg, strict=True)
-        assert max(deg for time_s, deg in swing if time_s >= end_s) < 2.0
+        assert swing_from(recording, end_s) < 2.0
 
 
 def test_a_motion_may_have_one_axis_with_a_rope(tmp_path: Path) -> None:
     text = FILE.read_text(encoding="utf-8")
     radius = text[text.index("    radius: {") : text.index("    max_pct: 50")]
     path = machine_file(tmp_path, FILE, ("    near_far: trolley\n", ""), (radius, ""))
-    assert 0.2 < left(driven(load_deployment(path), 40.0)) < 2.5
+    assert 0.2 < swing_from(driven(load_deployment(path), 40.0), END_S) < 2.5

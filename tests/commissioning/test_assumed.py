@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.assumed import confirmed, origins, write_numbers
 from canshaper.commissioning.likely_mistakes import warnings_of
+from canshaper.commissioning.origins import confirmed, origins, write_numbers
 from canshaper.commissioning.procedure.bench import Simulated
 from canshaper.commissioning.procedure.state import Context, Record, State, Status
-from canshaper.commissioning.procedure.steps import check, report
+from canshaper.commissioning.procedure.steps.check import check_file, write_report
 from canshaper.edit.edit import change
 from canshaper.machine.binding import load_deployment
 from tests.controller.adjustable import CONTROL
@@ -61,7 +61,7 @@ def test_a_report_is_fit_to_sign_without_any(
     change(path, confirmed(path, ("axes.lift.speed", *taken)))
     state = State(steps={"drive": Record(Status.DONE)})
     context = Context(load_deployment(path), Simulated(None, []), tmp_path, state)  # type: ignore[arg-type]
-    said = " ".join(str(part["text"]) for part in report.run(context).sheet.parts)
+    said = " ".join(str(part["text"]) for part in write_report(context).sheet.parts)
     assert (", fit to sign" in said) is fit
     assert ("NOT FIT TO SIGN" in said) is not fit
     text = (tmp_path / "report.html").read_text()
@@ -69,7 +69,7 @@ def test_a_report_is_fit_to_sign_without_any(
     assert "<caption>Origins" in text
     skipped = State(steps={"drive": Record(Status.SKIPPED)})
     again = Context(context.deployment, context.bench, tmp_path, skipped)
-    assert "fit to sign" not in str(report.run(again).sheet.parts)
+    assert "fit to sign" not in str(write_report(again).sheet.parts)
 
 
 @pytest.mark.slow
@@ -79,7 +79,7 @@ def test_to_go_on_after_the_check_is_to_allow_the_stop_distance(
     guessed.in_yaml(f"  - {PERIOD}\n", f"  - {PERIOD}\n  - axes.slew.limits.stop_distance_m\n")
     deployment = guessed.load()
     context = Context(deployment, Simulated(None, []), tmp_path, State())  # type: ignore[arg-type]
-    outcome = check.run(context)
+    outcome = check_file(context)
     assert "axes.slew.limits.stop_distance_m" in str(outcome.sheet.parts)
     assert outcome.edit
     outcome.edit(deployment)

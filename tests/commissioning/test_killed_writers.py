@@ -12,10 +12,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.commissioning.assumed import write_numbers
-from canshaper.commissioning.calibration.write import write_curve
-from canshaper.commissioning.filter_file import write_filters
+from canshaper.commissioning.calibration.fit import write_curve
 from canshaper.commissioning.identification.report import write_sway
+from canshaper.commissioning.origins import write_filters, write_numbers
 from canshaper.edit.edit import change, replace_text, written_by
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
@@ -51,7 +50,7 @@ def measured(deployment: Deployment) -> None:
 
 def calibrated(deployment: Deployment) -> None:
     one: Any = Measured()
-    write_curve(deployment, "slew", one, simulated=True)
+    write_curve(deployment, "slew", one, written_by("calibrate", simulated=True))
 
 
 def adjusted(deployment: Deployment) -> None:

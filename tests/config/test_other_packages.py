@@ -53,7 +53,8 @@ class Broken:
 
 WINDOW = Parameter("window_s", 0.1, 10, "s", "time")
 KIND = ShaperKind(
-    "moving_average", "Fails.", lambda tick_s, window_s: Broken(), lambda mode, s: {}, (WINDOW,)
+    "moving_average", "Fails.", lambda tick_s, window_s: Broken(), lambda mode, s: {}, (WINDOW,),
+    runs_ahead=False,
 )
 """
 EVENTS = """

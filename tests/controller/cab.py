@@ -5,7 +5,7 @@ from collections.abc import Callable
 from canshaper.checksums.algorithms import SAE_J1850
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.shaping.states import Reason, State
 from canshaper_sim.hand import Hand, Held
 from tests.rigs.files import Machine
@@ -40,7 +40,7 @@ class Cab:
     def __init__(self, machine: Machine) -> None:
         self.deployment = machine.load()
         self.controller = Controller(self.deployment)
-        self.guarded = Guarded(self.controller)
+        self.gated = GatedController(self.controller)
         self.hand = Hand(self.deployment)
         self.time_ms = 0
         self.sent: dict[int, bytes] = {}
@@ -52,8 +52,8 @@ class Cab:
             self.time_ms += TICK_MS
             for frame in self.hand.frames(self.time_ms, Held({"slew": slew}, enable=enable)):
                 if changed := self.change(frame):
-                    self.guarded.receive(changed, self.time_ms * 1_000_000)
-            for frame in self.guarded.tick(self.time_ms * 1_000_000):
+                    self.gated.receive(changed, self.time_ms * 1_000_000)
+            for frame in self.gated.tick(self.time_ms * 1_000_000):
                 self.sent[frame.can_id] = frame.data
             events = self.controller.events
             self.events += [e.text for e in events]

@@ -34,7 +34,7 @@ def near_far(rig: Rig, ticks: int, **raw: int) -> list[float]:
     sent = []
     for _ in range(ticks):
         rig.run(1, **raw)
-        sent.append(rig.controller.axes["near_far"].axis.sent)
+        sent.append(rig.controller.axes["near_far"].axis.output.setpoint)
     return sent
 
 

@@ -165,7 +165,7 @@ def test_the_new_filter_is_made_as_the_file_makes_it(
         made.append(((kind, tick_s), others))
         return build_shaper(kind, tick_s, sway, **others)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("canshaper.controller.runner.build_shaper", noted)
+    monkeypatch.setattr("canshaper.controller.axis_control.build_shaper", noted)
     rig = make(
         {
             f"{SLEW}\n    {FILTER}": f"{SLEW}\n    filter: {{ kind: {kind} }}\n",
@@ -190,9 +190,9 @@ def test_a_filter_made_for_one_period_is_drawn_out_to_another(make: Make) -> Non
             "    axes.slew.filter.a1: [0.3, 1.0]\n    axes.slew.filter.a2: [0.03, 0.2]\n": "",
         }
     )
-    adjuster, runner = Adjuster(rig.controller), rig.controller.axes["slew"]
+    adjuster, control = Adjuster(rig.controller), rig.controller.axes["slew"]
     adjuster.change({"axes.slew.sway.period_s": 2.9})
-    drawn = runner.bound.config.filter.parameters()["taps"]
+    drawn = control.bound.config.filter.parameters()["taps"]
     half = len(drawn) // 2
     first, second = (
         sum(k * tap for k, tap in part) / 0.5
@@ -201,6 +201,6 @@ def test_a_filter_made_for_one_period_is_drawn_out_to_another(make: Make) -> Non
     assert second - first == pytest.approx(59 * 2.9 / 2.356, abs=0.25)  # ticks
     for period in (1.8, 3.0, 2.0):
         adjuster.change({"axes.slew.sway.period_s": period})
-    assert runner.bound.config.filter.parameters()["taps"] != taps
+    assert control.bound.config.filter.parameters()["taps"] != taps
     adjuster.change({"axes.slew.sway.period_s": 2.356})
-    assert runner.bound.config.filter.parameters()["taps"] == taps
+    assert control.bound.config.filter.parameters()["taps"] == taps

@@ -31,7 +31,7 @@ def test_limits_change_in_neutral_only(make: Make) -> None:
     speeds = []
     for _ in range(300):
         rig.run(Slew=1000)
-        speeds.append(rig.controller.axes["slew"].axis.sent)
+        speeds.append(rig.controller.axes["slew"].axis.output.setpoint)
     assert 0.39 < max(speeds) <= 0.4
     # One full speed a second is 2 % a tick, and one step of the frame.
     assert max(b - a for a, b in pairwise(speeds)) <= 0.02 + 1 / 125
@@ -42,7 +42,7 @@ def test_an_axis_without_sway_has_adjustable_limits(make: Make) -> None:
     Adjuster(rig.controller).change({"axes.lift.limits.max_pct": 30})
     rig.run(3)
     rig.run(50, Lift=1000)
-    assert rig.controller.axes["lift"].axis.sent == pytest.approx(0.3, abs=1 / 125)
+    assert rig.controller.axes["lift"].axis.output.setpoint == pytest.approx(0.3, abs=1 / 125)
 
 
 def test_the_sway_shown_follows_full_speed(make: Make) -> None:

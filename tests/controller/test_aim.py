@@ -38,12 +38,14 @@ def test_it_is_the_way_that_the_axes_then_go(rig: Rig) -> None:
     rig.run(3)
     rig.run(60, Slew=600, NearFar=-800)
     said = aim(rig)
-    lag = {name: 0.1 * runner.axis.sent for name, runner in rig.controller.axes.items()}
+    lag = {
+        name: 0.1 * control.axis.output.setpoint for name, control in rig.controller.axes.items()
+    }
     slew = near_far = 0.0
     for _ in range(150):
         rig.run(1)
-        slew += 0.02 * 28.648 * rig.controller.axes["slew"].axis.sent
-        near_far += 0.02 * rig.controller.axes["near_far"].axis.sent
+        slew += 0.02 * 28.648 * rig.controller.axes["slew"].axis.output.setpoint
+        near_far += 0.02 * rig.controller.axes["near_far"].axis.output.setpoint
     assert said["known"] is True
     assert said["slew"] == pytest.approx(slew + 28.648 * lag["slew"], abs=0.2)
     assert said["radius"] == pytest.approx(near_far + lag["near_far"], abs=0.02)

@@ -50,8 +50,8 @@ def sent(rig: Rig, axis: ShapedAxis) -> tuple[list[float], list[float]]:
         joystick = 1000 if 3 <= tick < 100 else 0
         rig.run(1, Slew=joystick)
         axis.tick(CommandInput(joystick / 1000.0))
-        got.append(rig.controller.axes["slew"].axis.sent)
-        expected.append(axis.sent)
+        got.append(rig.controller.axes["slew"].axis.output.setpoint)
+        expected.append(axis.output.setpoint)
     return got, expected
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.input import Key
 from canshaper.inputs.value import Following
 from canshaper.shaping.states import State
@@ -49,11 +49,11 @@ def test_a_part_is_known_by_what_it_is_on_the_machine(rig: Rig) -> None:
     sent = [512, 513, 514, 784, 785, 768, 769, 770]
     senders = [("sender", *here, can_id, False) for can_id in sent]
     valves = {"slew": 512, "near_far": 513, "lift": 514}
-    runners: dict[Key, AxisControl] = {("axis", name): controller.axes[name] for name in valves}
+    controls: dict[Key, AxisControl] = {("axis", name): controller.axes[name] for name in valves}
     for name, can_id in valves.items():
-        runners["valve", *here, can_id, False, "Velocity"] = controller.axes[name]
-    assert set(parts) == {*inputs, *senders, *runners}
-    assert all(parts[key] is runner for key, runner in runners.items())
+        controls["valve", *here, can_id, False, "Velocity"] = controller.axes[name]
+    assert set(parts) == {*inputs, *senders, *controls}
+    assert all(parts[key] is control for key, control in controls.items())
     for *_, can_id, extended in inputs:
         part = parts["input", *here, can_id, extended]
         assert part is controller.inputs["crane", can_id, extended]

@@ -137,12 +137,12 @@ def test_missed_ticks_are_counted_and_the_model_swings_on(rig: Rig, missed: int)
     rig.moving()
     axis = rig.controller.axes["slew"].axis
     assert axis.sway
-    judge = axis.sway.retuned(axis.sway.mode, axis.sent)
+    judge = axis.sway.retuned(axis.sway.mode, axis.output.setpoint)
     for _ in range(missed):
-        judge.step(axis.sent)
+        judge.step(axis.output.setpoint)
     rig.receive(rig.joystick(Slew=1000))
     rig.tick(missed)
-    judge.step(axis.sent)
+    judge.step(axis.output.setpoint)
     assert swing(rig) == pytest.approx((judge.angle, judge.rate))
     assert rig.count("MissedDeadlines") == missed
 

@@ -97,7 +97,7 @@ def test_a_release_between_two_ticks_counts(switched: Machine) -> None:
     cab.drive(600, 0.8)
     first = bytes((0x04,))
     frame = Frame("crane", 288, False, first + bytes((SAE_J1850.of(first),)))
-    cab.guarded.receive(frame, cab.time_ms * 1_000_000 + 1)
+    cab.gated.receive(frame, cab.time_ms * 1_000_000 + 1)
     cab.drive(TICK_MS, 0.8)
     assert cab.slew == (State.TRIPPED, Reason.ENABLE_LOST)
 
@@ -110,7 +110,7 @@ def test_a_release_that_is_over_by_the_tick_counts(switched: Machine) -> None:
     for step, seated in ((1, 0), (2, 1)):
         first = bytes((last + step & 0xF) << 4 | 0x04 | seated for _ in range(1))
         frame = Frame("crane", 288, False, first + bytes((SAE_J1850.of(first),)))
-        cab.guarded.receive(frame, cab.time_ms * 1_000_000 + step)
+        cab.gated.receive(frame, cab.time_ms * 1_000_000 + step)
     cab.drive(TICK_MS, 0.8)
     assert cab.slew == (State.TRIPPED, Reason.ENABLE_LOST)
 
@@ -147,8 +147,8 @@ def test_the_gate_does_not_need_the_controller_for_it(
 ) -> None:
     """A controller that has forgotten its switches: the gate lets nothing pass."""
     cab = Cab(switched)
-    for runner in cab.controller.axes.values():
-        runner.stops.interlocks.clear()
+    for control in cab.controller.axes.values():
+        control.stops.interlocks.clear()
     cab.drive(200)
     cab.drive(600, 0.8)
     assert cab.moves
@@ -165,8 +165,8 @@ def _drive_without_look(cab: Cab, time_ms: int, slew: float) -> None:
         cab.time_ms += TICK_MS
         for frame in cab.hand.frames(cab.time_ms, Held({"slew": slew}, enable=True)):
             if changed := cab.change(frame):
-                cab.guarded.receive(changed, cab.time_ms * 1_000_000)
-        for frame in cab.guarded.tick(cab.time_ms * 1_000_000):
+                cab.gated.receive(changed, cab.time_ms * 1_000_000)
+        for frame in cab.gated.tick(cab.time_ms * 1_000_000):
             cab.sent[frame.can_id] = frame.data
         cab.events += [event.text for event in cab.controller.events]
         cab.controller.events.clear()

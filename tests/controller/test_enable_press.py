@@ -55,9 +55,9 @@ def test_a_release_that_does_not_count_is_no_press(switched: Machine, enable: st
     last = next(f for f in cab.hand.frames(cab.time_ms, Held(enable=True)) if f.can_id == can_id)
     counted = cab.hand.frames(cab.time_ms + 100, Held(enable=True))
     for frame in (last, *(f for f in counted if f.can_id == can_id)):
-        cab.guarded.receive(frame, cab.time_ms * 1_000_000 + 1)
+        cab.gated.receive(frame, cab.time_ms * 1_000_000 + 1)
     released = seat(0, 1)(last) if can_id == 288 else enable_of(can_id, 0)(last)
-    cab.guarded.receive(released, cab.time_ms * 1_000_000 + 2)  # behind those: a step back
+    cab.gated.receive(released, cab.time_ms * 1_000_000 + 2)  # behind those: a step back
     cab.drive(400)
     assert cab.slew == (State.TRIPPED, Reason.SECOND_SENDER)
     cab.drive(100, enable=False)

@@ -36,7 +36,7 @@ def run(rig: Rig, radius_m: float, ticks: int, **joystick: int) -> None:
 
 
 def demand(rig: Rig, axis: str = "near_far") -> float:
-    return rig.controller.axes[axis].axis.command
+    return rig.controller.axes[axis].axis.demand
 
 
 def news(rig: Rig) -> list[str]:

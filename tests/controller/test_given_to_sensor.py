@@ -6,8 +6,8 @@ from typing import NamedTuple
 import pytest
 
 from canshaper.codec.frame import Frame
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisControl
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -34,9 +34,9 @@ class Given(NamedTuple):
     other: float | None
 
 
-def given(runner: AxisControl) -> list[Given]:
+def given(control: AxisControl) -> list[Given]:
     """Record the values that the sensor of an axis is given from now on."""
-    sensed = runner.axis.sensed
+    sensed = control.axis.sensed
     assert sensed is not None
     measure, seen = sensed.measure, []
 
@@ -99,10 +99,10 @@ def test_by_the_radius_that_is_measured_and_by_the_last_when_that_is_lost() -> N
 
 def test_an_axis_that_nothing_moves_damps_no_swing_of_another() -> None:
     controller = Controller(sensor_machine())
-    runner = controller.axes["near_far"]
-    assert runner.added == 0.0
+    control = controller.axes["near_far"]
+    assert control.added == 0.0
     controller.motions.clear()
-    seen = given(runner)
+    seen = given(control)
     list(controller.tick(0))
     assert [one.damps for one in seen] == [False]
 
@@ -125,16 +125,16 @@ def test_a_sensor_of_another_kind_shows_nothing_of_that(tmp_path: Path) -> None:
 
 def test_and_its_filter_is_carried_out_for_that(monkeypatch: pytest.MonkeyPatch) -> None:
     drive = Slewing().until_it_damps()
-    act, carried = ShapedAxis.act, []
+    command, carried = ShapedAxis.command, []
 
     def spied(
-        axis: ShapedAxis, command: CommandInput, added: float, *, damps: bool = False
+        axis: ShapedAxis, joystick: CommandInput, added: float, *, damps: bool = False
     ) -> object:
         if axis is drive.near_far.axis:
             carried.append(damps)
-        return act(axis, command, added, damps=damps)
+        return command(axis, joystick, added, damps=damps)
 
-    monkeypatch.setattr(ShapedAxis, "act", spied)
+    monkeypatch.setattr(ShapedAxis, "command", spied)
     drive.step()
     assert carried == [True]
 

@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.config.load import load_config
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
 from tests.rigs.files import ROOT
@@ -23,7 +23,7 @@ def pump() -> Rig:
 
 
 def commands(rig: Rig) -> list[float]:
-    return [runner.axis.command for runner in rig.controller.axes.values()]
+    return [control.axis.demand for control in rig.controller.axes.values()]
 
 
 def news(rig: Rig) -> list[str]:
@@ -50,7 +50,7 @@ def test_what_runs_on_still_takes_its_oil(pump: Rig) -> None:
     pump.run(3)
     pump.run(150, **FULL)
     pump.run(1, Slew=1000)
-    assert pump.controller.axes["near_far"].axis.sent > 0.4
+    assert pump.controller.axes["near_far"].axis.output.setpoint > 0.4
     assert commands(pump)[0] < 0.65
     pump.run(250, Slew=1000)
     assert commands(pump)[0] == 1.0
@@ -102,7 +102,7 @@ def test_shares_and_others_count(changed_rig: Make) -> None:
 
 
 def test_the_gate_passes_whatever_third_lever_joins(pump: Rig) -> None:
-    guarded = Guarded(pump.controller)
+    gated = GatedController(pump.controller)
     levers = [{}, {"Slew": 1000}, FULL, {**FULL, "Lift": 1000}, {"Lift": -1000}, FULL, {}]
     for raw in levers:
         for _ in range(60):
@@ -112,8 +112,8 @@ def test_the_gate_passes_whatever_third_lever_joins(pump: Rig) -> None:
                 pump.joystick("JoystickLeft", **left),
                 pump.joystick("JoystickRight", **right),
             ):
-                guarded.receive(frame, pump.now_ns)
-            list(guarded.tick(pump.now_ns))
+                gated.receive(frame, pump.now_ns)
+            list(gated.tick(pump.now_ns))
             pump.now_ns += 20_000_000
     assert not any("refused" in event.text for event in pump.controller.events)
 

@@ -55,7 +55,9 @@ def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make
     for tick in range(250):
         rig.run(1, Slew=1000 if tick < 125 else 0)
         added += slew.added * TICK_S * FULL_SPEED_RAD_S
-        assert slew.axis.sent - slew.axis.output.applied == pytest.approx(slew.added, abs=1e-12)
+        assert slew.axis.output.setpoint - slew.axis.output.applied == pytest.approx(
+            slew.added, abs=1e-12
+        )
         lead = sway.angle * FULL_SPEED_RAD_S
         speed = sway.rate * FULL_SPEED_RAD_S
         missing = math.atan2(lead, 1.0 - (speed / sway.mode.omega_rad_s) ** 2) - lead
@@ -120,7 +122,9 @@ def test_without_near_far_slew_keeps_its_part(changed_rig: Make) -> None:
     rig.run(3)
     assert set(near_far(rig, 60, Slew=1000)) == {0.0}
     slew = rig.controller.axes["slew"]
-    assert slew.axis.sent - slew.axis.output.applied == pytest.approx(slew.added, abs=1e-12)
+    assert slew.axis.output.setpoint - slew.axis.output.applied == pytest.approx(
+        slew.added, abs=1e-12
+    )
     assert slew.added != 0.0
     rig.controller.motions[0].adjust()
     rig.run(1, Slew=1000)
@@ -134,7 +138,7 @@ def test_missed_ticks_are_no_way_that_is_lost(changed_rig: Make) -> None:
         rig = moving_as_one(changed_rig)
         rig.run(3)
         way = sum(near_far(rig, 40, Slew=1000))
-        sent = rig.controller.axes["near_far"].axis.sent
+        sent = rig.controller.axes["near_far"].axis.output.setpoint
         rig.tick(missed=missed)
         way += missed * sent
         way += sum(near_far(rig, 200, Slew=1000))
@@ -145,14 +149,14 @@ def test_missed_ticks_are_no_way_that_is_lost(changed_rig: Make) -> None:
 def test_an_axis_that_is_measured_is_alone(changed_rig: Make) -> None:
     rig = moving_as_one(changed_rig)
     rig.run(3)
-    runner = rig.controller.axes["near_far"]
-    runner.isolate(rig.controller.joysticks["left"])
+    control = rig.controller.axes["near_far"]
+    control.isolate(rig.controller.joysticks["left"])
     assert set(near_far(rig, 60, Slew=1000)) == {0.0}
-    assert runner.added == 0.0
+    assert control.added == 0.0
     other = ShapedAxis(TICK_S, OutputLimits(), sway=None, shaper=Off())
-    runner.isolate(rig.controller.joysticks["left"], other)
+    control.isolate(rig.controller.joysticks["left"], other)
     rig.run(60, Slew=1000)
-    assert runner.axis is other
+    assert control.axis is other
     assert other.state is State.READY
 
 

@@ -70,7 +70,7 @@ def test_a_lost_joystick_of_near_far_stops_the_compensation(changed_rig: Make) -
     for _ in range(120):
         rig.receive(rig.joystick("JoystickLeft", Slew=1000))
         rig.tick()
-        after.append(rig.controller.axes["near_far"].axis.sent)
+        after.append(rig.controller.axes["near_far"].axis.output.setpoint)
     assert rig.state() is State.ACTIVE
     # five ticks of timeout, then at the fall rate to neutral
     assert not any(after[5 + math.ceil(0.25 / 0.1) :])
@@ -102,7 +102,7 @@ def test_a_released_enable_of_slew_leaves_the_operators_own_part(changed_rig: Ma
     for one in (rig, plain):
         one.receive(one.joystick("JoystickLeft", Enable=0), one.joystick("JoystickRight", Lift=400))
         one.tick()
-    sent = [one.controller.axes["near_far"].axis.sent for one in (rig, plain)]
+    sent = [one.controller.axes["near_far"].axis.output.setpoint for one in (rig, plain)]
     assert sent[0] == pytest.approx(sent[1], abs=0.02)
     assert sent[1] > 0.2
 
@@ -116,7 +116,7 @@ def test_a_lost_joystick_of_slew_ends_it_in_the_fade(changed_rig: Make) -> None:
     for _ in range(30):
         rig.receive(rig.joystick("JoystickRight"))
         rig.tick()
-        after.append(rig.controller.axes["near_far"].axis.sent)
+        after.append(rig.controller.axes["near_far"].axis.output.setpoint)
     assert rig.state() is State.STOPPING
     assert not any(after[5 + 15 :])
     assert rig.state("near_far") is State.READY
@@ -134,7 +134,7 @@ def test_near_far_that_becomes_ready_while_slew_moves_does_not_twitch(
         if tick >= slew_ticks:
             rig.receive(rig.joystick("JoystickRight"))
         rig.tick()
-        sent.append(rig.controller.axes["near_far"].axis.sent)
+        sent.append(rig.controller.axes["near_far"].axis.output.setpoint)
     assert not any(sent[: slew_ticks + 1])
     assert max(map(abs, sent)) > 0.03  # it does take part
     begin = sent[slew_ticks : slew_ticks + 12]

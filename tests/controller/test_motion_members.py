@@ -83,10 +83,10 @@ def test_a_trip_of_slew_is_the_end_of_what_it_added_to_near_far(changed_rig: Mak
     rig = moving_as_one(changed_rig)
     rig.run(3)
     near_far(rig, 40, Slew=1000, NearFar=300)
-    runner = rig.controller.axes["near_far"]
-    assert runner.added
+    control = rig.controller.axes["near_far"]
+    assert control.added
     rig.controller.send_failed(Frame("crane", 512, False, bytes(2)))
     for _ in range(5):
         rig.run(1, Slew=1000, NearFar=300)
-        assert runner.added == 0.0
+        assert control.added == 0.0
     assert rig.reason() == "SEND_FAILED"

@@ -23,7 +23,7 @@ def driven(name: str) -> Controller:
         for frame in hand.frames(number * 20, held):
             controller.receive(frame, number * 20_000_000)
         list(controller.tick(number * 20_000_000))
-    assert all(runner.axis.raw for runner in controller.axes.values())
+    assert all(control.axis.output.steps for control in controller.axes.values())
     return controller
 
 
@@ -31,12 +31,12 @@ def driven(name: str) -> Controller:
 def test_all_axes_of_its_message_are_neutral(name: str) -> None:
     """A plain frame, one with a checksum, one with two axes."""
     controller = driven(name)
-    for runner in controller.axes.values():
-        frame = runner.valve.frame()
+    for control in controller.axes.values():
+        frame = control.valve.frame()
         neutral = controller.refused(frame)
         assert neutral[:3] == frame[:3]
         for of in controller.axes.values():
-            if of.valve is runner.valve:
+            if of.valve is control.valve:
                 raw = of.valve.fields.layout.decode(neutral.data)
                 assert of.bound.valve.read(raw) == 0
 
@@ -44,10 +44,10 @@ def test_all_axes_of_its_message_are_neutral(name: str) -> None:
 def test_it_has_the_count_of_the_refused_one() -> None:
     """Its receiver sees no gap."""
     controller = driven("canfd-forwarder")
-    runner = controller.axes["slew"]
-    check = runner.bound.valve.message.protection.check
+    control = controller.axes["slew"]
+    check = control.bound.valve.message.protection.check
     assert isinstance(check, E2e)
-    frame = runner.valve.frame()
+    frame = control.valve.frame()
     neutral = controller.refused(frame)
     assert check.verify(neutral.data)
     assert check.count(neutral.data) == check.count(frame.data)
@@ -75,8 +75,8 @@ def test_a_frame_moves_while_any_axis_in_it_does() -> None:
         for frame in hand.frames(time_ms, held) if time_ms < 2000 else ():  # then we stop the crane
             controller.receive(frame, time_ms * 1_000_000)
         for frame in controller.tick(time_ms * 1_000_000):
-            if frame.can_id == 272 and slew.raw:
-                assert not near_far.raw
+            if frame.can_id == 272 and slew.output.steps:
+                assert not near_far.output.steps
                 moves.append(controller.moves)
     assert moves
     assert all(moves)

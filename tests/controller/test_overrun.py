@@ -183,14 +183,14 @@ def test_a_slow_valve_stops_with_its_next_frame(changed_rig: Make) -> None:
 def test_a_joystick_held_the_other_way_ends_the_run_on(rig: Rig, interlock: bool) -> None:
     """In a stop that the joystick is no cause of: it is valid all the time."""
     rig.moving()
-    runner = rig.controller.axes["slew"]
+    control = rig.controller.axes["slew"]
     if interlock:
-        runner.stops.interlocks.append(lambda neutral, now_ns: Reason.NODE_FAULT)
+        control.stops.interlocks.append(lambda neutral, now_ns: Reason.NODE_FAULT)
         late(rig, Slew=-1000)
     else:
         overrun(rig, Slew=1000)
     assert rig.state() is State.STOPPING
-    limits = runner.bound.config.limits
-    for _ in range(round(1.0 / (limits.fall_per_s * runner.period_s)) + 1):
+    limits = control.bound.config.limits
+    for _ in range(round(1.0 / (limits.fall_per_s * control.period_s)) + 1):
         late(rig, Slew=-1000)
-    assert runner.axis.raw == 0
+    assert control.axis.output.steps == 0

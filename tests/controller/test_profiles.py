@@ -33,7 +33,7 @@ def rig() -> Rig:
 
 def numbers(rig: Rig | Forwarder) -> set[int]:
     """Sets in force, of the axes that have profiles."""
-    choosers = (runner.chooser for runner in rig.controller.axes.values())
+    choosers = (control.chooser for control in rig.controller.axes.values())
     return {chooser.number for chooser in choosers if chooser}
 
 
@@ -142,7 +142,7 @@ def test_in_motion_no_output_jumps(after_s: float, presses: int, *, released: bo
         rig.run(1, Button4=int(tick in {begin + 10 * i for i in range(presses)}), **joystick)
         plain.run(1, **joystick)
         for axis in ("slew", "near_far"):
-            one, other = (r.controller.axes[axis].axis.sent for r in (rig, plain))
+            one, other = (r.controller.axes[axis].axis.output.setpoint for r in (rig, plain))
             assert one == pytest.approx(other, abs=0.01)
     assert numbers(rig) == {presses}
     assert rig.state() is (State.READY if released else State.ACTIVE)
@@ -151,16 +151,16 @@ def test_in_motion_no_output_jumps(after_s: float, presses: int, *, released: bo
 def test_on_the_way_to_a_speed_the_profile_waits(rig: Rig) -> None:
     rig.run(10, X=60.0)
     press(rig, X=60.0)
-    runner = rig.controller.axes["slew"]
+    control = rig.controller.axes["slew"]
     steady = 0
     for _ in range(200):
         rig.run(1, X=60.0)
         if numbers(rig) != {NORMAL, QUICK}:  # near-far is at rest
             break
-        steady = steady + 1 if abs(runner.axis.sent - 0.6) <= 0.02 else 0
+        steady = steady + 1 if abs(control.axis.output.setpoint - 0.6) <= 0.02 else 0
     assert steady == 10
     assert numbers(rig) == {QUICK}
-    assert runner.axis.state is State.ACTIVE
+    assert control.axis.state is State.ACTIVE
     for tick in range(300):
         rig.run(1, X=50.0 + 40.0 * (tick // 20 % 2), Button4=int(tick == 100))
     assert rig.controller.axes["slew"].active_set == QUICK
@@ -181,9 +181,9 @@ def test_a_press_while_profiles_change_leaves_the_swing_small(axis: str) -> None
     """Without a filter it leaves 13 and 16 degrees; where no profile waits, up to 7."""
 
     def choose(controller: Controller) -> None:
-        for runner in controller.axes.values():
-            if runner.chooser:
-                runner.add_chooser(None, Restless())
+        for control in controller.axes.values():
+            if control.chooser:
+                control.add_chooser(None, Restless())
 
     script = Script("press", (Stroke(axis, 0.5, 3.0, 1.0, 0.1),), 10.0)
     left = axis_metrics(drive(load_deployment(FILE), script, prepare=choose), axis).residual_deg

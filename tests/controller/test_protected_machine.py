@@ -75,7 +75,7 @@ def test_a_joystick_with_its_header_drives_and_needs_no_more_than_qualify(rig: R
     assert rig.axis[0] is State.READY
     rig.run(40, slew=1000)
     assert rig.axis[0] is State.ACTIVE
-    assert rig.controller.axes["slew"].axis.command == 1.0
+    assert rig.controller.axes["slew"].axis.demand == 1.0
 
 
 @pytest.mark.parametrize("included", [b"\x24\x01", b"\x23\x00", b"\x01\x23", b"\x23", b""])
@@ -99,7 +99,7 @@ def test_nothing_in_a_frame_with_a_flipped_bit_is_believed(tmp_path: Path, bit: 
     rig.frame(STOP, rig.stop())
     rig.tick()
     assert rig.axis[0] is State.ACTIVE
-    assert rig.controller.axes["slew"].axis.command == 1.0
+    assert rig.controller.axes["slew"].axis.demand == 1.0
 
 
 def test_a_pressed_stop_counts_with_its_own_data_id_only(rig: Rig) -> None:

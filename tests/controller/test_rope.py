@@ -101,11 +101,11 @@ def test_a_hoist_in_motion_is_followed() -> None:
 def test_what_drives_the_valve_for_a_measurement_follows_no_rope() -> None:
     rig = OverheadRig()
     rig.run(3)
-    runner = rig.controller.axes["bridge"]
-    own, joystick = runner.axis, rig.controller.joysticks["left"]
-    runner.isolate(joystick, rig.controller.axes["hoist"].axis)
+    control = rig.controller.axes["bridge"]
+    own, joystick = control.axis, rig.controller.joysticks["left"]
+    control.isolate(joystick, rig.controller.axes["hoist"].axis)
     rig.rope_m = 5.2
     rig.run(2)
     assert own.sway is not None
     assert own.sway.mode.period_s == pytest.approx(of_rope(5.2))
-    assert runner.axis.sway is None
+    assert control.axis.sway is None

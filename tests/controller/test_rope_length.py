@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from canshaper.controller.demands import MOST_PER_S, SETTLES_S, RopeLength
+from canshaper.controller.measured_limits import MOST_PER_S, SETTLES_S, RopeLength
 from canshaper.shaping.states import Lost
 
 TICK_S = 0.02

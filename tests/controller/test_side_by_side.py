@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
@@ -32,7 +32,7 @@ class Driven:
 
     def __init__(self, deployment: Deployment, speed: float) -> None:
         self.controller = Controller(deployment)
-        self._guarded, self._hand = Guarded(self.controller), Hand(deployment)
+        self._gated, self._hand = GatedController(self.controller), Hand(deployment)
         self._plant, self._feedback = PlantNode(deployment), list[Frame]()
         self._deployment, self._speed, self._number = deployment, speed, 0
         self.sent: list[Frame] = []
@@ -45,8 +45,8 @@ class Driven:
         pushed = self._speed if time_ms > 1000 else 0.0
         held = Held(dict.fromkeys(self._deployment.axes, pushed), enable=time_ms < 2500)
         frames = [*self._hand.frames(time_ms, held), *self._feedback]
-        sent = [one for one in (self._guarded.receive(f, now_ns) for f in frames) if one]
-        sent += self._guarded.tick(now_ns)
+        sent = [one for one in (self._gated.receive(f, now_ns) for f in frames) if one]
+        sent += self._gated.tick(now_ns)
         if time_ms % 1000 == 0 and (identity := self.controller.status.identity(frozenset())):
             sent.append(identity)
         for frame in sent:
@@ -57,7 +57,7 @@ class Driven:
 
     def end(self) -> list[Frame]:
         """Everything that was sent, the last frames included."""
-        return [*self.sent, *self._guarded.neutral_frames()]
+        return [*self.sent, *self._gated.neutral_frames()]
 
 
 def steps(deployment: Deployment) -> range:

@@ -10,7 +10,7 @@ import pytest
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import SwingLengthEvent
-from canshaper.controller.status import SensorReport
+from canshaper.controller.status_messages import SensorReport
 from canshaper.design.lockstep import LockStep, drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -124,9 +124,9 @@ def test_of_a_period_it_is_reported_as_one() -> None:
 
 def test_the_length_of_a_breakpoint_is_no_other_one_than_that_of_the_file() -> None:
     """A load that hangs deeper: to set the key of the empty grapple to it would be wrong."""
-    runner = Controller(load_deployment(FILE)).axes["near_far"]
-    report = SensorReport("near_far", runner)
-    axis, loaded_length = runner.axis, SwingLength(2.0, 0.04, 3.0)
+    control = Controller(load_deployment(FILE)).axes["near_far"]
+    report = SensorReport("near_far", control)
+    axis, loaded_length = control.axis, SwingLength(2.0, 0.04, 3.0)
     assert axis.sensed is not None
     assert axis.sway is not None
     of_file, loaded = axis.sway.mode, SwayMode.from_grapple(2.0, 120.0, 900.0)

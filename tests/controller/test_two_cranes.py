@@ -61,8 +61,8 @@ class Rig:
 
     def states(self, crane: str) -> set[str]:
         return {
-            runner.axis.state.name
-            for name, runner in self.controller.axes.items()
+            control.axis.state.name
+            for name, control in self.controller.axes.items()
             if name.startswith(crane)
         }
 

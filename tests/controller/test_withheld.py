@@ -2,7 +2,7 @@
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.shaping.states import State
 from canshaper_sim.hand import Hand, Held
 from tests.gate.bench import load
@@ -14,18 +14,18 @@ MOVING = 50
 def test_the_motion_goes_on_without_a_gap_in_the_counter() -> None:
     deployment = load("forwarder")
     controller = Controller(deployment)
-    guarded, hand = Guarded(controller), Hand(deployment)
+    gated, hand = GatedController(controller), Hand(deployment)
     message = deployment.axes["near_far"].valve.message
     left: list[Frame] = []
     for number in range(MOVING + 5):
         position = 0.5 if number > 5 else 0.0
         for frame in hand.frames(number * 20, Held({"near_far": position}, enable=True)):
-            guarded.receive(frame, number * TICK_NS)
-        for frame in guarded.tick(number * TICK_NS):
+            gated.receive(frame, number * TICK_NS)
+        for frame in gated.tick(number * TICK_NS):
             if frame[:3] != message.key:
                 continue
             if number == MOVING:
-                assert guarded.withhold(frame)
+                assert gated.withhold(frame)
             else:
                 left.append(frame)
     assert not any("output=refused" in event.text for event in controller.events)

@@ -176,8 +176,8 @@ def test_every_axis_of_a_joystick_sees_a_release_once(changed_rig: Make) -> None
     tick(rig, port)
     assert rig.controller.axes["slew"]._releases == 0
     rig.run(10)
-    runners = rig.controller.axes
-    assert [runners[n]._releases for n in ("slew", "near_far")] == [1, 1]
+    controls = rig.controller.axes
+    assert [controls[n]._releases for n in ("slew", "near_far")] == [1, 1]
 
 
 @pytest.mark.parametrize("age_ns", [0, TICK_NS, FOREIGN_NS, FOREIGN_NS + 1, 5 * FOREIGN_NS])

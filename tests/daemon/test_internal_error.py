@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.codec.velocity import ValveCodec
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
-from canshaper.controller.runner import AxisControl
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import InternalError, raised
 from canshaper.machine.binding import load_deployment
@@ -95,10 +95,10 @@ def test_neutral_that_cannot_be_made_hides_no_failure_and_keeps_the_end_orderly(
 def test_a_valve_without_neutral_costs_the_others_nothing(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
-    def put(runner: AxisControl, steps: int) -> None:
-        if runner.bound.name == "slew":
+    def put(control: AxisControl, steps: int) -> None:
+        if control.bound.name == "slew":
             raise LookupError("no neutral")
-        sound(runner, steps)
+        sound(control, steps)
 
     def plant() -> None:
         bench.sent.clear()
@@ -117,7 +117,7 @@ def test_a_last_frame_that_is_refused_is_in_the_log(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
     def plant() -> None:
-        monkeypatch.setattr(AxisControl, "put", lambda runner, _: sound(runner, 9))
+        monkeypatch.setattr(AxisControl, "put", lambda control, _: sound(control, 9))
 
     sound = AxisControl.put
     driven(bench, plant)
@@ -169,7 +169,7 @@ def test_a_setpoint_beyond_full_trips_its_axis_only(rig: Rig) -> None:
     assert sent["SlewCommand"]["Velocity"] == 0
     assert sent["LiftCommand"]["Velocity"] > 50
     assert (axis.state, axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
-    assert (axis.raw, axis.sent, axis.output.applied) == (0, 0.0, 0.0)
+    assert (axis.output.steps, axis.output.setpoint, axis.output.applied) == (0, 0.0, 0.0)
 
 
 def test_run_ends_with_an_exit_code_after_which_it_is_started_again(

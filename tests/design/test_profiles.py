@@ -5,15 +5,14 @@ import re
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from canshaper.campaign import work_results
-from canshaper.cli.app import app
+from tests.cli.invocation import invoke
 from tests.rigs.files import ROOT, text_of
 
 
 def run(*words: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, ["profiles", *words])
+    done = invoke("profiles", *words)
     return done.exit_code, done.output
 
 

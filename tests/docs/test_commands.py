@@ -44,7 +44,7 @@ NOT_PASTED = {
 # Outputs that are not compared, and why.
 NOT_COMPARED = {
     "compare": "minutes; tests/design holds its table",
-    "work": "minutes; tests/campaign/test_work.py holds its table",
+    **dict.fromkeys(("work", "profiles"), "minutes; tests/campaign holds their tables"),
     "monitor forwarder.yaml, next to run, sim and operator": "a picture of one moment",
 }
 

@@ -13,7 +13,7 @@ from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools import architecture
-from tools.frame_faults import FAULT_TEXTS
+from tools.frame_faults import FAULT_TEXTS, TRUST_TEXTS
 
 ROOT = Path(__file__).parents[2]
 generate: dict[str, Any] = runpy.run_path(str(ROOT / "tools/generate.py"))
@@ -63,7 +63,7 @@ def test_a_valve_state_of_another_message_keeps_its_table() -> None:
 
 
 def test_every_reason_fault_and_state_has_its_texts() -> None:
-    assert [*FAULT_TEXTS] == [*FrameFault]
+    assert [*FAULT_TEXTS, *TRUST_TEXTS] == [*FrameFault, *Trust]
     assert all(FAULT_TEXTS.values())
     assert REASON_TEXTS.keys() == {*Reason}
     assert STATE_TEXTS.keys() == {*State}
@@ -84,12 +84,12 @@ def test_the_page_names_every_transition() -> None:
 
 
 def test_a_list_of_keys_has_default_range_unit_and_the_place_of_what_is_below() -> None:
-    links = {"Match": "#the-device", "Limits": "#limits"}
-    rows = list(generate["key_rows"](generate["section_names"]()["Limits"], links))
+    of, links = generate["section_names"](), {"Match": "#the-device", "Limits": "#limits"}
+    rows = [r for n in ("Limits", "Uncertainty", "Bus") for r in generate["key_rows"](of[n], links)]
     assert "- `allow_reverse` (false): the output may go against the joystick" in rows
     assert "- `min_pct` (0, 0 to 50 % of full speed): outputs below this are zero" in rows
-    rows = list(generate["key_rows"](generate["section_names"]()["Bus"], links))
-    assert rows[6].startswith("- [`match`](#the-device) (optional): the device behind")
+    assert "- `damping_pct` ([-50, 100], -95 to 500 %): damping of its joints, from and to" in rows
+    assert any(row.startswith("- [`match`](#the-device) (optional): the device") for row in rows)
 
 
 def test_a_list_of_keys_has_those_of_the_section_itself() -> None:

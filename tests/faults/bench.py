@@ -26,7 +26,7 @@ from canshaper.gate import cycle as io_cycle_module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.daemon.bench import Uncollected
-from tests.faults.guarded import Unrefused
+from tests.faults.gated import Unrefused
 from tests.faults.machine import Key
 from tests.faults.rules import Rules
 from tests.faults.world import World

@@ -12,7 +12,7 @@ from canshaper.codec.frame import Frame
 from tests.faults import inject
 from tests.faults.axis_judge import FOREIGN_NS
 from tests.faults.fault import Fault
-from tests.faults.guarded import guarded
+from tests.faults.gated import gated
 from tests.faults.hand import path
 from tests.faults.inputs import Joystick
 from tests.faults.joystick_faults import joystick_frames
@@ -42,7 +42,7 @@ class Drive:
     def __init__(
         self,
         seed: int,
-        controller_of: Callable[[Any], Any] = guarded,
+        controller_of: Callable[[Any], Any] = gated,
         trace: Callable[[str], None] | None = None,
     ) -> None:
         self.seed = seed

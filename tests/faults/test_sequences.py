@@ -10,9 +10,9 @@ from unittest.mock import patch
 
 import pytest
 
-from canshaper.controller import demands
+from canshaper.controller import measured_limits
 from canshaper.controller.controller import Controller
-from canshaper.shaping.demands import FlowBudget
+from canshaper.shaping.demand_bounds import FlowBudget
 from tests.faults import later
 from tests.faults.judge import Violation
 from tests.faults.lies import LIES, Lie
@@ -23,7 +23,7 @@ from tests.faults.shipped import CONFIG, MADE, NAMES, shipped
 QUICK, SAMPLE = 1, 18
 # So many sequences may a lie stay unseen.
 MOST = 200
-BUDGET, BOUNDS = FlowBudget.step, demands.bounds  # as they are
+BUDGET, BOUNDS = FlowBudget.step, measured_limits.bounds  # as they are
 # Seen after many sequences.
 RARE = {"always active", "another sender unseen", "emergency unseen", "enable forced"}
 RARE |= {"error code unseen"}
@@ -121,8 +121,12 @@ def test_the_rules_catch_what_the_controller_does_not_do(method: str) -> None:
     [
         (FlowBudget, "step", lambda *_: 1.0),  # the pump delivers enough, always
         (FlowBudget, "step", lambda one, flow, *rest: BUDGET(one, 1.2 * flow, *rest)),
-        (demands, "bounds", lambda *_: (-1.0, 1.0)),  # no end stop
-        (demands, "bounds", lambda *arguments: tuple(-side for side in BOUNDS(*arguments)[::-1])),
+        (measured_limits, "bounds", lambda *_: (-1.0, 1.0)),  # no end stop
+        (
+            measured_limits,
+            "bounds",
+            lambda *arguments: tuple(-side for side in BOUNDS(*arguments)[::-1]),
+        ),
     ],
     ids=["no budget", "budget too large", "no end stop", "wrong end stop"],
 )

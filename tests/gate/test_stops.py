@@ -130,7 +130,7 @@ class TestStopsAtOnce:
         world = World("ecu-forwarder")
         for world.agree in (True, False, True):
             world.go(25)
-        axes = world.guarded._gate.axes.values()
+        axes = world.gated._gate.axes.values()
         assert all(axis.armed for axis in axes)
 
     def test_a_reset_is_a_press_too(self) -> None:

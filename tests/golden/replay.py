@@ -10,7 +10,7 @@ from typing import Any
 from canshaper.codec.frame import Frame
 from canshaper.codec.message import FieldSet
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping import output
 from canshaper.shaping.limits import with_deadband
@@ -71,7 +71,7 @@ def golden(name: str) -> Path:
 
 def replay(name: str, drive: list[str]) -> list[str]:
     """Frames of a deployment at the ticks, in order."""
-    controller = Guarded(Controller(load_deployment(CONFIG / f"{name}.yaml")))
+    controller = GatedController(Controller(load_deployment(CONFIG / f"{name}.yaml")))
     waiting = [parsed(row) for row in drive]
     waiting.reverse()
     sent = []

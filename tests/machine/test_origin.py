@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.commissioning.identification.canlog import is_simulated
+from canshaper.commissioning.origins import is_simulated
 from canshaper.config.bus import Bus
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
@@ -96,17 +96,20 @@ def test_a_day_that_is_none_and_an_origin_without_a_curve(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("line", "simulated"),
+    ("file", "own", "line", "simulated"),
     [
-        ("(1.000000) can0 123#00", False),
-        ("(1.000000) vcan0 123#00", True),
-        ("(1.000000) 239.74.163.2 123#00", True),
-        ("(1.000000) can0 {own:03X}#0000000000000000", True),
+        ("forwarder", "GrappleSway", "(1.000000) can0 123#00", False),
+        ("forwarder", "GrappleSway", "(1.000000) vcan0 123#00", True),
+        ("forwarder", "GrappleSway", "(1.000000) 239.74.163.2 123#00", True),
+        ("forwarder", "GrappleSway", "(1.000000) can0 {own:03X}#0000000000000000", True),
+        ("bridge-crane", "LoadSway", "(1.000000) can0 {own:03X}#0000000000000000", True),
     ],
 )
-def test_logs_of_a_simulated_crane(tmp_path: Path, line: str, simulated: bool) -> None:
-    messages = load_deployment(ROOT / "config" / "forwarder.yaml").messages
-    sway = messages.find("GrappleSway")
+def test_logs_of_a_simulated_crane(
+    tmp_path: Path, file: str, own: str, line: str, simulated: bool
+) -> None:
+    messages = load_deployment(ROOT / "config" / f"{file}.yaml").messages
+    sway = messages.find(own)
     assert not isinstance(sway, str)
     log = tmp_path / "drive.log"
     log.write_text(line.format(own=sway[1].frame_id) + "\n")

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
-from canshaper.native.drive import play, random_drive
+from canshaper.native.drive import NAMES, play, random_drive, rows
 from canshaper.native.library import C_FILES, NativeController, NativeLibrary, compiler
-from canshaper.native.states import NAMES, rows
 from tests.rigs.files import CONFIG, read
 
 SeenStates = set[tuple[str, str]]
@@ -40,7 +39,7 @@ def shipped(name: str) -> NativeLibrary:
 
 
 def difference(
-    deployment: Deployment, c: NativeController, seed: str, ticks: int, *, guarded: bool = False
+    deployment: Deployment, c: NativeController, seed: str, ticks: int, *, gated: bool = False
 ) -> tuple[str, SeenStates]:
     """The first difference of frames or states, "" for none; and the states that were seen.
 
@@ -49,10 +48,10 @@ def difference(
         c: the C with its tables.
         seed: of the drive.
         ticks: of the drive.
-        guarded: the controller is behind its gate.
+        gated: the controller is behind its gate.
     """
     controller = Controller(deployment.unreported)
-    python = Guarded(controller) if guarded else controller
+    python = GatedController(controller) if gated else controller
     seen: SeenStates = set()
     for number, tick in enumerate(random_drive(deployment, seed, ticks)):
         ours, theirs = play(tick, python), play(tick, c)
@@ -61,8 +60,8 @@ def difference(
             return f"tick {number}: frames {ours}, C {theirs}", seen
         if wrong := _of_rows(rows(controller), c.rows()):
             return f"tick {number}: {wrong}", seen
-        for runner in controller.axes.values():
-            seen.add((runner.axis.state.name, runner.axis.reason.name))
+        for control in controller.axes.values():
+            seen.add((control.axis.state.name, control.axis.reason.name))
     return "", seen
 
 

@@ -11,17 +11,16 @@ from pathlib import Path
 import pytest
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.cli.common import EXIT_WRONG
 from canshaper.machine.identity import program_sha256
+from tests.cli.invocation import invoke
 from tests.native.judge import needs_compiler
 from tests.rigs.files import CONFIG, machine_file, read
 
 
 def run(*arguments: str) -> tuple[int, str]:
-    result = CliRunner().invoke(app, ["export", *arguments])
+    result = invoke("export", *arguments)
     return result.exit_code, result.output
 
 

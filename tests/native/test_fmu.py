@@ -13,9 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.design.lockstep import Simulation
 from canshaper.shaping.states import Reason, State
 from canshaper_sim.axes import TIP_AXES
@@ -23,6 +21,7 @@ from canshaper_sim.hand import Hand
 from canshaper_sim.operator import script_for
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.valve_frames import CommandReader
+from tests.cli.invocation import invoke
 from tests.native.judge import needs_compiler
 from tests.rigs.files import CONFIG, read
 
@@ -45,7 +44,7 @@ def units(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     made = {}
     for kind in ("controller", "plant"):
         options = ["export", f"{NAME}.yaml", "--fmu", kind, "--out", str(folder / kind)]
-        done = CliRunner().invoke(app, options)
+        done = invoke(*options)
         assert done.exit_code == 0, done.output
         made[kind] = folder / kind / f"{kind}.fmu"
         assert f"{kind}, with a binary for" in done.output

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.native.library import C_FILES, FMU_FILES
-from canshaper.native.source import sizes_source, tables_source
+from canshaper.native.library import C_FILES, FMU_FILES, sizes_source, tables_source
 from canshaper.native.tables import tables
 from tests.rigs.files import CONFIG, read
 

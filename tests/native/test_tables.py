@@ -11,7 +11,7 @@ from canshaper.config.crane import Motion, Radius
 from canshaper.config.limits import Limits, Sway
 from canshaper.config.schema import AxisSection, Bus, Command, DeploymentConfig, Joystick, Valve
 from canshaper.errors import ConfigError
-from canshaper.native.source import sizes_source, tables_source
+from canshaper.native.library import sizes_source, tables_source
 from canshaper.native.tables import NOT_EXPORTED, tables
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Shaper, ShaperKind

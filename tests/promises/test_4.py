@@ -90,7 +90,7 @@ class TestEveryFrameIsOfItsTick:
                     data = world.encode(axis, data, round(speed * world.axes[axis].steps))
                 for ahead in (0, 1):
                     wrong = frame._replace(data=world.counted(axes[0], data, ahead))
-                    assert not world.guarded.passes(wrong, world.now_ns), (axes, speed, ahead)
+                    assert not world.gated.passes(wrong, world.now_ns), (axes, speed, ahead)
 
     def test_what_waited_while_the_loop_stood(self, name: str) -> None:
         """Frames that are computed from it are neutral; a gateway passes nothing of it on."""
@@ -112,7 +112,7 @@ class TestEveryFrameIsOfItsTick:
         late = [frame for frame in world.left if frame[:3] in world.moved_by]
         self.counters(world, late, before)
         world.step()
-        assert all(world.guarded.withhold(frame) for frame in self.valves(world))
+        assert all(world.gated.withhold(frame) for frame in self.valves(world))
         world.step()
         self.counters(world, self.valves(world), before)
         assert len(self.valves(world)) == len(world.moved_by)

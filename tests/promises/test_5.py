@@ -164,7 +164,7 @@ class TestNoFrameBeyondTheLimits:
 
         def plant(frames: list[Frame]) -> Iterator[Frame]:
             nonlocal planted
-            gate, of = world.guarded._gate, world.evil.of
+            gate, of = world.gated._gate, world.evil.of
             for sound in frames:
                 if sound[:3] in world.moved_by:
                     for wrong in WRONG[what](world, sound):

@@ -51,8 +51,8 @@ def raising(world: World) -> None:
         def step(self, command: float) -> float:
             raise ZeroDivisionError
 
-    for runner in world.evil.axes.values():
-        runner.axis._transfer._shaper = Raising()
+    for control in world.evil.axes.values():
+        control.axis._transfer._shaper = Raising()
 
 
 FAULTS = {
@@ -212,7 +212,7 @@ class TestEveryFault:
 
         with pytest.raises(ZeroDivisionError):
             world.step(plant)
-        last = {frame[:3]: frame for frame in world.guarded.neutral_frames()}
+        last = {frame[:3]: frame for frame in world.gated.neutral_frames()}
         assert set(last) >= set(world.moved_by)
         for key, axes in world.moved_by.items():
             assert all(world.decode(axis, last[key].data) == 0 for axis in axes)
@@ -230,7 +230,7 @@ class TestEveryFault:
                     wrong(one) if one[:3] == key else one for one in sound()
                 ]
             )
-            left = {frame[:3] for frame in world.guarded.neutral_frames()}
+            left = {frame[:3] for frame in world.gated.neutral_frames()}
             assert key not in left
             assert left >= set(world.moved_by) - {key}
             assert any("output=refused" in event.text for event in world.evil.events)

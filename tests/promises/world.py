@@ -11,7 +11,7 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import RefusalEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from tests.faults.machine import Key
 from tests.faults.shipped import NAMES
 from tests.promises.seen import Buses
@@ -77,7 +77,7 @@ class World(ValveFrames):
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.evil = Evil(self.deployment)
-        self.guarded = Guarded(self.evil)
+        self.gated = GatedController(self.evil)
         self.buses = Buses(self.machine)
         self.stick: dict[str, float] = {}
         self.raw: dict[str, dict[str, int]] = {}
@@ -146,12 +146,12 @@ class World(ValveFrames):
 
     def passed(self, frame: Frame, at_ns: int) -> list[Frame]:
         """Return the frames that leave for it at once."""
-        passed = self.guarded.receive(frame, at_ns)
+        passed = self.gated.receive(frame, at_ns)
         return [passed] if passed else []
 
     def ticked(self, missed: int) -> Iterable[Frame]:
         """Yield the frames that leave in the tick."""
-        return self.guarded.tick(self.now_ns, missed)
+        return self.gated.tick(self.now_ns, missed)
 
     def step(self, plant: Plant | None = None, missed: int = 0) -> list[Frame]:
         """A tick; what left."""
@@ -234,7 +234,7 @@ class World(ValveFrames):
             self.fails(frame)
 
     def fails(self, frame: Frame) -> None:
-        self.guarded.send_failed(frame)
+        self.gated.send_failed(frame)
 
     def stalled(self, ticks: int = 15) -> None:
         """The loop stood still for so long."""
@@ -243,12 +243,12 @@ class World(ValveFrames):
         self.stands()
 
     def stands(self) -> None:
-        self.guarded.stalled()
+        self.gated.stalled()
 
     def reload(self) -> None:
         """The file is read again."""
         evil = Evil(self.deployment)
         evil.carry_over(self.evil)
-        before, self.evil, self.guarded = self.guarded, evil, Guarded(evil)
-        self.guarded.carry_over(before)
+        before, self.evil, self.gated = self.gated, evil, GatedController(evil)
+        self.gated.carry_over(before)
         self.buses.reload()

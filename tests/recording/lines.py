@@ -1,4 +1,4 @@
-"""Lines of candump and their frames, and what a reader makes of a file of them."""
+"""Logs as files, lines of candump with their frames, and what a reader makes of them."""
 
 from pathlib import Path
 
@@ -22,10 +22,15 @@ LINES = [
 HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
 
 
-def log(tmp_path: Path, *lines: str, name: str = "a.log") -> Path:
-    path = tmp_path / name
-    path.write_text("".join(lines), encoding="utf-8", newline="")
+def kept(folder: Path, name: str, content: str) -> Path:
+    """Write a log; line ends stay as they are."""
+    path = folder / name
+    path.write_text(content, encoding="utf-8", newline="")
     return path
+
+
+def log(tmp_path: Path, *lines: str, name: str = "a.log") -> Path:
+    return kept(tmp_path, name, "".join(lines))
 
 
 def prefix(path: Path) -> tuple[list[TimedFrame], LogError | None]:

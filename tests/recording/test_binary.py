@@ -9,7 +9,7 @@ import can
 import pytest
 
 from canshaper.recording.log import LogFile, TimedFrame
-from tests.recording.files import error_of, kept
+from tests.recording.lines import error_of, kept
 from tests.recording.writing import written
 
 

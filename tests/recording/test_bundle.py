@@ -11,7 +11,7 @@ import pytest
 
 from canshaper.errors import LogError
 from canshaper.machine.binding import load_deployment
-from canshaper.recording.history import History, HistoryEvent
+from canshaper.recording.listen import History, HistoryEvent
 from canshaper.recording.record import history_lines, pack, unpack
 from tests.rigs.files import ROOT
 

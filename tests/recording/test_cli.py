@@ -8,18 +8,17 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.cli.verbs.replay import _run
 from canshaper.recording.log import LogFile
 from canshaper.recording.plot import figure
+from tests.cli.invocation import invoke
 
 DRIVE = Path(__file__).parents[1] / "golden" / "drive.log"
 
 
 def called(*arguments: object, code: int = 0) -> str:
-    result = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    result = invoke("replay", *arguments)
     assert result.exit_code == code, result.output
     return result.output
 

@@ -9,9 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import drive
@@ -23,8 +21,9 @@ from canshaper.recording.replay import Replay, look
 from canshaper.recording.ticks import Result, Tick
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import script_named
+from tests.cli.invocation import invoke
 from tests.golden.replay import CONFIG, DRIVE
-from tests.recording.files import error_of
+from tests.recording.lines import error_of
 
 MULTIPLEXED = """
 BO_ 1536 Oil: 4 PLANT
@@ -149,9 +148,9 @@ def test_a_machine_that_no_simulated_crane_has_is_exported_without_pose() -> Non
 def test_demo_and_replay_export_what_replay_and_others_read(tmp_path: Path) -> None:
     drive, again = tmp_path / "drive.mcap", tmp_path / "again.mcap"
     demo = ["demo", "--seed", "3", "--export", str(drive), "--out", str(tmp_path / "demo")]
-    assert CliRunner().invoke(app, demo).exit_code == 0
+    assert invoke(*demo).exit_code == 0
     replay = ["replay", str(drive), "--config", "forwarder-robust.yaml", "--export", str(again)]
-    result = CliRunner().invoke(app, [*replay, "--out", str(tmp_path / "out")])
+    result = invoke(*replay, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     deployment = load_deployment(CONFIG / "forwarder-robust.yaml")
     two = [
@@ -177,7 +176,7 @@ def test_wrong_exports_are_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     call = ["replay", str(DRIVE), "--config", "forwarder-robust.yaml", *options]
-    result = CliRunner().invoke(app, call)
+    result = invoke(*call)
     assert (result.exit_code, result.stderr.strip()) == (2, text)
 
 

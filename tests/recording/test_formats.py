@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.recording.log import LogFile, TimedFrame
-from tests.recording.files import error_of, kept
+from tests.recording.lines import error_of, kept
 
 DAY_NS = 86_400 * 10**9
 

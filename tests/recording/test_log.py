@@ -29,20 +29,10 @@ def test_every_format_gives_the_frames_that_were_written(
     if suffix in ("asc", "blf"):  # python-can's begin with their first frame
         expected = [f._replace(time_ns=f.time_ns - FRAMES[0].time_ns) for f in FRAMES]
     assert list(LogFile(path)) == expected
-
-
-@pytest.mark.parametrize("suffix", ["log", "asc", "blf", "csv"])
-def test_a_packed_log_gives_the_same(tmp_path: Path, suffix: str) -> None:
-    path = written(tmp_path / f"drive.{suffix}", messages(FRAMES))
-    packed = tmp_path / f"other.{suffix}.gz"
-    packed.write_bytes(gzip.compress(path.read_bytes()))
-    assert list(LogFile(packed)) == list(LogFile(path))
-
-
-def test_candump_as_it_stands(tmp_path: Path) -> None:
-    assert list(LogFile(log(tmp_path, *LINES))) == [
-        f._replace(channel=f"can{int(f.channel) - 1}") for f in FRAMES
-    ]
+    if suffix != "db":  # a database cannot be packed
+        packed = tmp_path / f"other.{suffix}.gz"
+        packed.write_bytes(gzip.compress(path.read_bytes()))
+        assert list(LogFile(packed)) == expected
 
 
 def test_candump_of_python_can_with_directions_and_of_nanoseconds(tmp_path: Path) -> None:
@@ -119,12 +109,10 @@ def test_what_is_no_data_frame_is_left_out_and_counted(tmp_path: Path) -> None:
         can.Message(timestamp=1.1, is_error_frame=True),
         can.Message(timestamp=1.2, arbitration_id=0x110, is_remote_frame=True),
     ]
-    file = LogFile(written(tmp_path / "b.blf", binary))
-    assert len(list(file)) == 1
-    assert file.left_out == {"error": 1, "remote": 1}
-    file = LogFile(written(tmp_path / "b.csv", binary))
-    assert len(list(file)) == 1
-    assert file.left_out == {"error": 1, "remote": 1}
+    for name in ("b.blf", "b.csv"):
+        file = LogFile(written(tmp_path / name, binary))
+        assert len(list(file)) == 1
+        assert file.left_out == {"error": 1, "remote": 1}
 
 
 # -- clocks ------------------------------------------------------------------------------------

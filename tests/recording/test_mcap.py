@@ -29,7 +29,7 @@ from tests.recording.exports import (
     replayed,
     timed,
 )
-from tests.recording.files import error_of
+from tests.recording.lines import error_of
 
 
 def by_topic(path: Path) -> dict[str, list[tuple[int, Any]]]:

@@ -23,8 +23,7 @@ from tests.recording.exports import (
     replayed,
     timed,
 )
-from tests.recording.files import error_of
-from tests.recording.lines import FRAMES
+from tests.recording.lines import FRAMES, error_of
 from tests.recording.writing import messages
 from tests.recording.writing import written as written_by_python_can
 

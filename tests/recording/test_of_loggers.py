@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.recording.log import LogFile
-from tests.recording.files import error_of
+from tests.recording.lines import error_of
 
 # Time in ms, channel, id, whether that is extended, data.
 FRAMES = [

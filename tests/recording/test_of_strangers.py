@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.recording.log import LogFile
-from tests.recording.files import error_of
+from tests.recording.lines import error_of
 
 STEPS_US = [0, *(9_900 + 37 * n % 211 for n in range(40)), 1_500_000, 10_000, 9_990, 10_010]
 TIMES_NS = [1000 * t for t in accumulate(STEPS_US)]

@@ -14,13 +14,12 @@ from pathlib import Path
 
 import can
 import pytest
-from typer.testing import CliRunner
 
 from canshaper.bus.multicast import LocalMulticastBus
-from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.recording.listen import Listener
 from canshaper.recording.record import Recording, unpack
+from tests.cli.invocation import invoke
 from tests.rigs.files import machine_file
 
 # Of this process alone: two runs of the tests on one machine must not receive each other's frames.
@@ -67,24 +66,22 @@ def test_a_running_daemon_writes_its_last_minute(tmp_path: Path) -> None:
     boxes = tmp_path / "boxes"
     boxes.mkdir()
     last = ["record", str(file), "--last", "--control", socket]
-    assert CliRunner().invoke(app, last).exit_code == 1  # no daemon yet
+    assert invoke(*last).exit_code == 1  # no daemon yet
     options = ("--control", socket, "--black-box", str(boxes))
     with (
         running("run", *options, log=tmp_path / "run", file=str(file)),
         running("operator", "--script", "pulse-slew", log=tmp_path / "operator") as operator,
     ):
         assert operator.wait(ANSWER_S) == 0
-        changed = CliRunner().invoke(
-            app, ["set", str(file), "axes.slew.filter.a1=0.75", "--control", socket]
-        )
+        changed = invoke("set", file, "axes.slew.filter.a1=0.75", "--control", socket)
         assert changed.exit_code == 0, changed.output
-        result = CliRunner().invoke(app, last)
+        result = invoke(*last)
     assert result.exit_code == 0, result.output + (tmp_path / "run").read_text()
     assert f"written in {boxes}" in result.output.replace("\n", "")
     bundles = sorted(boxes.iterdir())
     out = tmp_path / "out"
     played = ["replay", str(bundles[0]), "--verify", "--out", str(out)]
-    result = CliRunner().invoke(app, played)
+    result = invoke(*played)
     assert result.exit_code == 0, result.output
     assert "every one the same to the last bit" in result.output
     data = json.loads((out / "replay.json").read_text())["machine"]
@@ -122,7 +119,7 @@ def test_the_command_makes_a_bundle_and_ends_with_ctrl_c(tmp_path: Path) -> None
 
 def test_a_bus_that_cannot_be_opened_ends_with_3(tmp_path: Path) -> None:
     arguments = ["record", "forwarder.yaml", "--interface", "nothing", "--channel", "x"]
-    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "x.zip")])
+    result = invoke(*arguments, "--out", tmp_path / "x.zip")
     assert result.exit_code == 3
     assert "bus crane: cannot open nothing channel x" in result.output
     assert not list(tmp_path.iterdir())
@@ -131,9 +128,7 @@ def test_a_bus_that_cannot_be_opened_ends_with_3(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["none.zip", "none.log"])
 def test_a_silent_bus_gives_a_file_without_frames(tmp_path: Path, name: str) -> None:
     out = tmp_path / name
-    result = CliRunner().invoke(
-        app, ["record", "forwarder.yaml", *BUS, "--seconds", "0.2", "--out", str(out)]
-    )
+    result = invoke("record", "forwarder.yaml", *BUS, "--seconds", "0.2", "--out", out)
     assert result.exit_code == 0, result.output
     assert f"nothing was received, {out} is without frames: is the bus up" in result.output
     assert ", 0 frames" in result.output
@@ -147,13 +142,13 @@ def test_a_silent_bus_gives_a_file_without_frames(tmp_path: Path, name: str) -> 
 
 def test_a_log_that_cannot_be_written_ends_with_1(tmp_path: Path) -> None:
     arguments = ["record", "forwarder.yaml", *BUS, "--seconds", "0.2"]
-    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "no" / "x.zip")])
+    result = invoke(*arguments, "--out", tmp_path / "no" / "x.zip")
     assert result.exit_code == 1
     assert "No such file or directory" in result.output
 
 
 def test_only_bundles_and_logs(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["record", "forwarder.yaml", "--out", "x.tar"])
+    result = invoke("record", "forwarder.yaml", "--out", "x.tar")
     assert result.exit_code == 2
     assert "expected .zip, .log, .mcap, .mf4, got " in result.output
 

@@ -2,15 +2,14 @@
 
 import csv
 import math
+from functools import partial
 from itertools import accumulate
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
 
 from canshaper.campaign.run import Source
 from canshaper.campaign.work import SetUp, Work, do_work, learn
-from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.report.shift import FIGURES
@@ -18,6 +17,7 @@ from canshaper_sim.operator_model import Skill
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import Recording
 from tests.blackbox.driven import SECOND, TRIP, drive
+from tests.cli.invocation import invoke
 from tests.daemon.bench import Bench
 from tests.recording.shift_logs import (
     MONDAY_S,
@@ -29,6 +29,8 @@ from tests.recording.shift_logs import (
     tip_m_s,
     written,
 )
+
+run = partial(invoke, "shift")
 
 
 def waits_s(recording: Recording, large_deg: float) -> float:
@@ -107,10 +109,6 @@ def test_a_black_box_is_counted_by_what_its_daemon_sent(
     assert any(float(row["way_m"]) == pytest.approx(way_m, rel=0.02) for way_m in ways_m)
     assert (row["anti_sway"], row["cycles"], row["taps"]) == ("on", "0", "0")
     assert "note:" not in result.output
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, ["shift", *map(str, arguments)])
 
 
 def test_the_command_writes_one_table_three_times(tmp_path: Path) -> None:

@@ -64,12 +64,6 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [
-        (
-            "a.log",
-            LINES[0] + "  can0  110   [2]  01 02\n",
-            "a.log:2: expected times before the frames: candump -L, or candump -t a, got"
-            " '  can0  110   [2]",
-        ),
         ("a.log", "(1.0) can0 110#012\n", "expected a line of candump -L, such as ("),
         ("a.log", "(1.0) can0 110#010203040506070809\n", "expected a line of candump -L, "),
         (
@@ -88,37 +82,6 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         ("a.asc", "1.0 1 110 Rx d 3 01 02\n", "expected all of them, got 2 of 3 bytes"),
         ("a.asc", "1.0 1 110 Rx d 1 1FF\n", "with numbers"),
         ("a.asc", "1.0 1 900 Rx d 1 1F\n", "got id 0x900"),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d -1 01 02\n",
-            "a.asc:1: expected ..., got '1.0 1 110 Rx d -1 01 02'",
-        ),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d\n",
-            "a.asc:1: expected a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with"
-            " numbers, got '1.0 1 110 Rx d'",
-        ),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d 2 0_1 02\n",
-            "a.asc:1: expected ..., got '1.0 1 110 Rx d 2 0_1 02'",
-        ),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d \u0661 01\n",
-            "a.asc:1: expected ..., got '1.0 1 110 Rx d \u0661 01'",
-        ),
-        (
-            "a.asc",
-            "1.0 CANFD 1 Rx 110 1 0 2 ² 01 02 0 0 0\n",
-            "a.asc:1: expected ..., got '1.0 CANFD 1",
-        ),
-        (
-            "a.asc",
-            "1.0 CANFD 1 Rx 110 1 0 2 2 01 02 0 0 zz\n",
-            "a.asc:1: expected ..., got '1.0 CANFD 1",
-        ),
         (
             "a.csv",
             "time;id;value\n",
@@ -140,8 +103,25 @@ def test_what_is_no_log_is_reported_with_its_place(
     tmp_path: Path, name: str, content: str, text: str
 ) -> None:
     message = error_of(log(tmp_path, content, name=name))
-    assert all(part in message for part in text.split("..."))
+    assert text in message
     assert str(tmp_path / name) in message
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "1.0 1 110 Rx d -1 01 02",
+        "1.0 1 110 Rx d",
+        "1.0 1 110 Rx d 2 0_1 02",
+        "1.0 1 110 Rx d \u0661 01",
+        "1.0 CANFD 1 Rx 110 1 0 2 ² 01 02 0 0 0",
+        "1.0 CANFD 1 Rx 110 1 0 2 2 01 02 0 0 zz",
+    ],
+)
+def test_a_line_of_asc_with_what_is_no_number(tmp_path: Path, line: str) -> None:
+    expected = "expected a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with numbers"
+    message = error_of(log(tmp_path, line, "\n", name="a.asc"))
+    assert message == f"{tmp_path / 'a.asc'}:1: {expected}, got {line!r}"
 
 
 @pytest.mark.parametrize(
@@ -171,30 +151,20 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     assert f"{says}Is a directory" in error_of(tmp_path / "x.log")
 
 
+IMPOSSIBLE = "frame 1: expected a data frame, got other frames only: 1 impossible"
+
+
 @pytest.mark.parametrize(
     ("at", "value", "text"),
     [
-        (
-            8,
-            bytes(4),
-            "expected a BLF log that is whole, got ValueError an object of 0 bytes",
-        ),  # its length
         (
             24,
             b"\xff" * 8,
             "frame 1: expected a date before 2286, or a time from the start of the log, got a time"
             " further than 10000000000 s",
         ),  # ns
-        (
-            36,
-            b"\x00\x08\x00\x00",
-            "frame 1: expected a data frame, got other frames only: 1 impossible",
-        ),
-        (
-            45,
-            b"\x00",
-            "frame 1: expected a data frame, got other frames only: 1 impossible",
-        ),  # flags of FD
+        (36, b"\x00\x08\x00\x00", IMPOSSIBLE),
+        (45, b"\x00", IMPOSSIBLE),  # flags of FD
     ],
 )
 def test_a_damaged_object_of_a_blf(tmp_path: Path, at: int, value: bytes, text: str) -> None:

@@ -3,31 +3,24 @@ import math
 import random
 import subprocess
 import sys
-from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 
 from canshaper.report.metrics import AxisMetrics, compare, report_dict
 from canshaper_sim.recording import AxisTrace, Recording
-
-HandMade = Callable[..., Recording]
-Signal = Callable[[float], float]
-
-
-def zero(_t: float) -> float:
-    return 0.0
+from tests.report.drives import Signal, sampled, zero
 
 
 def stroke(t: float) -> float:
     return 1.0 if 1.0 <= t < 4.0 else 0.0
 
 
-def one_axis(hand_made: HandMade, sway: Signal) -> Recording:
-    return hand_made(12.0, near_far=(stroke, stroke, stroke, sway))
+def one_axis(sway: Signal) -> Recording:
+    return sampled(12.0, near_far=(stroke, stroke, stroke, sway))
 
 
-def test_compare_known_reductions_over_different_time_bases(hand_made: HandMade) -> None:
+def test_compare_known_reductions_over_different_time_bases() -> None:
     def drive(late_s: float, scale: float, duration_s: float, dt_s: float) -> Recording:
         def joystick(t: float) -> float:
             return stroke(t - late_s + 1e-9)
@@ -38,7 +31,7 @@ def test_compare_known_reductions_over_different_time_bases(hand_made: HandMade)
 
         lost = frozenset(range(7, 2000, 53))
         axes = {"near_far": (joystick, joystick, joystick, sway), "lift": (zero, zero, zero, None)}
-        return hand_made(duration_s, dt_s=dt_s, drop=lost, **axes)
+        return sampled(duration_s, dt_s=dt_s, drop=lost, **axes)
 
     # The shaped drive was recorded earlier, longer and on a grid of its own.
     comparison = compare(drive(0.0, 1.0, 12.0, 0.02), drive(0.6, 0.25, 19.0, 0.0203))
@@ -52,13 +45,11 @@ def test_compare_known_reductions_over_different_time_bases(hand_made: HandMade)
     assert lift.raw == AxisMetrics(*[None] * 11)
 
 
-def test_a_swing_of_nothing_has_no_reduction_and_a_worse_one_is_negative(
-    hand_made: HandMade,
-) -> None:
-    still, calm = one_axis(hand_made, zero), one_axis(hand_made, lambda t: 0.01 * (t > 4.0))
+def test_a_swing_of_nothing_has_no_reduction_and_a_worse_one_is_negative() -> None:
+    still, calm = one_axis(zero), one_axis(lambda t: 0.01 * (t > 4.0))
     assert compare(calm, still)["near_far"].peak_reduction_pct is None
-    small = one_axis(hand_made, lambda t: 1.0 * (t > 4.0))
-    large = one_axis(hand_made, lambda t: 3.0 * (t > 4.0))
+    small = one_axis(lambda t: 1.0 * (t > 4.0))
+    large = one_axis(lambda t: 3.0 * (t > 4.0))
     assert compare(small, large)["near_far"].residual_reduction_pct == pytest.approx(-200.0)
 
 
@@ -115,10 +106,10 @@ def test_no_drive_gives_nan_or_fails() -> None:
             assert axis["peak_reduction_pct"] in (None, 0.0)
 
 
-def test_drives_that_cannot_be_compared(hand_made: HandMade) -> None:
+def test_drives_that_cannot_be_compared() -> None:
     quiet = (zero, zero, zero, zero)
     with pytest.raises(ValueError, match="different axes"):
-        compare(hand_made(1.0, slew=quiet), hand_made(1.0, near_far=quiet))
+        compare(sampled(1.0, slew=quiet), sampled(1.0, near_far=quiet))
     empty = Recording([], {"slew": AxisTrace([], [], [], [])})
     with pytest.raises(ValueError, match="without samples"):
         compare(empty, empty)

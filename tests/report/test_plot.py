@@ -1,6 +1,5 @@
 import math
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from canshaper.report.metrics import report_dict
 from canshaper.report.plot import figure, gain_and_price
 from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, save, stamp
 from canshaper_sim.recording import CraneTrace, Recording
+from tests.report.drives import sampled, zero
 
 Pair = tuple[Recording, Recording]
 
@@ -167,14 +167,12 @@ def test_nothing_drawn_leaves_the_picture(pair: Pair, seen: Pair, *, known: bool
         assert box.y1 <= frame.y1
 
 
-def test_without_a_residual_window_the_peak_is_reported(
-    hand_made: Callable[..., Recording], tmp_path: Path
-) -> None:
+def test_without_a_residual_window_the_peak_is_reported(tmp_path: Path) -> None:
     def joystick(t: float) -> float:
         return 1.0 if 0.5 <= t < 1.5 else 0.0
 
     def drive(swing: float) -> Recording:
-        return hand_made(2.0, slew=(joystick, joystick, joystick, lambda t: swing * (t > 1.0)))
+        return sampled(2.0, slew=(joystick, joystick, joystick, lambda t: swing * (t > 1.0)))
 
     raw, shaped = drive(-8.0), drive(2.0)
     report = report_dict(raw, shaped, transport="vcan0", missed_deadlines=0)
@@ -183,16 +181,11 @@ def test_without_a_residual_window_the_peak_is_reported(
     assert not fig.texts, "no shade, no word of it"
 
 
-def test_a_still_crane_can_be_drawn_and_one_without_sway_cannot(
-    hand_made: Callable[..., Recording],
-) -> None:
-    def zero(_t: float) -> float:
-        return 0.0
-
-    still = hand_made(1.0, slew=(zero, zero, zero, zero))
+def test_a_still_crane_can_be_drawn_and_one_without_sway_cannot() -> None:
+    still = sampled(1.0, slew=(zero, zero, zero, zero))
     report = report_dict(still, still, transport="vcan0", missed_deadlines=0)
     assert titles(figure(still, still, report))
-    lift = hand_made(1.0, lift=(zero, zero, zero, None))
+    lift = sampled(1.0, lift=(zero, zero, zero, None))
     report = report_dict(lift, lift, transport="vcan0", missed_deadlines=0)
     with pytest.raises(ValueError, match="no axis of the drives has sway"):
         figure(lift, lift, report)

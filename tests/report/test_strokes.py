@@ -1,32 +1,18 @@
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.report.metrics import axis_metrics
 from canshaper.report.strokes import aligned, find_strokes, residual_windows
 from canshaper_sim.recording import Recording
-
-HandMade = Callable[..., Recording]
-Signal = Callable[[float], float]
+from tests.report.drives import Signal, held, sampled, zero
 
 
-def zero(_t: float) -> float:
-    return 0.0
-
-
-def held(*strokes: tuple[float, float, float]) -> Signal:
-    return lambda t: next((v for on, off, v in strokes if on - 1e-9 <= t < off - 1e-9), 0.0)
-
-
-def drive(
-    hand_made: HandMade, duration_s: float = 12.0, dt_s: float = 0.02, **joysticks: Signal
-) -> Recording:
+def pressed(duration_s: float = 12.0, dt_s: float = 0.02, **joysticks: Signal) -> Recording:
     axes = {name: (joystick, joystick, joystick, zero) for name, joystick in joysticks.items()}
-    return hand_made(duration_s, dt_s=dt_s, **axes)
+    return sampled(duration_s, dt_s=dt_s, **axes)
 
 
-def test_strokes_have_press_release_direction_and_level(hand_made: HandMade) -> None:
-    recording = drive(hand_made, slew=held((1.0, 2.0, 0.4), (3.0, 4.0, -0.8), (4.0, 5.0, 1.0)))
+def test_strokes_have_press_release_direction_and_level() -> None:
+    recording = pressed(slew=held((1.0, 2.0, 0.4), (3.0, 4.0, -0.8), (4.0, 5.0, 1.0)))
     strokes = find_strokes(recording)["slew"]
     times = [(recording.t_s[s.press], recording.t_s[s.release or 0]) for s in strokes]
     assert times == [pytest.approx(pair) for pair in ((1.0, 2.0), (3.0, 4.0), (4.0, 5.0))]
@@ -35,41 +21,35 @@ def test_strokes_have_press_release_direction_and_level(hand_made: HandMade) -> 
     assert [bool(s.rest) for s in strokes] == [True, False, True]
 
 
-def test_a_joystick_in_the_neutral_band_is_released(hand_made: HandMade) -> None:
-    assert find_strokes(drive(hand_made, slew=lambda t: 0.02))["slew"] == []
-    (stroke,) = find_strokes(drive(hand_made, slew=lambda t: 0.03))["slew"]
+def test_a_joystick_in_the_neutral_band_is_released() -> None:
+    assert find_strokes(pressed(slew=lambda t: 0.02))["slew"] == []
+    (stroke,) = find_strokes(pressed(slew=lambda t: 0.03))["slew"]
     assert stroke.release is None
     assert not stroke.rest
 
 
-def test_the_plateau_is_where_the_joystick_is_held_longest_near_its_largest_deflection(
-    hand_made: HandMade,
-) -> None:
+def test_the_plateau_is_where_the_joystick_is_held_longest_near_its_largest_deflection() -> None:
     joystick = held((1.0, 1.2, 1.0), (1.2, 2.0, 0.5), (2.0, 4.0, 0.97), (4.0, 5.0, 0.3))
-    recording = drive(hand_made, slew=joystick)
+    recording = pressed(slew=joystick)
     (stroke,) = find_strokes(recording)["slew"]
     first, last = stroke.plateau
     assert (recording.t_s[first], recording.t_s[last]) == pytest.approx((2.0, 3.98))
     assert stroke.level == 0.97
 
 
-def test_a_rest_ends_when_another_joystick_is_released(hand_made: HandMade) -> None:
+def test_a_rest_ends_when_another_joystick_is_released() -> None:
     near_far, slew = held((1.0, 4.0, 1.0)), held((0.5, 6.0, 1.0))
     # Letting go of slew makes the two-axis motion move near-far: not a re-rise of its own stop.
     sent = held((1.0, 4.0, 1.0), (4.0, 4.5, 0.5), (6.2, 7.0, 0.2))
-    recording = hand_made(
-        12.0, near_far=(near_far, sent, sent, zero), slew=(slew, slew, slew, zero)
-    )
+    recording = sampled(12.0, near_far=(near_far, sent, sent, zero), slew=(slew, slew, slew, zero))
     (stroke,) = find_strokes(recording)["near_far"]
     assert recording.t_s[stroke.rest[-1]] == pytest.approx(5.98)
     assert not stroke.alone
     assert axis_metrics(recording, "near_far").re_rise == 0.0
 
 
-def test_residual_windows_begin_after_the_dwell_and_end_at_the_next_move(
-    hand_made: HandMade,
-) -> None:
-    recording = drive(hand_made, slew=held((1.0, 3.0, 1.0)), lift=held((8.0, 9.0, 1.0)))
+def test_residual_windows_begin_after_the_dwell_and_end_at_the_next_move() -> None:
+    recording = pressed(slew=held((1.0, 3.0, 1.0)), lift=held((8.0, 9.0, 1.0)))
     strokes = find_strokes(recording)
     (window,) = residual_windows(recording, strokes["slew"])
     assert recording.t_s[window[0]] == pytest.approx(5.5)
@@ -77,9 +57,9 @@ def test_residual_windows_begin_after_the_dwell_and_end_at_the_next_move(
     assert residual_windows(recording, strokes["lift"]) == []  # 0.5 s to the end
 
 
-def test_aligned_drives_press_at_the_same_time_and_cover_the_same_span(hand_made: HandMade) -> None:
-    raw = drive(hand_made, 12.0, slew=held((1.0, 3.0, 1.0)))
-    shaped = drive(hand_made, 19.0, 0.0203, slew=held((1.6, 3.6, 1.0)))
+def test_aligned_drives_press_at_the_same_time_and_cover_the_same_span() -> None:
+    raw = pressed(12.0, slew=held((1.0, 3.0, 1.0)))
+    shaped = pressed(19.0, 0.0203, slew=held((1.6, 3.6, 1.0)))
     a, b = aligned(raw, shaped)
     starts = [d.t_s[find_strokes(d)["slew"][0].press] for d in (a, b)]
     assert starts == pytest.approx([1.0, 1.0], abs=1e-6)
@@ -89,6 +69,6 @@ def test_aligned_drives_press_at_the_same_time_and_cover_the_same_span(hand_made
         assert len(d.axes["slew"].joystick) == len(d.axes["slew"].sway_deg or []) == len(d.t_s)
 
 
-def test_drives_without_a_press_are_aligned_by_their_starts(hand_made: HandMade) -> None:
-    a, b = aligned(drive(hand_made, 3.0, slew=zero), drive(hand_made, 2.0, slew=zero))
+def test_drives_without_a_press_are_aligned_by_their_starts() -> None:
+    a, b = aligned(pressed(3.0, slew=zero), pressed(2.0, slew=zero))
     assert a.t_s == pytest.approx(b.t_s)

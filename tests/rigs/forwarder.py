@@ -101,7 +101,7 @@ class Rig:
 
 def command(rig: Rig) -> float:
     """Command of the operator for slew."""
-    return rig.controller.axes["slew"].axis.command
+    return rig.controller.axes["slew"].axis.demand
 
 
 def velocity(sent: dict[str, dict[str, Any]]) -> float:

@@ -163,14 +163,14 @@ class Setup:
             axis.tick(CommandInput(command=round(1000.0 * command) / 1000.0, enabled=True))
             drive.time_s.append(state.time_s)
             drive.swing_deg.append(math.degrees(state.theta6_rad))
-            drive.sent.append(axis.sent)
+            drive.sent.append(axis.output.setpoint)
             drive.speed.append(state.radius_rate_m_s)
             drive.radius_m.append(state.radius_m)
             drive.trust.append(sensed.state if sensed else Trust.NO_DATA)
             if log:
-                swing_on(log, crane, axis.raw / STEPS)
+                swing_on(log, crane, axis.output.steps / STEPS)
             else:
-                crane.step(TICK_S, {"near_far": axis.raw / STEPS})
+                crane.step(TICK_S, {"near_far": axis.output.steps / STEPS})
         return drive
 
     def _crane(self) -> Crane:

@@ -44,8 +44,8 @@ class Drive:
 
     def tick(self, joystick: CommandInput) -> Transition | None:
         transition = self.axis.tick(joystick)
-        self.raw.append(self.axis.raw)
-        self.sent.append(self.axis.sent)
+        self.raw.append(self.axis.output.steps)
+        self.sent.append(self.axis.output.setpoint)
         return transition
 
     def run(self, joystick: CommandInput, duration_s: float) -> list[Transition]:
@@ -62,7 +62,7 @@ class Drive:
         """Half a second of a held joystick from rest."""
         self.to_ready().run(CommandInput(command, bypass=bypass), 0.5)
         assert self.state is (State.BYPASS_ON if bypass else State.ACTIVE)
-        assert self.axis.raw != 0
+        assert self.axis.output.steps != 0
         return self
 
 

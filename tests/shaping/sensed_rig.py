@@ -44,9 +44,9 @@ class Rig:
             shown = self.angle if value == math.inf else value
             self.sensed.measure(shown, SCALE, commanded=self.axis.output.commanded, damps=damps)
             joystick = CommandInput(command=self.command, enabled=True)
-            self.axis.act(joystick, 0.0, damps=damps)
-            self.axis.advance()
-            self.real.step(self.axis.sent)
+            self.axis.command(joystick, 0.0, damps=damps)
+            self.axis.propagate()
+            self.real.step(self.axis.output.setpoint)
             self.real.rate += TICK_S * self.push
         return self
 

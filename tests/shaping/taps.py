@@ -55,5 +55,5 @@ def tapped(axis: ShapedAxis, level: float, duration_s: float, rest_s: float = 3.
     sent = []
     for tick in range(held + round(rest_s / TICK_S)):
         axis.tick(CommandInput(level if tick < held else 0.0))
-        sent.append(axis.sent)
+        sent.append(axis.output.setpoint)
     return sent

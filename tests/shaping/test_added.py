@@ -3,10 +3,10 @@
 import pytest
 
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.motion import range_with_added
 from canshaper.shaping.moving_axis import UNATTENDED_TICKS, AddedTime
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.states import CommandInput, Reason, State
+from canshaper.shaping.two_axis_motion import range_with_added
 from tests.shaping.added_pair import SLACK, TICK_S, pair
 
 
@@ -95,10 +95,10 @@ def test_time_is_used_up_in_the_bypass_too() -> None:
         axis.tick(CommandInput(), 0.2)
     for _ in range(3):
         axis.tick(CommandInput(bypass=True), 0.2)
-        assert axis.sent
-    before = axis.sent
+        assert axis.output.setpoint
+    before = axis.output.setpoint
     axis.tick(CommandInput(), 0.2)
-    assert axis.sent < before
+    assert axis.output.setpoint < before
 
 
 def test_when_the_time_is_over_it_falls_and_rests() -> None:
@@ -109,7 +109,7 @@ def test_when_the_time_is_over_it_falls_and_rests() -> None:
     sent = []
     for _ in range(4):
         axis.tick(CommandInput(), 0.2)
-        sent.append(round(axis.sent, 3))
+        sent.append(round(axis.output.setpoint, 3))
     assert sent == [0.1, 0.0, 0.0, 0.0]
 
 
@@ -119,7 +119,7 @@ def test_missed_ticks_use_up_time() -> None:
     axis.hold(29)
     axis.tick(CommandInput(), 0.2)
     axis.tick(CommandInput(), 0.2)
-    assert axis.raw == 0
+    assert axis.output.steps == 0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -130,15 +130,15 @@ def test_a_joystick_that_is_pushed_the_other_way_ends_it_by_the_rate(
     axis, _ = pair(OutputLimits(fall_per_s=fall_per_s))
     for _ in range(10):
         axis.tick(CommandInput(), -sign * 0.2)
-    assert sign * axis.sent < -0.19
+    assert sign * axis.output.setpoint < -0.19
     left = 0.2
     for _ in range(20):
         axis.tick(CommandInput(sign * 0.1), -sign * 0.2)
         left = max(0.0, left - fall_per_s * TICK_S)
-        assert sign * axis.sent == pytest.approx(-left, abs=SLACK)
+        assert sign * axis.output.setpoint == pytest.approx(-left, abs=SLACK)
     for _ in range(5):
         axis.tick(CommandInput(sign * 0.5), -sign * 0.2)
-    assert sign * axis.sent == pytest.approx(0.3, abs=0.02)
+    assert sign * axis.output.setpoint == pytest.approx(0.3, abs=0.02)
     assert sign * axis.output.applied == pytest.approx(0.5, abs=0.02)
 
 
@@ -147,7 +147,7 @@ def test_what_is_cut_of_the_sum_is_cut_from_the_own_part() -> None:
     axis, _ = pair(OutputLimits())
     for _ in range(10):
         axis.tick(CommandInput(0.1), -0.2)
-    assert axis.sent == 0.0
+    assert axis.output.setpoint == 0.0
     assert axis.output.applied == pytest.approx(0.2)
 
 
@@ -157,15 +157,15 @@ def test_it_makes_no_axis_faster_than_its_operator_asks(sign: float) -> None:
     for _ in range(10):
         axis.tick(CommandInput(sign * 0.3), sign * 0.2)
         plain.tick(CommandInput(sign * 0.3))
-    assert sign * plain.sent == pytest.approx(0.15, abs=SLACK)
-    assert sign * axis.sent == pytest.approx(0.3, abs=SLACK)
+    assert sign * plain.output.setpoint == pytest.approx(0.15, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(0.3, abs=SLACK)
 
 
 def test_the_time_that_is_given_back_moves_it_again() -> None:
     axis, _ = pair(OutputLimits(fall_per_s=10.0))
     for _ in range(40):
         axis.tick(CommandInput(), 0.2)
-    assert axis.raw == 0
+    assert axis.output.steps == 0
     axis.added_time.renew()
     axis.tick(CommandInput(), 0.2)
-    assert axis.raw
+    assert axis.output.steps

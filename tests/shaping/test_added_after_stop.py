@@ -38,14 +38,14 @@ def test_in_the_direction_of_the_demand_no_faster_until_the_tail_is_over(
     axis = stopped(sign, stop)
     for _ in range(TAIL - 4):
         axis.tick(CommandInput(), sign * 0.5)
-        assert sign * axis.sent <= DEMAND + SLACK
-    assert sign * axis.sent == pytest.approx(DEMAND, abs=2 * SLACK)
+        assert sign * axis.output.setpoint <= DEMAND + SLACK
+    assert sign * axis.output.setpoint == pytest.approx(DEMAND, abs=2 * SLACK)
     axis.tick(CommandInput(), sign * 0.5)
-    assert sign * axis.sent > DEMAND + SLACK
+    assert sign * axis.output.setpoint > DEMAND + SLACK
     for _ in range(5):
         axis.tick(CommandInput(), sign * 0.5)
-        assert sign * axis.sent <= LARGEST + SLACK
-    assert sign * axis.sent == pytest.approx(LARGEST, abs=2 * SLACK)
+        assert sign * axis.output.setpoint <= LARGEST + SLACK
+    assert sign * axis.output.setpoint == pytest.approx(LARGEST, abs=2 * SLACK)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -54,14 +54,14 @@ def test_in_the_other_direction_up_to_the_largest_at_once(sign: float, stop: Com
     axis = stopped(sign, stop)
     for _ in range(5):
         axis.tick(CommandInput(), sign * -0.5)
-    assert sign * axis.sent == pytest.approx(-LARGEST, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(-LARGEST, abs=SLACK)
 
 
 def test_missed_ticks_count_towards_the_tail() -> None:
     axis = stopped(1.0, TRIP)
     axis.hold(TAIL)
     axis.tick(CommandInput(), 0.5)
-    assert axis.sent > DEMAND + SLACK
+    assert axis.output.setpoint > DEMAND + SLACK
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -74,11 +74,11 @@ def test_after_a_bypass_in_neutral_the_slower_of_both_counts(sign: float, demand
         axis.tick(joystick)
     for _ in range(20):
         axis.tick(CommandInput(), sign * 0.8)
-    assert sign * axis.sent == pytest.approx(min(demand, LARGEST), abs=2 * SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(min(demand, LARGEST), abs=2 * SLACK)
     axis.tick(CommandInput(sign * 0.05), sign * 0.8)
     for _ in range(5):
         axis.tick(CommandInput(sign * 0.05), sign * 0.8)
-    assert sign * axis.sent == pytest.approx(0.05, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(0.05, abs=SLACK)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -89,11 +89,11 @@ def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
     axis.tick(CommandInput())
     for _ in range(30):
         axis.tick(CommandInput(), sign * 0.2)
-    assert axis.raw == 0
+    assert axis.output.steps == 0
     for _ in range(5):
         axis.hold(2)
         axis.tick(CommandInput(), sign * 0.2)
-        assert axis.raw == 0
+        assert axis.output.steps == 0
 
 
 def test_missed_ticks_of_an_axis_that_stands_use_up_no_time() -> None:
@@ -104,7 +104,7 @@ def test_missed_ticks_of_an_axis_that_stands_use_up_no_time() -> None:
     axis.tick(CommandInput())
     for _ in range(3):
         axis.tick(CommandInput(), 0.001)
-    assert (axis.state, axis.raw) == (State.ACTIVE, 0)
+    assert (axis.state, axis.output.steps) == (State.ACTIVE, 0)
     axis.hold(20)
     axis.tick(CommandInput(), 0.2)
-    assert axis.raw
+    assert axis.output.steps

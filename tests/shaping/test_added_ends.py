@@ -22,20 +22,20 @@ def test_who_adds_and_loses_the_right_to_leaves_nothing(
         axis.tick(CommandInput(sign * command))
     for _ in range(6):
         axis.tick(CommandInput(sign * command), sign * 0.2)
-    assert sign * axis.sent == pytest.approx(left + 0.2, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(left + 0.2, abs=SLACK)
     axis.drop_added()
     axis.tick(CommandInput(sign * command))
-    assert sign * axis.sent == pytest.approx(left, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(left, abs=SLACK)
 
 
 def test_what_was_added_against_the_own_part_ends_by_the_rates() -> None:
     axis, _ = pair(OutputLimits(rise_per_s=1.0))
     for _ in range(20):
         axis.tick(CommandInput(0.5), -0.2)
-    assert axis.sent == pytest.approx(0.3, abs=SLACK)
+    assert axis.output.setpoint == pytest.approx(0.3, abs=SLACK)
     axis.drop_added()
     axis.tick(CommandInput(0.5))
-    assert axis.sent == pytest.approx(0.35, abs=SLACK)
+    assert axis.output.setpoint == pytest.approx(0.35, abs=SLACK)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -49,13 +49,13 @@ def test_what_was_added_beyond_the_own_part_stops_before_the_own_part_begins(sig
             axis.tick(CommandInput(sign * command))
     for _ in range(20):
         axis.tick(CommandInput(), -sign)
-    assert sign * axis.sent < -0.5
+    assert sign * axis.output.setpoint < -0.5
     assert sign * axis._stage._own_ramp > 0.1
     axis.drop_added()
     seen = []
     for _ in range(3):
         axis.tick(CommandInput())
-        seen.append(sign * axis.sent)
+        seen.append(sign * axis.output.setpoint)
     assert seen == pytest.approx([0.0, 0.05, 0.1], abs=SLACK)
 
 
@@ -70,19 +70,19 @@ def test_what_was_added_to_an_own_part_that_turns_ends_before_the_other_side(sig
     for _ in range(27):
         axis.tick(CommandInput(), -sign * 0.1)
     assert sign * axis._stage._own_ramp == pytest.approx(-0.04)
-    assert sign * axis.sent == pytest.approx(-0.14, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(-0.14, abs=SLACK)
     axis.drop_added()
     axis.tick(CommandInput())
-    assert axis.sent == 0.0
+    assert axis.output.setpoint == 0.0
     axis.tick(CommandInput())
-    assert sign * axis.sent == pytest.approx(0.05, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(0.05, abs=SLACK)
 
 
 def test_an_axis_at_rest_has_nothing_to_drop() -> None:
     axis, _ = pair(OutputLimits())
     axis.drop_added()
     axis.tick(CommandInput())
-    assert (axis.state, axis.raw) == (State.READY, 0)
+    assert (axis.state, axis.output.steps) == (State.READY, 0)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -92,7 +92,7 @@ def test_a_command_after_what_was_added_begins_at_rest(sign: float) -> None:
         axis.tick(CommandInput(), sign * 0.2)
     axis.drop_added()
     axis.tick(CommandInput(sign * 0.5))
-    assert sign * axis.sent == pytest.approx(0.05, abs=SLACK)
+    assert sign * axis.output.setpoint == pytest.approx(0.05, abs=SLACK)
 
 
 @pytest.mark.parametrize("fault", [Reason.JOYSTICK_TIMEOUT, Reason.JOYSTICK_ERROR])
@@ -102,7 +102,7 @@ def test_what_was_added_falls_by_the_rate_when_the_joystick_is_lost(fault: Reaso
         axis.tick(CommandInput(), 0.2)
     for left in (0.1, 0.0):
         axis.tick(CommandInput(fault=fault), 0.2)
-        assert axis.sent == pytest.approx(left, abs=SLACK)
+        assert axis.output.setpoint == pytest.approx(left, abs=SLACK)
     axis.tick(CommandInput(fault=fault), 0.2)
     assert axis.state is State.NEUTRAL_WAIT
 
@@ -112,10 +112,10 @@ def test_nor_while_it_falls_already() -> None:
     for _ in range(10):
         axis.tick(CommandInput(), 0.2)
     axis.tick(CommandInput())
-    assert axis.sent == pytest.approx(0.19, abs=SLACK)
+    assert axis.output.setpoint == pytest.approx(0.19, abs=SLACK)
     axis.drop_added()
     axis.tick(CommandInput())
-    assert axis.sent == 0.0
+    assert axis.output.setpoint == 0.0
 
 
 def test_nor_what_rounding_has_left_out() -> None:
@@ -127,7 +127,7 @@ def test_nor_what_rounding_has_left_out() -> None:
         axis.tick(CommandInput(0.3))
     axis.drop_added()
     axis.tick(CommandInput(0.3), 0.001)
-    assert axis.sent == pytest.approx(0.3)
+    assert axis.output.setpoint == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -139,13 +139,13 @@ def test_what_falls_is_rounded_to_the_side_of_rest(sign: float) -> None:
         axis.tick(CommandInput(), sign * 0.2)
     for _ in range(40):
         axis.tick(CommandInput())
-        assert 0.0 <= sign * axis.sent <= sign * axis._stage.ramp + 1e-12
+        assert 0.0 <= sign * axis.output.setpoint <= sign * axis._stage.ramp + 1e-12
 
 
 def test_with_anti_sway_off_nothing_that_is_added_begins_a_motion() -> None:
     axis, _ = pair(OutputLimits())
     axis.tick(CommandInput(bypass=True), 0.2)
-    assert (axis.state, axis.raw) == (State.READY, 0)
+    assert (axis.state, axis.output.steps) == (State.READY, 0)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -157,5 +157,5 @@ def test_a_shaped_stop_is_that_of_an_axis_to_which_nothing_is_added(sign: float)
     for _ in range(12):
         for one in (axis, plain):
             one.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
-        assert (axis.state, axis.sent) == (plain.state, plain.sent)
-    assert plain.sent == 0.0
+        assert (axis.state, axis.output.setpoint) == (plain.state, plain.output.setpoint)
+    assert plain.output.setpoint == 0.0

@@ -33,8 +33,8 @@ def test_the_first_move_takes_two_ticks_of_a_centred_joystick(drive: Drive) -> N
         State.NEUTRAL_WAIT, State.READY, Reason.JOYSTICK_NEUTRAL
     )
     assert drive.tick(PUSHED) == Transition(State.READY, State.ACTIVE, Reason.JOYSTICK_MOVED)
-    assert drive.axis.raw > 0
-    assert drive.axis.command == 0.8
+    assert drive.axis.output.steps > 0
+    assert drive.axis.demand == 0.8
 
 
 @pytest.mark.parametrize("fault", LOST)
@@ -48,7 +48,7 @@ def test_a_joystick_that_is_not_valid_moves_nothing(drive: Drive, fault: Reason)
 def test_a_reversal_within_the_run_on_goes_on_at_once(drive: Drive) -> None:
     drive.moving(0.8).run(CENTRED, 0.1)
     assert drive.run(CommandInput(-0.8), 1.5) == []
-    assert drive.axis.sent == pytest.approx(-0.8, abs=0.1)
+    assert drive.axis.output.setpoint == pytest.approx(-0.8, abs=0.1)
 
 
 # -- stopping --------------------------------------------------------------------------------------
@@ -58,12 +58,12 @@ def test_a_reversal_within_the_run_on_goes_on_at_once(drive: Drive) -> None:
 @pytest.mark.parametrize("fault", LOST)
 def test_a_lost_joystick_gives_a_shaped_stop(drive: Drive, fault: Reason, bypass: bool) -> None:
     drive.moving(bypass=bypass)
-    moving, sent = drive.state, drive.axis.sent
+    moving, sent = drive.state, drive.axis.output.setpoint
     assert drive.tick(CommandInput(fault=fault)) == Transition(moving, State.STOPPING, fault)
-    assert sent - 0.12 < drive.axis.sent < sent  # no faster than the valve's fall
+    assert sent - 0.12 < drive.axis.output.setpoint < sent  # no faster than the valve's fall
     (done,) = drive.run(CommandInput(fault=fault), 3.0)
     assert done == Transition(State.STOPPING, State.NEUTRAL_WAIT, Reason.STOP_DONE)
-    assert drive.axis.raw == 0
+    assert drive.axis.output.steps == 0
     assert drive.axis.reason is fault
 
 
@@ -73,18 +73,18 @@ def test_a_released_enable_is_more_than_a_lost_frame(drive: Drive) -> None:
     assert drive.state is State.STOPPING
     drive.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT, enabled=False))
     assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.ENABLE_LOST)
-    assert drive.axis.raw == 0
+    assert drive.axis.output.steps == 0
 
 
 def test_a_demand_is_scaled_but_not_in_bypass(drive: Drive) -> None:
     drive.to_ready()
     drive.tick(CommandInput(0.8))
-    assert drive.axis.command == 0.8
+    assert drive.axis.demand == 0.8
     drive.axis.scale = 0.5
     drive.tick(CommandInput(0.8))
-    assert drive.axis.command == 0.4
+    assert drive.axis.demand == 0.4
     drive.tick(CommandInput(0.8, bypass=True))
-    assert drive.axis.command == 0.8
+    assert drive.axis.demand == 0.8
 
 
 @pytest.mark.parametrize("command", [0.02, -0.02])
@@ -94,7 +94,7 @@ def test_the_end_of_the_neutral_band_is_neutral(drive: Drive, command: float) ->
     assert drive.run(CommandInput(command), 1.0) == []
     drive.moving(1.0)
     drive.tick(CommandInput(command))
-    assert drive.axis.command == 0.0
+    assert drive.axis.demand == 0.0
 
 
 def test_enable_released_as_a_stop_ends_is_latched_all_the_same(drive_with: DriveWith) -> None:
@@ -104,4 +104,4 @@ def test_enable_released_as_a_stop_ends_is_latched_all_the_same(drive_with: Driv
     ]
     released = drive.tick(CommandInput(enabled=False))
     assert released == Transition(State.STOPPING, State.TRIPPED, Reason.ENABLE_LOST)
-    assert drive.axis.raw == 0
+    assert drive.axis.output.steps == 0

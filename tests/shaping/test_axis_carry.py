@@ -34,7 +34,7 @@ def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> No
     for _ in range(10):
         axis.tick(CommandInput(command), 0.2)
     axis.tick(CommandInput(command), bad)
-    assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
+    assert (axis.state, axis.reason, axis.output.steps) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
     assert axis.sway is not None
     assert (axis.sway.angle, axis.sway.rate, axis.output.applied) == (0.0, 0.0, 0.0)
     axis.tick(CommandInput(enabled=False))
@@ -42,7 +42,7 @@ def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> No
     axis.tick(CommandInput())
     axis.tick(CommandInput(), 0.2)
     assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
-    assert axis.sent > 0.1
+    assert axis.output.setpoint > 0.1
 
 
 @pytest.mark.parametrize("steps", [10, 125, 1000])
@@ -53,7 +53,7 @@ def test_a_slow_path_there_and_back_is_run_to_its_end(steps: int) -> None:
     position = 0.0
     for i in range(200):
         axis.tick(CommandInput(), 0.13 * math.sin(2.0 * math.pi * i / 200.0))
-        position += axis.sent * TICK_S
+        position += axis.output.setpoint * TICK_S
         travel.append(position)
     # a coarse grid leaves out the first and last part of either way, below half a step
     assert max(travel) == pytest.approx(0.13 * 200 * TICK_S / math.pi, rel=0.08)
@@ -64,9 +64,11 @@ def test_an_addition_below_the_valves_minimum_is_not_sent() -> None:
     axis = axis_with(OutputLimits(minimum=0.1, rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(50):
         axis.tick(CommandInput(), 0.05)
-        assert axis.raw == 0
+        assert axis.output.steps == 0
     axis.tick(CommandInput(), 0.2)
-    assert axis.sent == pytest.approx(0.2 + 1 / 125, abs=0.005)  # a step of what is carried
+    assert axis.output.setpoint == pytest.approx(
+        0.2 + 1 / 125, abs=0.005
+    )  # a step of what is carried
 
 
 def test_an_addition_of_less_than_half_a_step_is_not_sent() -> None:
@@ -74,7 +76,7 @@ def test_an_addition_of_less_than_half_a_step_is_not_sent() -> None:
     axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(50):
         axis.tick(CommandInput(), 0.003)
-        assert axis.raw == 0
+        assert axis.output.steps == 0
 
 
 @pytest.mark.parametrize(("joystick", "added"), [(1 / 3, 0.03), (-0.41, 0.0271), (0.25, -0.05)])
@@ -90,7 +92,7 @@ def test_in_the_long_run_joystick_and_addition_are_sent_in_full(
     sent = 0.0
     for _ in range(200):
         axis.tick(CommandInput(joystick), added)
-        sent += axis.sent
+        sent += axis.output.setpoint
     assert sent == pytest.approx(200 * (joystick + added), abs=0.02)
 
 
@@ -103,15 +105,15 @@ def test_what_was_carried_is_dropped_at_rest() -> None:
     for _ in range(5):
         axis.tick(CommandInput(), 0.02)
         fresh.tick(CommandInput(), 0.02)
-        assert axis.raw == fresh.raw
+        assert axis.output.steps == fresh.output.steps
 
 
 def test_a_change_of_filter_in_motion_joins_with_an_addition_too() -> None:
     axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(4):  # after that the filter brakes against its model's swing
         axis.tick(CommandInput(0.8), -0.2)
-    before = axis.sent
+    before = axis.output.setpoint
     assert before == pytest.approx(0.6)
     axis.retune(MODE, lambda model: Gff(model, (-1.5, -1.5)))
     axis.tick(CommandInput(0.8), -0.2)
-    assert axis.sent == pytest.approx(before, abs=0.01)
+    assert axis.output.setpoint == pytest.approx(before, abs=0.01)

@@ -44,7 +44,7 @@ def join(drive: Drive, what: str, after_s: float) -> tuple[float, list[float]]:
         drive.run(CommandInput(0.1, bypass=True), 0.2)
     elif what == "retune":
         drive.axis.retune(NEW_MODE, new_filter)
-    last, before = drive.axis.sent, len(drive.sent)
+    last, before = drive.axis.output.setpoint, len(drive.sent)
     drive.run(CommandInput(0.2, bypass=what == "bypass on"), 0.1)
     return last, drive.sent[before:]
 
@@ -61,7 +61,7 @@ def test_a_change_in_motion_joins_and_fades(
         assert sent[0] == pytest.approx(last, abs=2e-6)  # nothing jumps,
         steps.append(largest_step([last, *sent]))
         drive.run(CommandInput(0.2, bypass=what == "bypass on"), 12.0)
-        assert drive.axis.sent == pytest.approx(0.2, abs=1e-3)  # and nothing stays;
+        assert drive.axis.output.setpoint == pytest.approx(0.2, abs=1e-3)  # and nothing stays;
     # continuous: a quarter of the tick, about a quarter of the largest step.
     assert steps[1] < 0.35 * steps[0] + 1e-5
 
@@ -75,7 +75,7 @@ def test_the_difference_at_a_change_fades_with_its_time_constant(drive_with: Dri
     for k in range(60):
         drive.tick(CommandInput(0.8, bypass=True))
         expected = 0.8 - 0.4 * math.exp(-k * TICK_S / BLEND_S)
-        assert drive.axis.sent == pytest.approx(expected, abs=2e-6)
+        assert drive.axis.output.setpoint == pytest.approx(expected, abs=2e-6)
 
 
 def test_the_time_constant_is_the_documented_one() -> None:
@@ -87,7 +87,7 @@ def test_a_bypass_from_rest_gives_the_joystick_at_once(drive_with: DriveWith) ->
     for command in (0.8, -0.6):
         drive.to_ready().tick(CommandInput(command, bypass=True))
         assert drive.state is State.BYPASS_ON
-        assert drive.axis.sent == pytest.approx(command, abs=2e-6)
+        assert drive.axis.output.setpoint == pytest.approx(command, abs=2e-6)
         drive.run(CommandInput(bypass=True), 3.0)
 
 

@@ -92,7 +92,7 @@ def test_an_axis_without_a_sway_model_trips_too() -> None:
     axis.tick(CommandInput())
     faulty.error = ZeroDivisionError("again")
     assert axis.tick(PUSHED) == Transition(State.READY, State.TRIPPED, Reason.OUTPUT_INVALID)
-    assert axis.raw == 0
+    assert axis.output.steps == 0
 
 
 def test_a_filter_that_goes_on_raising_is_reported_once(drive_with: DriveWith) -> None:

@@ -47,13 +47,13 @@ def test_the_mirror_image_of_a_drive(limits: OutputLimits, seed: int) -> None:
     for joystick, added in busy(seed):
         changed = one.tick(joystick, added)
         assert other.tick(joystick._replace(command=-joystick.command), -added) == changed
-        assert (other.raw, other.sent, other.output.applied) == (
-            -one.raw,
-            -one.sent,
+        assert (other.output.steps, other.output.setpoint, other.output.applied) == (
+            -one.output.steps,
+            -one.output.setpoint,
             -one.output.applied,
         )
         assert (other.output.commanded, other.neutral) == (one.output.commanded, one.neutral)
-        moved.add(one.raw > 0)
+        moved.add(one.output.steps > 0)
     assert moved == {True, False}
 
 
@@ -79,7 +79,7 @@ def test_an_axis_at_rest_in_the_middle_of_its_run_on_is_not_done(sign: float) ->
     for _ in range(50):
         axis.tick(CommandInput())
         assert (axis.state, axis.output.commanded, axis.neutral) == (State.ACTIVE, True, False)
-        sent.append(axis.sent)
+        sent.append(axis.output.setpoint)
     assert sent[25] == 0.0
     assert sent[-1] == pytest.approx(0.4 * sign, abs=0.01)
     for _ in range(20):

@@ -35,7 +35,7 @@ def test_late_ticks_lengthen_neither_a_stop_nor_the_run_on(
     for joystick, bound_s in ((LOST, 0.6), (CommandInput(), 1.0)):
         drive = drive_with(Stubborn(), limits, stop_s=0.6).moving()
         ticks = 0
-        while drive.axis.raw and ticks < 200:
+        while drive.axis.output.steps and ticks < 200:
             drive.tick(joystick)
             drive.axis.hold(missed)
             ticks += 1
@@ -51,7 +51,7 @@ def test_a_coarse_frame_does_not_hold_up_a_slow_rate(drive_with: DriveWith) -> N
     limits = OutputLimits(rise_per_s=0.2, fall_per_s=1.0)
     drive = drive_with(Off(), limits, grid_steps=10).to_ready()
     drive.run(CommandInput(1.0), 5.1)
-    assert drive.axis.raw == 10
+    assert drive.axis.output.steps == 10
 
 
 def test_below_the_minimum_the_output_is_zero(drive_with: DriveWith) -> None:
@@ -59,9 +59,9 @@ def test_below_the_minimum_the_output_is_zero(drive_with: DriveWith) -> None:
     drive.run(CommandInput(0.19), 1.0)
     assert not any(drive.raw)
     drive.run(CommandInput(0.21), 1.0)
-    assert drive.axis.sent == pytest.approx(0.21, abs=0.01)
+    assert drive.axis.output.setpoint == pytest.approx(0.21, abs=0.01)
     drive.run(CommandInput(0.19), 1.0)
-    assert drive.axis.raw == 0
+    assert drive.axis.output.steps == 0
 
 
 @pytest.mark.parametrize("bypass", [False, True])
@@ -79,7 +79,7 @@ def test_a_joystick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -
                 axis.retune(new, lambda model: Gff(model, (-2.2, -2.7)))
             command = 0.0 if number < 2 else (full, -full, 0.0)[number // 100 % 3]
             axis.tick(CommandInput(command, bypass=bypass))
-            velocities.append(axis.sent)
+            velocities.append(axis.output.setpoint)
         return velocities
 
     assert sent(1.0) == sent(0.4)
@@ -94,7 +94,7 @@ def test_limits_change_in_neutral_and_hold_from_then_on() -> None:
     sent = []
     for number in range(100):
         axis.tick(CommandInput(1.0 if number < 50 else 0.0))
-        sent.append(axis.sent)
+        sent.append(axis.output.setpoint)
         if number == 10:
             with pytest.raises(ValueError, match=r"^limits change in neutral only$"):
                 axis.limit(OutputLimits())
@@ -120,10 +120,10 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
             if now % 7 == 0 and missed:
                 axis.hold(missed)
                 for _ in range(missed):
-                    truth.step(axis.sent)
+                    truth.step(axis.output.setpoint)
                 now += missed
             axis.tick(CommandInput(0.7 if now < 200 else 0.0))
-            truth.step(axis.sent)
+            truth.step(axis.output.setpoint)
             now += 1
             if now > 450:
                 largest = max(largest, abs(truth.angle))

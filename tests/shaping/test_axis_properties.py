@@ -103,7 +103,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
         """At rest after tail or stop, and the time to fall from full speed."""
         self.added = 0.0
         self.keep(CommandInput(reset=True), max(self.tail, self.stop) + self.falling + 10)
-        assert self.axis.raw == 0
+        assert self.axis.output.steps == 0
         assert self.axis.state in (State.READY, State.TRIPPED)
 
     @rule(command=joysticks, ticks=durations, then=durations)
@@ -165,7 +165,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     def tick(self) -> None:
         joystick, axis = self.joystick, self.axis
-        old, sent_before = axis.state, axis.sent
+        old, sent_before = axis.state, axis.output.setpoint
         self.usable = joystick.fault is None and joystick.trip is None and joystick.enabled
         self.centred = joystick.fault is None and abs(joystick.command) <= BAND
         adds = bool(self.setup.added) and self.usable and not joystick.bypass and old not in DEAF
@@ -173,11 +173,15 @@ class AxisUnderWatch(RuleBasedStateMachine):
         transition = axis.tick(joystick, self.added)
         if twin is not None:  # nothing that may be added to
             twin.tick(joystick)
-            assert (axis.state, axis.raw, axis.sent) == (twin.state, twin.raw, twin.sent)
-            assert axis.output.applied == twin.output.applied == axis.sent
+            assert (axis.state, axis.output.steps, axis.output.setpoint) == (
+                twin.state,
+                twin.output.steps,
+                twin.output.setpoint,
+            )
+            assert axis.output.applied == twin.output.applied == axis.output.setpoint
         self.now += 1
         self.carried = self.added if adds and axis.state is State.ACTIVE else 0.0
-        assert axis.output.applied == axis.sent - self.carried
+        assert axis.output.applied == axis.output.setpoint - self.carried
         if axis.state is State.TRIPPED and axis.reason is Reason.OUTPUT_INVALID and transition:
             self.shadow = SwayModel(self.shadow.mode, self.setup.tick_s)
         self.shadow.step(axis.output.applied)
@@ -196,19 +200,23 @@ class AxisUnderWatch(RuleBasedStateMachine):
         since = self.now - self.tail if self.axis.state in MAY_MOVE else self.now + 1
         self.commanded = [(at, c) for at, c in self.commanded if at >= since]
         self.demanded = [(at, c) for at, c in self.demanded if self.now - at <= self.tail]
-        self.mixed = bool(self.carried) or (self.mixed and self.axis.raw != 0)
+        self.mixed = bool(self.carried) or (self.mixed and self.axis.output.steps != 0)
         self.overtime = 0 if self.commanded or self.carried else self.overtime + 1
         self.armed = self.usable and (self.armed or self.centred)
 
     def check_frame(self) -> None:
         """A frame that can be sent, the velocity that it gives, and a model that knows it."""
         axis, limits, steps = self.axis, self.limits, self.setup.steps
-        assert isinstance(axis.raw, int)
-        assert abs(axis.raw) <= steps
-        assert abs(axis.sent) <= limits.maximum
-        opened = max(0.0, abs(axis.raw) / steps - limits.deadband) / (1.0 - limits.deadband)
-        assert math.isclose(axis.sent, math.copysign(opened, axis.raw), abs_tol=1e-12)
-        assert (axis.raw == 0) == (axis.sent == 0.0)
+        assert isinstance(axis.output.steps, int)
+        assert abs(axis.output.steps) <= steps
+        assert abs(axis.output.setpoint) <= limits.maximum
+        opened = max(0.0, abs(axis.output.steps) / steps - limits.deadband) / (
+            1.0 - limits.deadband
+        )
+        assert math.isclose(
+            axis.output.setpoint, math.copysign(opened, axis.output.steps), abs_tol=1e-12
+        )
+        assert (axis.output.steps == 0) == (axis.output.setpoint == 0.0)
         if axis.sway is not None:
             assert math.isfinite(axis.sway.angle)
             assert (axis.sway.angle, axis.sway.rate) == (self.shadow.angle, self.shadow.rate)
@@ -242,12 +250,12 @@ class AxisUnderWatch(RuleBasedStateMachine):
         if old is State.STOPPING and axis.state is State.NEUTRAL_WAIT:
             assert ended or before == 0.0
         driven = axis.state in DRIVEN and not self.centred
-        assert axis.command == (joystick.command if driven else 0.0)
+        assert axis.demand == (joystick.command if driven else 0.0)
 
     def check_cause(self) -> None:
         """No motion without a fresh, valid, enabled command within the bounded times."""
         joystick, axis = self.joystick, self.axis
-        if axis.raw == 0:
+        if axis.output.steps == 0:
             return
         assert axis.state in MAY_MOVE
         assert joystick.trip is None
@@ -257,7 +265,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     def check_speed(self, before: float) -> None:
         """Not faster than asked within the tail, not against the joystick, except while falling."""
-        limits, sent = self.limits, self.axis.sent
+        limits, sent = self.limits, self.axis.output.setpoint
         # Where something is added, demands count that a stop or a trip came after.
         demands = self.demanded if self.mixed else self.commanded
         most = self.setup.added if self.mixed else 0.0
@@ -267,9 +275,9 @@ class AxisUnderWatch(RuleBasedStateMachine):
             high, low = math.ceil(high), math.ceil(low)
         if limits.allow_reverse:
             high = low = max(high, low)
-        elif self.axis.state in DRIVEN and self.axis.command > 0.0:
+        elif self.axis.state in DRIVEN and self.axis.demand > 0.0:
             low = 0.0
-        elif self.axis.state in DRIVEN and self.axis.command < 0.0:
+        elif self.axis.state in DRIVEN and self.axis.demand < 0.0:
             high = 0.0
         allowed, falling = (high, before) if sent > 0.0 else (low, -before)
         # The own part falls by the rate, whatever is added; so it does where that has ended.
@@ -278,7 +286,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     def check_rate(self, old: State, before: float) -> None:
         """Rise and fall within a tick; only a trip or the end of a stop cuts off."""
-        sent, axis = self.axis.sent, self.axis
+        sent, axis = self.axis.output.setpoint, self.axis
         if axis.state not in MAY_MOVE:
             assert sent == 0.0
             assert before == 0.0 or axis.state is State.TRIPPED or old is State.STOPPING

@@ -31,5 +31,5 @@ def test_an_axis_that_has_followed_is_the_one_of_that_length(kind: str) -> None:
     for tick in range(400):
         for each in (one, other):
             each.tick(CommandInput(0.8 if 1 <= tick < 150 else 0.0))
-        assert one.sent == pytest.approx(other.sent, abs=1e-6)
+        assert one.output.setpoint == pytest.approx(other.output.setpoint, abs=1e-6)
     assert one.neutral

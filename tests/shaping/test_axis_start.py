@@ -37,8 +37,13 @@ def test_before_the_first_tick_an_axis_carries_neutral() -> None:
     """A frame may go out before the first tick: the first one sent is that of a neutral valve."""
     axis = new_axis()
     assert (axis.state, axis.reason) == (State.NEUTRAL_WAIT, Reason.START)
-    assert (axis.raw, axis.sent, axis.output.applied, axis.command) == (0, 0.0, 0.0, 0.0)
-    assert isinstance(axis.raw, int)
+    assert (axis.output.steps, axis.output.setpoint, axis.output.applied, axis.demand) == (
+        0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    assert isinstance(axis.output.steps, int)
     assert axis.output.commanded is False
     assert axis.neutral is True
     assert axis.added_time.unattended is False
@@ -60,12 +65,15 @@ def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None
     assert (axis.sway.angle, axis.sway.rate) == (0.0, 0.0)
     for joystick in [CENTRED, CENTRED, *[CommandInput(0.7)] * 60, *[CENTRED] * 60]:
         assert axis.tick(joystick) == right.tick(joystick)
-        assert (axis.raw, axis.output.applied) == (right.raw, right.output.applied)
+        assert (axis.output.steps, axis.output.applied) == (
+            right.output.steps,
+            right.output.applied,
+        )
     assert axis.sway.angle == model.angle
     waiting = new_axis()
     waiting.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))
     assert waiting.tick(CommandInput(0.5)) is None
-    assert (waiting.reason, waiting.raw) == (Reason.JOYSTICK_NOT_NEUTRAL, 0)
+    assert (waiting.reason, waiting.output.steps) == (Reason.JOYSTICK_NOT_NEUTRAL, 0)
 
 
 def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive) -> None:
@@ -92,7 +100,7 @@ def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
     for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
         axis.tick(joystick)
     stopping = 0
-    while axis.raw:
+    while axis.output.steps:
         axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
         stopping += 1
     assert stopping == round(2.0 / TICK_S) + 1
@@ -104,9 +112,9 @@ def test_a_stop_shorter_than_a_tick_is_one_tick() -> None:
     for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
         axis.tick(joystick)
     axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
-    assert (axis.state, axis.raw) == (State.STOPPING, 125)
+    assert (axis.state, axis.output.steps) == (State.STOPPING, 125)
     axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
-    assert (axis.state, axis.raw) == (State.NEUTRAL_WAIT, 0)
+    assert (axis.state, axis.output.steps) == (State.NEUTRAL_WAIT, 0)
 
 
 def test_full_speed_is_125_steps_where_nothing_else_is_said() -> None:
@@ -114,7 +122,7 @@ def test_full_speed_is_125_steps_where_nothing_else_is_said() -> None:
     axis = ShapedAxis(TICK_S, OutputLimits(), sway=None, shaper=Off())
     for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
         axis.tick(joystick)
-    assert axis.raw == 125
+    assert axis.output.steps == 125
 
 
 # -- what it says ----------------------------------------------------------------------------------
@@ -136,7 +144,7 @@ def test_full_speed_may_be_added(drive_with: DriveWith, sign: float) -> None:
     axis.allow_added(1.0, 1.0)
     axis.tick(CENTRED, sign)
     assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
-    assert axis.sent == sign
+    assert axis.output.setpoint == sign
 
 
 def test_an_axis_that_starts_latched_is_not_freed_by_an_enable_that_is_held(drive: Drive) -> None:

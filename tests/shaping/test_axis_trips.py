@@ -25,7 +25,7 @@ def test_a_released_enable_switch_is_neutral_in_the_same_tick_and_latched(
     moving = drive.state
     lost = drive.tick(CommandInput(0.8, enabled=False, bypass=bypass))
     assert lost == Transition(moving, State.TRIPPED, Reason.ENABLE_LOST)
-    assert (drive.axis.raw, drive.axis.sent, drive.axis.command) == (0, 0.0, 0.0)
+    assert (drive.axis.output.steps, drive.axis.output.setpoint, drive.axis.demand) == (0, 0.0, 0.0)
     before = len(drive.raw)
     drive.run(CommandInput(0.8, enabled=False), 1.0)
     drive.run(PUSHED, 1.0)  # the edge came with a moved joystick: it does not count
@@ -52,7 +52,11 @@ def test_a_trip_is_neutral_in_the_same_tick_from_every_state(
     assert drive.state is state
     expected = None if state is State.TRIPPED else Transition(state, State.TRIPPED, cause)
     assert drive.tick(CommandInput(0.8, trip=cause)) == expected
-    assert (drive.state, drive.axis.raw, drive.axis.sent) == (State.TRIPPED, 0, 0.0)
+    assert (drive.state, drive.axis.output.steps, drive.axis.output.setpoint) == (
+        State.TRIPPED,
+        0,
+        0.0,
+    )
 
 
 TRIP = CommandInput(trip=Reason.SEND_FAILED)
@@ -138,7 +142,7 @@ def test_a_filter_without_a_number_trips_and_can_recover(drive_with: DriveWith, 
     assert abs(drive.model.angle) > 0.0
     shaper.broken = True
     assert drive.tick(PUSHED) == Transition(State.ACTIVE, State.TRIPPED, Reason.OUTPUT_INVALID)
-    assert (drive.axis.raw, drive.axis.sent, drive.axis.command) == (0, 0.0, 0.0)
+    assert (drive.axis.output.steps, drive.axis.output.setpoint, drive.axis.demand) == (0, 0.0, 0.0)
     assert (drive.model.angle, drive.model.rate) == (0.0, 0.0)
     assert drive.run(CENTRED, 0.5) == []
     shaper.broken = False
@@ -155,7 +159,7 @@ def test_a_command_that_is_no_number_never_reaches_the_valve(
         tripped = drive.tick(CommandInput(bad))
         assert tripped == Transition(State.ACTIVE, State.TRIPPED, Reason.OUTPUT_INVALID)
         assert tripped.error.startswith(f"ValueError: command is {bad} (")
-        assert (drive.axis.raw, drive.axis.command) == (0, 0.0)
+        assert (drive.axis.output.steps, drive.axis.demand) == (0, 0.0)
         drive.tick(RESET)
         drive.moving()
 

@@ -52,7 +52,7 @@ def test_a_tap_after_it_runs_nothing_of_it(
     drive.tick(CommandInput())
     for _ in range(25):
         drive.tick(CommandInput())
-        assert drive.axis.raw == 0
+        assert drive.axis.output.steps == 0
 
 
 def test_a_motion_that_came_to_rest_costs_the_next_one_nothing(drive_with: DriveWith) -> None:
@@ -64,5 +64,5 @@ def test_a_motion_that_came_to_rest_costs_the_next_one_nothing(drive_with: Drive
     sent = []
     for _ in range(42):
         drive.tick(CommandInput())
-        sent.append(drive.axis.sent)
+        sent.append(drive.axis.output.setpoint)
     assert max(sent[10:]) > 0.3

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from canshaper.shaping.demands import EndStops, RunOn, bounds
+from canshaper.shaping.demand_bounds import EndStops, RunOn, bounds
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.fir import Fir

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.demands import FlowBudget
+from canshaper.shaping.demand_bounds import FlowBudget
 
 TICK_S = 0.02
 STILL = [0.0, 0.0, 0.0]

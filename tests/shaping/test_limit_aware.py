@@ -90,7 +90,7 @@ def test_residual_swing_where_a_limit_acts(
         for command in [0.0, *commands]:
             axis.tick(CommandInput(command))
         assert axis.state is State.READY
-        return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
+        return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.output.setpoint)
 
     bare, aware, off = (residual(kind) for kind in ("bare", "aware", "off"))
     print(f"residual: off {off:.3f}, bare ZV {bare:.4f}, limit-aware {aware:.5f}")
@@ -111,7 +111,7 @@ def test_a_slow_valve_gets_feedback_that_it_can_follow(mode: SwayMode, rate: flo
         axis = ShapedAxis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
         for command in [0.0, *REVERSAL]:
             axis.tick(CommandInput(command))
-        return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
+        return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.output.setpoint)
 
     assert residual(aware=True) < 0.8 * residual(aware=False)
 

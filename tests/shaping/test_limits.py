@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from canshaper.config.limits import Limits
 from canshaper.shaping.limits import (
     OutputLimits,
-    RecentCommand,
+    RecentDemand,
     allowed_range,
     on_grid,
     rate_limited,
@@ -199,7 +199,7 @@ def test_rounding_to_ten_steps(
 
 
 def test_before_the_first_command_nothing_was_asked() -> None:
-    recent = RecentCommand(5)
+    recent = RecentDemand(5)
     assert (recent.low, recent.high) == (0.0, 0.0)
     recent.age(3)
     assert (recent.low, recent.high) == (0.0, 0.0)
@@ -215,7 +215,7 @@ events = st.lists(
 def test_recent_command_is_the_window_seen_by_brute_force(
     happenings: list[float | int | str], ticks: int
 ) -> None:
-    recent = RecentCommand(ticks)
+    recent = RecentDemand(ticks)
     seen: list[float | None] = []  # one entry per tick, None for one without a command
     for event in happenings:
         if event == "clear":

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from canshaper.shaping.motion import TwoAxisMotion
 from canshaper.shaping.moving_axis import MOST_STEP
+from canshaper.shaping.two_axis_motion import TwoAxisMotion
 from tests.shaping.two_axes import OUT_M_S, STILL, TICK_S, Drive, slewing, stroke
 
 

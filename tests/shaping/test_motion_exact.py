@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from canshaper.shaping import motion as motion_module
-from canshaper.shaping.motion import TwoAxisMotion, farthest_m
+from canshaper.shaping import two_axis_motion
 from canshaper.shaping.moving_axis import MOST_STEP, GrapplePath, MovingAxis
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.two_axis_motion import TwoAxisMotion, farthest_m
 from tests.shaping.two_axes import NEAR_FAR, OUT_M_S, SLEW, TICK_S, TURN_RAD_S, slewing
 
 EXACT = 1e-12
@@ -172,7 +172,7 @@ def test_a_measured_radius_corrects_the_carried_one_within_a_second_and_no_farth
 def test_a_measured_radius_corrects_the_carried_one_within_the_time_constant(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(motion_module, "RADIUS_S", 2.0)
+    monkeypatch.setattr(two_axis_motion, "RADIUS_S", 2.0)
     assert carried(0.5, 3.4) == pytest.approx(moved_at(3.1), rel=0.0, abs=EXACT)
 
 

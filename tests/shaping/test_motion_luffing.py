@@ -4,12 +4,12 @@ import pytest
 
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.motion import TwoAxisMotion
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.states import CommandInput, Reason
 from canshaper.shaping.sway import SwayModel
 from canshaper.shaping.transfer import Off
+from canshaper.shaping.two_axis_motion import TwoAxisMotion
 from tests.shaping.two_axes import NEAR_FAR, TICK_S, slewing
 
 RAD_S, HEIGHT_M = 0.2, 2.0

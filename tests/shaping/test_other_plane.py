@@ -36,13 +36,13 @@ def test_it_is_damped_within_the_bound_of_what_may_be_added() -> None:
     assert swing_deg(rig) > 3.0
     for _ in range(round(2.5 / TICK_S)):
         rig.run(TICK_S, damps=True)
-        seen = max(seen, abs(rig.axis.sent))
-        assert rig.axis.output.applied == rig.axis.sent
+        seen = max(seen, abs(rig.axis.output.setpoint))
+        assert rig.axis.output.applied == rig.axis.output.setpoint
     assert 0.1 < seen <= LARGEST
     assert swing_deg(rig) < 1.0
     assert rig.sensed.state is Trust.TRUSTED
     rig.run(1.0)
-    assert (rig.axis.state, rig.axis.raw) == (State.READY, 0)
+    assert (rig.axis.state, rig.axis.output.steps) == (State.READY, 0)
 
 
 def test_it_is_not_damped_into_an_end_stop_nor_without_bounds_by_ends_that_are_far() -> None:
@@ -52,7 +52,7 @@ def test_it_is_not_damped_into_an_end_stop_nor_without_bounds_by_ends_that_are_f
         seen = []
         for _ in range(round(2.5 / TICK_S)):
             rig.run(TICK_S, damps=True)
-            seen.append(rig.axis.sent)
+            seen.append(rig.axis.output.setpoint)
         step = 1.0 / 125
         assert max(-LARGEST, bounds[0]) - step <= min(seen)
         assert max(seen) <= min(LARGEST, bounds[1]) + step
@@ -67,29 +67,29 @@ def test_not_by_a_sensor_that_is_only_watched_and_not_where_no_other_axis_makes_
     rig = swinging(Rig(damps=not damps))
     for _ in range(50):
         rig.run(TICK_S, damps=damps)
-        assert (rig.axis.state, rig.axis.raw) == (State.READY, 0)
+        assert (rig.axis.state, rig.axis.output.steps) == (State.READY, 0)
 
 
 def test_not_by_an_axis_that_has_no_sensor_or_may_not_be_added_to() -> None:
     rig = swinging(Rig())
     rig.axis.allow_added(0.0, TIME_S)
     rig.run(1.0, damps=True)
-    assert rig.axis.raw == 0
+    assert rig.axis.output.steps == 0
     rig.axis.allow_added(LARGEST, TIME_S)
     rig.axis.sensed = None
     for _ in range(20):
-        rig.axis.act(CommandInput(enabled=True), 0.0, damps=True)
-        rig.axis.advance()
-        assert rig.axis.raw == 0
+        rig.axis.command(CommandInput(enabled=True), 0.0, damps=True)
+        rig.axis.propagate()
+        assert rig.axis.output.steps == 0
 
 
 def test_for_no_longer_than_may_be_added() -> None:
     rig = swinging(Rig())
     rig.axis.allow_added(LARGEST, 0.5)
     rig.run(0.46, damps=True)
-    assert rig.axis.raw != 0
+    assert rig.axis.output.steps != 0
     rig.run(0.3, damps=True)
-    assert rig.axis.raw == 0
+    assert rig.axis.output.steps == 0
 
 
 def test_a_held_joystick_counts_alone() -> None:
@@ -98,7 +98,7 @@ def test_a_held_joystick_counts_alone() -> None:
     for _ in range(round(1.5 / TICK_S)):
         rig.run(TICK_S, damps=True)
         twin.run(TICK_S)
-        assert rig.axis.raw == twin.axis.raw
+        assert rig.axis.output.steps == twin.axis.output.steps
 
 
 def test_a_grapple_that_leans_on_something_does_not_drive_it_away() -> None:
@@ -106,7 +106,7 @@ def test_a_grapple_that_leans_on_something_does_not_drive_it_away() -> None:
     way = 0.0
     for _ in range(round(TIME_S / TICK_S)):
         rig.run(TICK_S, math.radians(6.0), damps=True)
-        way += TICK_S * rig.axis.sent
+        way += TICK_S * rig.axis.output.setpoint
     assert rig.sensed.state in (Trust.JUMP, Trust.CONTACT, Trust.STUCK)
     assert abs(way) < 0.1
 
@@ -124,7 +124,7 @@ def test_what_it_does_for_another_axis_is_no_restlessness() -> None:
 def test_unasked_for_nothing_is_damped() -> None:
     rig = swinging(Rig())
     rig.axis.tick(CommandInput(enabled=True))
-    assert rig.axis.raw == 0
+    assert rig.axis.output.steps == 0
 
 
 def test_the_path_of_the_other_axis_is_run_besides() -> None:
@@ -132,21 +132,21 @@ def test_the_path_of_the_other_axis_is_run_besides() -> None:
     for tick in range(100):  # the tip leads the grapple by the path
         angle = rig.angle + SCALE * 0.1 * TICK_S * tick
         rig.sensed.measure(angle, SCALE, commanded=False, damps=True)
-        rig.axis.act(CommandInput(enabled=True), 0.1, damps=True)
-        rig.axis.advance()
+        rig.axis.command(CommandInput(enabled=True), 0.1, damps=True)
+        rig.axis.propagate()
         rig.real.step(rig.axis.output.applied)
-    assert rig.axis.sent == pytest.approx(0.1, abs=0.03)
-    assert rig.axis.output.applied == pytest.approx(rig.axis.sent - 0.1)
+    assert rig.axis.output.setpoint == pytest.approx(0.1, abs=0.03)
+    assert rig.axis.output.applied == pytest.approx(rig.axis.output.setpoint - 0.1)
 
 
 def test_with_a_path_at_full_speed_it_is_no_error() -> None:
     rig = swinging(Rig())
     for sign in [1.0] * 30 + [-1.0] * 30:
         rig.sensed.measure(rig.angle, SCALE, commanded=False, damps=True)
-        rig.axis.act(CommandInput(enabled=True), sign, damps=True)
-        rig.axis.advance()
+        rig.axis.command(CommandInput(enabled=True), sign, damps=True)
+        rig.axis.propagate()
         rig.real.step(rig.axis.output.applied)
         assert rig.axis.state is State.ACTIVE
-        assert abs(rig.axis.sent) <= LARGEST
-    rig.axis.act(CommandInput(enabled=True), -1.1, damps=True)
+        assert abs(rig.axis.output.setpoint) <= LARGEST
+    rig.axis.command(CommandInput(enabled=True), -1.1, damps=True)
     assert rig.axis.state is State.TRIPPED

@@ -1,6 +1,7 @@
 """Every filter by its name: the one that is built is the one that was asked for."""
 
 import math
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from typing import Any
 
@@ -192,7 +193,8 @@ def test_settings_are_those_of_the_comparison_in_its_order() -> None:
 
 
 def kind_of(name: str = "notch", *parameters: Parameter) -> ShaperKind:
-    return ShaperKind(name, "", lambda _tick_s: Off(), lambda _m, _t: {name: {}}, parameters)
+    off, settings = (lambda _tick_s: Off()), (lambda _m, _t: {name: {}})
+    return ShaperKind(name, "", off, settings, parameters, runs_ahead=False)
 
 
 def number(name: str = "width_s", low: float = 1, **more: Any) -> Parameter:
@@ -252,6 +254,10 @@ def test_entry_points_add_kinds_after_the_others_in_the_order_of_their_names() -
         (ImportError("No module\nnamed x"), "ImportError: No module named x"),
         (kind_of("zv"), "ValueError: the kind 'zv' is there already"),
         (7, "ValueError: expected a ShaperKind, got a value of type int"),
+        (
+            replace(kind_of("own"), runs_ahead=None),
+            "ValueError: expected runs_ahead=True or False for the gate, got neither",
+        ),
     ],
 )
 def test_a_package_that_gives_no_kind_is_named_and_the_next_one_counts(

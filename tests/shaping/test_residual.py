@@ -80,7 +80,7 @@ def sent_by(axis: ShapedAxis, commands: list[float]) -> list[float]:
     sent = []
     for command in commands:
         axis.tick(CommandInput(command))
-        sent.append(axis.sent)
+        sent.append(axis.output.setpoint)
     assert axis.state is State.READY
     return sent
 

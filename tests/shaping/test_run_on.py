@@ -58,10 +58,10 @@ def test_it_goes_no_farther_than_the_limit(
     for tick in range(150):
         shaper.asks = after[tick // 7 % len(after)]
         axis.tick(CommandInput(fault=LATE if lost else None))
-        way += abs(axis.sent) * TICK_S
+        way += abs(axis.output.setpoint) * TICK_S
     # A tick at full speed while it rises, and the rounding of each frame.
     assert way <= LIMITS.run_on + TICK_S + 150 * TICK_S * 0.5 * STEP
-    assert axis.sent == 0.0
+    assert axis.output.setpoint == 0.0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -70,9 +70,9 @@ def test_it_reaches_the_limit_and_falls(sign: float) -> None:
     for _ in range(40):
         axis.tick(CommandInput(sign))
     seen = []
-    while axis.sent:
+    while axis.output.setpoint:
         axis.tick(CommandInput())
-        seen.append(sign * axis.sent)
+        seen.append(sign * axis.output.setpoint)
     assert sum(seen) * TICK_S == pytest.approx(0.5, abs=0.03)
     fall = 4.0 * TICK_S
     assert seen[-14:-1] == pytest.approx([1.0, *(1.0 - fall * n for n in range(1, 13))], abs=STEP)
@@ -89,7 +89,7 @@ def test_what_is_added_beyond_its_bound_counts_too(sign: float, turns: int) -> N
     sent = []
     for tick in range(140):
         axis.tick(CommandInput(), sign if tick // turns % 2 else -sign)
-        sent.append(abs(axis.sent))
+        sent.append(abs(axis.output.setpoint))
     beyond = sum(max(size - 0.25, 0.0) for size in sent) * TICK_S
     assert beyond == pytest.approx(0.5, abs=TICK_S)
     assert max(sent[-40:]) == pytest.approx(0.25, abs=STEP)
@@ -104,13 +104,13 @@ def test_a_lower_demand_bounds_what_runs_on_beyond_it(sign: float) -> None:
     beyond = 0.0
     for _ in range(200):
         axis.tick(CommandInput(sign * 0.3))
-        beyond += (sign * axis.sent - 0.3) * TICK_S
-    assert sign * axis.sent == pytest.approx(0.3, abs=STEP)
+        beyond += (sign * axis.output.setpoint - 0.3) * TICK_S
+    assert sign * axis.output.setpoint == pytest.approx(0.3, abs=STEP)
     assert beyond == pytest.approx(0.5, abs=0.03)
     way = 0.0  # and from there the whole way again
     for _ in range(99):  # the tail of what was asked first is over
         axis.tick(CommandInput())
-        way += sign * axis.sent * TICK_S
+        way += sign * axis.output.setpoint * TICK_S
     assert way == pytest.approx(0.5, abs=0.03)
 
 
@@ -122,7 +122,7 @@ def test_against_the_joystick_the_way_counts_as_in_neutral(sign: float) -> None:
     way = 0.0
     for _ in range(60):
         axis.tick(CommandInput(-sign))
-        way += sign * axis.sent * TICK_S
+        way += sign * axis.output.setpoint * TICK_S
     assert way == pytest.approx(0.5, abs=0.03)
 
 
@@ -137,7 +137,7 @@ def test_a_new_stroke_has_the_whole_way_again(sign: float) -> None:
         way = 0.0
         for _ in range(100):
             axis.tick(CommandInput())
-            way += sign * axis.sent * TICK_S
+            way += sign * axis.output.setpoint * TICK_S
         ways.append(way)
     assert ways[0] == pytest.approx(0.5, abs=0.03)
     assert ways[1] == pytest.approx(ways[0])
@@ -150,10 +150,10 @@ def test_missed_ticks_count_as_way() -> None:
     way = 0.0
     for _ in range(60):
         axis.tick(CommandInput())
-        way += axis.sent * TICK_S
+        way += axis.output.setpoint * TICK_S
         if way == pytest.approx(0.1):
             axis.hold(8)
-            way += 8 * axis.sent * TICK_S
+            way += 8 * axis.output.setpoint * TICK_S
     assert way == pytest.approx(0.5, abs=0.03)
 
 
@@ -168,7 +168,7 @@ def test_against_the_joystick_it_ends_in_time(sign: float, lost: bool, size: flo
     old = []
     for _ in range(60):
         axis.tick(CommandInput(-sign * size, fault=fault))
-        old.append(sign * axis.sent > 0.0)
+        old.append(sign * axis.output.setpoint > 0.0)
     assert old == [True] * 22 + [False] * 38  # 0.2 s, and the fall of 0.25 s
 
 
@@ -183,7 +183,7 @@ def test_a_touch_the_other_way_is_enough(sign: float, reversal_s: float) -> None
     for _ in range(round(max(reversal_s, 0.25) / TICK_S)):
         axis.tick(CommandInput())
     for _ in range(100):
-        assert axis.sent == 0.0
+        assert axis.output.setpoint == 0.0
         axis.tick(CommandInput())
 
 
@@ -194,9 +194,9 @@ def test_missed_ticks_count_as_time_against_the_joystick() -> None:
     for _ in range(5):
         axis.tick(CommandInput(-1.0))
     axis.hold(5)
-    assert axis.sent == 1.0
+    assert axis.output.setpoint == 1.0
     axis.tick(CommandInput(-1.0))
-    assert axis.sent < 1.0
+    assert axis.output.setpoint < 1.0
 
 
 def test_with_allow_reverse_the_old_direction_has_no_time() -> None:
@@ -205,7 +205,7 @@ def test_with_allow_reverse_the_old_direction_has_no_time() -> None:
         axis.tick(CommandInput(1.0))
     for _ in range(60):
         axis.tick(CommandInput(-1.0))
-    assert (axis.sent, axis.state) == (1.0, State.ACTIVE)
+    assert (axis.output.setpoint, axis.state) == (1.0, State.ACTIVE)
 
 
 @pytest.mark.parametrize("kind", ["first_order", "gff", "zv"])

@@ -61,7 +61,7 @@ def test_missed_ticks_pass_for_the_observer_too() -> None:
     rig.run(0.2)
     missing.axis.hold(10)
     for _ in range(10):
-        missing.real.step(missing.axis.sent)
+        missing.real.step(missing.axis.output.setpoint)
     missing.run(0.02)
     assert missing.sensed.state in (Trust.TRUSTED, Trust.LOST)
 
@@ -73,7 +73,7 @@ def test_it_gets_what_is_added_and_a_retune() -> None:
     for added in (0.05, -0.05):
         rig.axis.tick(CommandInput(command=0.8, enabled=True), added)
     applied, command, path = sensed.step.call_args.args
-    assert (applied, command) == (rig.axis.output.applied, rig.axis.command)
-    assert path == pytest.approx(rig.axis.sent - rig.axis.output.applied) != 0.0
+    assert (applied, command) == (rig.axis.output.applied, rig.axis.demand)
+    assert path == pytest.approx(rig.axis.output.setpoint - rig.axis.output.applied) != 0.0
     rig.axis.retune(SwayMode(2.4, 0.05), lambda sway: Gff(sway, (-5.0, -4.0)))
     sensed.retune.assert_called_once_with(rig.axis.sway)

@@ -136,16 +136,16 @@ def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
     axis.tick(CommandInput())
     for _ in range(800):
         axis.tick(CommandInput(0.8))
-    before = last = axis.sent
+    before = last = axis.output.setpoint
     assert before == pytest.approx(0.8, abs=2e-3)
     assert axis.sway is not None
     swing = math.hypot(axis.sway.angle * EMPTY.omega_rad_s, axis.sway.rate + axis.output.applied)
     axis.retune(FULL, lambda sway: make(new, sway))
     for _ in range(150):
         axis.tick(CommandInput(0.8))
-        assert abs(axis.sent - last) <= 0.02  # a fifth of the rate of the valve
-        assert axis.sent == pytest.approx(before, abs=0.005 + 2.0 * swing)
-        last = axis.sent
+        assert abs(axis.output.setpoint - last) <= 0.02  # a fifth of the rate of the valve
+        assert axis.output.setpoint == pytest.approx(before, abs=0.005 + 2.0 * swing)
+        last = axis.output.setpoint
 
 
 def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:
@@ -154,11 +154,11 @@ def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:
     axis.tick(CommandInput())
     for _ in range(40):
         axis.tick(CommandInput(0.9))
-    before = axis.sent
+    before = axis.output.setpoint
     axis.retune(EMPTY, lambda sway: make("robust", sway))
     for _ in range(8):
         axis.tick(CommandInput(0.9))
-        assert axis.sent >= before - 1e-9
+        assert axis.output.setpoint >= before - 1e-9
 
 
 def test_a_load_that_is_known_late_has_hung_there_since_the_press_began() -> None:
@@ -177,7 +177,7 @@ def test_a_load_that_is_known_late_has_hung_there_since_the_press_began() -> Non
     for command in 20 * [0.9] + 60 * [0.0]:
         late.tick(CommandInput(command))
         known.tick(CommandInput(command))
-        assert late.sent == pytest.approx(known.sent, abs=0.02)
+        assert late.output.setpoint == pytest.approx(known.output.setpoint, abs=0.02)
 
 
 def test_inherited_history_gives_the_same_output() -> None:

@@ -121,11 +121,11 @@ def test_missed_ticks_are_travelled_too(ticks: int) -> None:
     way = 0.0
     for tick in range(160):
         axis.tick(CommandInput(0.1 if tick < 10 else 0.0))
-        way += axis.sent
+        way += axis.output.setpoint
         if tick == 30:
-            assert axis.sent
+            assert axis.output.setpoint
             axis.hold(ticks)
-            way += ticks * axis.sent
+            way += ticks * axis.output.setpoint
     assert way == pytest.approx(1.0, rel=0.05)
 
 
@@ -145,7 +145,7 @@ def test_after_a_retune_nothing_is_known_until_it_rests(command: float) -> None:
     """A step is not held to the end of the tail for what another filter would have made."""
     axis = axis_with()
     tapped(axis, 0.1, 0.1, rest_s=0.2)
-    axis.command = command
+    axis.demand = command
     axis.retune(MODE, lambda sway: LimitAware(sway, Fir(zv_taps(MODE, TICK_S)), 5.0))
     sent = tapped(axis, 0.0, 0.0)
     assert not any(sent[80:])
@@ -169,7 +169,7 @@ def test_what_is_added_for_the_path_is_no_part_of_the_stroke(path: float) -> Non
     for tick in range(200):
         axis.tick(CommandInput(0.1 if tick < 5 else 0.0), path if 10 <= tick < 40 else 0.0)
         own += axis.output.applied
-        added += axis.sent - axis.output.applied
+        added += axis.output.setpoint - axis.output.applied
     assert added == pytest.approx(30 * path)
     assert own == pytest.approx(0.5, rel=0.05)
 
@@ -237,12 +237,12 @@ def test_it_is_never_faster_than_asked_nor_against_the_joystick(seed: int) -> No
         command = hand.choice([0.0, 0.0, hand.uniform(-0.3, 0.3)])
         for _ in range(hand.randint(1, 12)):
             axis.tick(CommandInput(command))
-            tail = [*tail[-25:], axis.command]
-            low = 0.0 if axis.command > 0.0 else min(0.0, *tail)
-            high = 0.0 if axis.command < 0.0 else max(0.0, *tail)
-            if not low <= axis.sent <= high:  # on its way back by the rate
-                assert abs(axis.sent) < abs(before)
-            before = axis.sent
+            tail = [*tail[-25:], axis.demand]
+            low = 0.0 if axis.demand > 0.0 else min(0.0, *tail)
+            high = 0.0 if axis.demand < 0.0 else max(0.0, *tail)
+            if not low <= axis.output.setpoint <= high:  # on its way back by the rate
+                assert abs(axis.output.setpoint) < abs(before)
+            before = axis.output.setpoint
             moved += before != 0.0
     assert moved > 50
 
@@ -275,7 +275,7 @@ def test_small_strokes_are_left_alone_only_while_swing_is_damped() -> None:
         for tick in range(len(plain)):
             axis.sensed.weight = weight
             axis.tick(CommandInput(0.1 if tick < 5 else 0.0))
-            sent[weight].append(axis.sent)
+            sent[weight].append(axis.output.setpoint)
     assert sent[0.0] == plain
     assert sent[0.5] != plain
 
@@ -286,7 +286,7 @@ def test_missed_ticks_count_and_a_retune_and_a_stop_lose_the_travel() -> None:
         axis.tick(CommandInput(0.3))
     axis._stage._small = small = Mock(wraps=axis._stage._small)
     axis.hold(5)
-    small.hold.assert_called_once_with(axis.command, axis.output.applied, 5)
+    small.hold.assert_called_once_with(axis.demand, axis.output.applied, 5)
     axis.tick(CommandInput(0.3))
     assert not small.lose.called
     axis.retune(MODE, lambda sway: Gff(sway, (-5.0, -4.0)))

@@ -34,7 +34,7 @@ def stopping(drive_with: DriveWith, sign: float, limits: OutputLimits = LIMITS) 
     shaper.repeated = sign * 0.8
     drive.run(CommandInput(sign * 0.8, fault=LATE), 0.1)
     assert drive.state is State.STOPPING
-    assert drive.axis.sent == pytest.approx(sign * 0.8, abs=0.01)
+    assert drive.axis.output.setpoint == pytest.approx(sign * 0.8, abs=0.01)
     return drive
 
 
@@ -44,12 +44,12 @@ def test_held_the_other_way_it_ends_the_run_on_by_the_fall(
     drive_with: DriveWith, sign: float, fault: Reason | None
 ) -> None:
     drive = stopping(drive_with, sign)
-    before = drive.axis.sent
+    before = drive.axis.output.setpoint
     for _ in range(11):
         drive.tick(CommandInput(sign * -0.03, fault=fault))
-        assert 0.0 <= sign * drive.axis.sent <= max(0.0, sign * before - FALL + 3 / 125)
-        before = drive.axis.sent
-    assert (drive.axis.raw, drive.state) == (0, State.NEUTRAL_WAIT)
+        assert 0.0 <= sign * drive.axis.output.setpoint <= max(0.0, sign * before - FALL + 3 / 125)
+        before = drive.axis.output.setpoint
+    assert (drive.axis.output.steps, drive.state) == (0, State.NEUTRAL_WAIT)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -64,8 +64,8 @@ def test_it_begins_no_run_on_against_a_joystick_that_is_held(
     shaper.repeated = -sign * 0.5
     for _ in range(20):
         drive.tick(CommandInput(sign * 0.8, fault=LATE))
-        assert sign * drive.axis.sent >= 0.0
-    assert drive.axis.sent == 0.0
+        assert sign * drive.axis.output.setpoint >= 0.0
+    assert drive.axis.output.setpoint == 0.0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -75,12 +75,12 @@ def test_in_the_middle_of_a_reversal_it_ends_in_neutral(drive_with: DriveWith, s
     drive = drive_with(shaper, LIMITS)
     drive.to_ready().run(CommandInput(sign * 0.8), 1.0)
     drive.run(CommandInput(-sign * 0.8), 0.1)
-    assert sign * drive.axis.sent > 0.2
+    assert sign * drive.axis.output.setpoint > 0.2
     shaper.repeated = -sign * 0.8
     for _ in range(20):
         drive.tick(CommandInput(-sign * 0.8, fault=LATE))
-        assert sign * drive.axis.sent >= 0.0
-    assert drive.axis.raw == 0
+        assert sign * drive.axis.output.setpoint >= 0.0
+    assert drive.axis.output.steps == 0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -89,7 +89,7 @@ def test_a_short_touch_is_enough(drive_with: DriveWith, sign: float) -> None:
     drive = stopping(drive_with, sign)
     drive.tick(CommandInput(sign * -1.0, fault=LATE))
     drive.run(CommandInput(fault=LATE), 10 * TICK_S)
-    assert drive.axis.raw == 0
+    assert drive.axis.output.steps == 0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -99,7 +99,7 @@ def test_held_the_same_way_or_in_neutral_it_leaves_the_run_on(
 ) -> None:
     drive = stopping(drive_with, sign)
     drive.run(CommandInput(sign * held, fault=LATE), 0.5)
-    assert drive.axis.sent == pytest.approx(sign * 0.8, abs=0.01)
+    assert drive.axis.output.setpoint == pytest.approx(sign * 0.8, abs=0.01)
 
 
 @pytest.mark.parametrize("allowed", [{"reversal_s": 1.0}, {"allow_reverse": True}])
@@ -108,7 +108,7 @@ def test_where_a_reversal_may_run_on_a_stop_may_too(
 ) -> None:
     drive = stopping(drive_with, 1.0, replace(LIMITS, **allowed))
     drive.run(CommandInput(-1.0, fault=LATE), 0.5)
-    assert drive.axis.sent == pytest.approx(0.8, abs=0.01)
+    assert drive.axis.output.setpoint == pytest.approx(0.8, abs=0.01)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -125,7 +125,7 @@ def test_held_the_same_way_it_leaves_a_run_on_that_has_yet_to_begin(
     drive = drive_with(shaper, LIMITS).to_ready()
     drive.run(CommandInput(sign * 0.8), 0.1)
     drive.run(CommandInput(sign * 0.8, fault=LATE), 0.1)
-    assert (drive.axis.raw, drive.state) == (0, State.STOPPING)
+    assert (drive.axis.output.steps, drive.state) == (0, State.STOPPING)
     shaper.output = sign * 0.8
     drive.run(CommandInput(sign * 0.8, fault=LATE), 0.5)
-    assert drive.axis.sent == pytest.approx(sign * 0.8, abs=0.01)
+    assert drive.axis.output.setpoint == pytest.approx(sign * 0.8, abs=0.01)

@@ -134,8 +134,8 @@ def test_an_axis_sends_the_command_of_its_curve_and_knows_the_speed(
     command: float, raw: int
 ) -> None:
     axis = driven(command)
-    assert axis.raw == raw
-    assert axis.sent == pytest.approx(max(command, -0.8))
+    assert axis.output.steps == raw
+    assert axis.output.setpoint == pytest.approx(max(command, -0.8))
 
 
 def test_an_added_velocity_goes_through_the_curve_too() -> None:
@@ -143,8 +143,8 @@ def test_an_added_velocity_goes_through_the_curve_too() -> None:
     axis.allow_added(0.25, 1.0)
     for command, added in [(0.5, 0.0)] * 5 + [(0.3, 0.05)] * 5:
         axis.tick(CommandInput(command), added)
-    assert axis.raw == pytest.approx(400, abs=1)
-    assert axis.sent == pytest.approx(0.35, abs=2e-3)
+    assert axis.output.steps == pytest.approx(400, abs=1)
+    assert axis.output.setpoint == pytest.approx(0.35, abs=2e-3)
 
 
 def test_rounding_never_passes_a_bound() -> None:

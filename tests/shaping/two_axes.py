@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable
 
-from canshaper.shaping.motion import TwoAxisMotion
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.shapers.fir import Fir, zv_taps
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.two_axis_motion import TwoAxisMotion
 
 SLEW, NEAR_FAR = SwayMode(2.67, 0.04), SwayMode(2.86, 0.06)
 TURN_RAD_S, OUT_M_S = 0.5, 1.0

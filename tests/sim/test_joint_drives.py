@@ -14,6 +14,7 @@ from canshaper_sim.machines import build_machine
 from canshaper_sim.operator import SCRIPTS, random_script, script_for, script_named
 from canshaper_sim.strokes import Script, Stroke
 from tests.rigs.files import CONFIG, machine_file
+from tests.rigs.swing import crane_of, last_swing
 
 TICK_S = 0.02
 
@@ -60,12 +61,8 @@ def left_deg(file: str, strokes: tuple[Stroke, ...]) -> tuple[float, float]:
     """Swing in the last 3 of 8 s after the strokes: raw, shaped."""
     deployment = load_deployment(CONFIG / file)
     script = Script("one", strokes, max(one.end_s for one in strokes) + 8.0)
-    left = []
-    for bypass in (True, False):
-        recording = drive(deployment, script, bypass=bypass)
-        assert recording.crane is not None
-        left.append(max(recording.crane.sway_deg[-150:]))
-    return left[0], left[1]
+    raw, shaped = (last_swing(drive(deployment, script, bypass=one)) for one in (True, False))
+    return raw, shaped
 
 
 def reversal(axis: str, level: float) -> tuple[Stroke, ...]:
@@ -101,8 +98,7 @@ def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
 
     def left_deg(path: Path, script: str) -> float:
         recording = drive(load_deployment(path), script_named(script, JOINT_AXES))
-        assert recording.crane is not None
-        residual_deg = crane_metrics(recording, recording.crane).residual_deg
+        residual_deg = crane_metrics(recording, crane_of(recording)).residual_deg
         assert residual_deg is not None
         return residual_deg
 

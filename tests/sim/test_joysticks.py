@@ -105,7 +105,7 @@ def test_a_controller_takes_every_frame(machine: Make, bypass: bool) -> None:
             for frame in node.frames(earlier):
                 controller.receive(frame, time_ms * 1_000_000)
         list(controller.tick(time_ms * 1_000_000))
-        states |= {runner.axis.state for runner in controller.axes.values()}
+        states |= {control.axis.state for control in controller.axes.values()}
     assert states == {State.READY, State.BYPASS_ON if bypass else State.ACTIVE}
     assert controller.counters.last_fault == 0
 

@@ -1,13 +1,12 @@
 """Which machine a deployment gets, its feedback, and its parameters by name."""
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import drive
 from canshaper.errors import ConfigError, DriveError
@@ -20,6 +19,7 @@ from canshaper_sim.machines import MACHINES, TipControlledCrane, build_machine, 
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.parameters import changed_parameters, parameter_names
 from canshaper_sim.plant import FEEDBACK, JOINT_FEEDBACK, PlantNode
+from tests.cli.invocation import invoke
 from tests.rigs.files import ROOT, machine_file
 
 TIP_FILE = ROOT / "config" / "forwarder.yaml"
@@ -48,16 +48,9 @@ def test_axes_choose_the_machine() -> None:
     assert machine_for(dict.fromkeys(JOINT_AXES)) == "joints"
     assert machine_for({"knuckle": None}) == "joints"
     assert machine_for(dict.fromkeys(TIP_AXES), "tip-controller") == "tip-controller"
-    with pytest.raises(
-        ValueError,
-        match=f"machine: expected one of {KINDS}, got 'crab'",
-    ):
-        machine_for({}, "crab")
-    with pytest.raises(
-        ValueError,
-        match=f"machine: expected one of {KINDS}, got 'crab'",
-    ):
-        build_machine("crab")
+    for build in (partial(machine_for, {}), build_machine):
+        with pytest.raises(ValueError, match=f"machine: expected one of {KINDS}, got 'crab'"):
+            build("crab")
     assert [type(build_machine(name).crane.boom).__name__ for name in MACHINES] == [
         "TipBoom",
         "JointBoom",
@@ -175,6 +168,6 @@ def test_an_axis_that_the_deployment_merely_lacks_is_left_out(tmp_path: Path) ->
     ],
 )
 def test_commands_report_what_does_not_fit(arguments: list[str], text: str) -> None:
-    done = CliRunner().invoke(app, arguments)
+    done = invoke(*arguments)
     assert done.exit_code == 2
     assert text in done.output

@@ -123,7 +123,7 @@ def test_the_joysticks_of_a_machine_with_headers_are_received(tmp_path: Path) ->
                 crc = Crc8SaeJ1850.calc(b"\x23\x01" + sent.data[1:], initvalue=0) ^ 0xFF
                 assert sent.data[0] == crc
         list(controller.tick(time_ms * 1_000_000))
-        states |= {runner.axis.state for runner in controller.axes.values()}
+        states |= {control.axis.state for control in controller.axes.values()}
     assert counts == [(n + 1) % 15 for n in range(len(counts))]
     assert State.ACTIVE in states
     assert controller.counters.last_fault == 0

@@ -1,5 +1,6 @@
 """``canshaper calibrate``: the curve of a valve, or the flow of the pump, measured and written."""
 
+from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,9 +23,7 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.machine.deployment import Deployment
 
 GROUP = "setup"
 
@@ -86,10 +85,17 @@ def calibrate(
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOGETHER_PER_S, Ramp, usual_top
+    from canshaper.commissioning.calibration.fit import curve_lines, write_curve
+    from canshaper.commissioning.calibration.pump import pair_of, pump_lines
+    from canshaper.commissioning.calibration.ramp import (
+        RATE_PER_S,
+        TOGETHER_PER_S,
+        Ramp,
+        speed_signal,
+        usual_top,
+    )
     from canshaper.commissioning.calibration.run import run_live, run_simulated
-    from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
-    from canshaper.edit.edit import written_by
+    from canshaper.commissioning.origins import origin_of, written_line
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters
 
@@ -110,14 +116,7 @@ def calibrate(
     also = {one: signals[one] for one in axes[1:]}
     drive = CalibrationDrive(deployment, axes[0], signals[axes[0]], ramp, also)
     if live and not yes:
-        who = f"Axes {' and '.join(axes)}, alone, then at once," if together else f"Axis {axes[0]}"
-        typer.confirm(
-            f"{who} will move by itself for {drive.duration_s:.0f} s, up to"
-            f" {100.0 * ramp.top:.0f} % of its command: in positive direction, at most as far as in"
-            f" {ramp.travel_s:.1f} s at full deflection, and as far back. Has it that room, is"
-            " everybody away, and the enable switch held?",
-            abort=True,
-        )
+        _confirm(axes, drive)
     with progress_bar(" and ".join(axes)) as on_progress:
 
         def show(now: "CalibrationDrive") -> None:
@@ -130,33 +129,35 @@ def calibrate(
             run_simulated(drive, deployment, changed_parameters(changes or [], deployment), show)
     drive.check_ended()
     bus = deployment.config.buses[deployment.axes[axes[0]].config.valve.bus]
-    simulated = not live or bus.is_virtual
+    origin = origin_of("calibrate", live=[bus] if live else [])
     if together:
-        origin = written_by("calibrate", simulated=simulated) if write else None
-        lines = pump_lines(deployment, axes, [drive.moments], origin)
-        results.print("\n".join(lines), soft_wrap=True)
-    else:
-        _valve(drive, deployment, results, simulated=simulated if write else None)
-    results.write()
-
-
-def _valve(
-    drive: "CalibrationDrive", deployment: "Deployment", results: "Results", simulated: bool | None
-) -> None:
-    """Show the curve of a valve, and write it where it is known whether it is a simulated one."""
-    from canshaper.commissioning.calibration.write import curve_lines, write_curve
-
-    axis, result, top_pct = drive.axis, drive.result(), 100.0 * drive.ramp.top
-    if simulated is not None:  # first: what reads the output may end before its last line
-        write_curve(deployment, axis, result, simulated=simulated)
-    results.print("\n".join(curve_lines(deployment, axis, result, top_pct)), soft_wrap=True)
+        lines = pump_lines(deployment, axes, [drive.moments], origin if write else None)
+        results.conclude(lambda to: to.print("\n".join(lines), soft_wrap=True))
+        return
+    result, top_pct = drive.result(), 100.0 * ramp.top
+    lines = curve_lines(deployment, axes[0], result, top_pct)
+    if write:
+        write_curve(deployment, axes[0], result, origin)
 
     def figure() -> "Figure":
         from canshaper.commissioning.plots import of_valve
 
-        return of_valve(axis, deployment.axes[axis].config.limits.output_limits(), result, top_pct)
+        return of_valve(axes[0], limits[0].output_limits(), result, top_pct)
 
-    if path := results.picture(None, figure):
-        results.picture_line(path)
-    if simulated is not None:
-        results.print(f"written: {deployment.path}", soft_wrap=True)
+    after = [written_line(deployment.path)] if write else []
+    results.conclude(
+        lambda to: to.print("\n".join(lines), soft_wrap=True), figure=figure, after=after
+    )
+
+
+def _confirm(axes: Sequence[str], drive: "CalibrationDrive") -> None:
+    """Ask whether the axes may move by themselves; end the verb where they may not."""
+    who = f"Axes {' and '.join(axes)}, alone, then at once," if len(axes) > 1 else f"Axis {axes[0]}"
+    ramp = drive.ramp
+    typer.confirm(
+        f"{who} will move by itself for {drive.duration_s:.0f} s, up to"
+        f" {100.0 * ramp.top:.0f} % of its command: in positive direction, at most as far as in"
+        f" {ramp.travel_s:.1f} s at full deflection, and as far back. Has it that room, is"
+        " everybody away, and the enable switch held?",
+        abort=True,
+    )

@@ -164,7 +164,8 @@ def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "li
 
 def _report(files: "list[Deployment]", stores: "list[Store]", results: "Results") -> bool:
     """Print and write the results; return whether the first file's limits accept them all."""
-    from canshaper.campaign.summary import difference_table, differences, lines, summarise, tables
+    from canshaper.campaign.statistics import differences
+    from canshaper.campaign.summary import difference_table, lines, summarise, tables
 
     accept = files[0].config.accept.model_dump(exclude_none=True)
     columns, accepted = [store.columns() for store in stores], True

@@ -230,7 +230,7 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
     """Return a line on how far the motion moves near-far without its joystick."""
     if motion.near_far is None:
         return f"  motion of {motion.slew} alone: nothing is known of near-far"
-    from canshaper.shaping.motion import farthest_m
+    from canshaper.shaping.two_axis_motion import farthest_m
 
     axis = deployment.axes[motion.near_far].config
     assert axis.sway is not None  # checked with the deployment

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from canshaper.cli.results import Results
-    from canshaper.design.comparison.limits import Least
     from canshaper.design.comparison.manoeuvres import Candidate
-    from canshaper.design.comparison.summary import Row
+    from canshaper.design.comparison.summary import Least, Row
     from canshaper.machine.deployment import Deployment
 
 GROUP = "design"
@@ -92,11 +91,10 @@ def compare(
       canshaper compare --json --processes 1
     """
     from canshaper.cli.results import Results
-    from canshaper.design.comparison.limits import AXIS, least, limits_for
     from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.ropes import on_rope
-    from canshaper.design.comparison.summary import recommendations, rows
+    from canshaper.design.comparison.summary import AXIS, least, limits_for, recommendations, rows
     from canshaper.design.profiles import swinging_axis
     from canshaper.report.console import progress_bar
 
@@ -183,8 +181,8 @@ def _ropes(
 
 def _for_fleet(deployment: "Deployment", processes: int | None) -> "list[Candidate]":
     """Return two candidates: the filters of the file, and robust ones for its fleet."""
-    from canshaper.campaign.fleet import FLEET, design_fleet
-    from canshaper.campaign.fleet_filters import ROBUST
+    from canshaper.campaign.fleet import design_fleet
+    from canshaper.campaign.fleet_candidates import FLEET, ROBUST
     from canshaper.config.filters import filter_of
     from canshaper.design.comparison.manoeuvres import AXES, Candidate
     from canshaper.design.parallel import Processes

@@ -1,12 +1,12 @@
 """``canshaper doctor``: is this PC fit to run a deployment?"""
 
-import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, PICTURE, REPORT, echo, loader
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, PICTURE, REPORT, loader
 from canshaper.errors import UsageError, WrongDeviceError
 
 if TYPE_CHECKING:
@@ -84,22 +84,23 @@ def doctor(
             raise
         raise UsageError(str(error)) from None
     findings = measured_findings(deployment, runs) + findings
-    if as_json:
-        echo(json.dumps(as_dict(deployment, seconds, runs, findings), indent=2))
-    print_report(deployment, seconds, runs, findings, results)
+    result = deployment, seconds, runs, findings
 
     def figure() -> "Figure":
         from canshaper.commissioning.plots import of_runs
 
         return of_runs(runs, deployment.config.tick_ms)
 
-    if path := results.picture(None, figure):
-        results.picture_line(path)
-    results.write(0 if fit(findings) else EXIT_NOT_FIT)
+    results.conclude(
+        partial(print_report, *result),
+        figure=figure,
+        data=(lambda _path: as_dict(*result)) if as_json else None,
+        code=0 if fit(findings) else EXIT_NOT_FIT,
+    )
 
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
-    from canshaper.commissioning.doctor.listen import arrival_findings, listen
+    from canshaper.commissioning.doctor.joysticks import arrival_findings, listen
     from canshaper.commissioning.doctor.verdict import Finding, Level
     from canshaper.report.console import progress_bar
 

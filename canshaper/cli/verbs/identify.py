@@ -1,6 +1,5 @@
 """``canshaper identify``: period, damping and full speed of the swing, from what a person has."""
 
-import json
 import os
 from collections.abc import Sequence
 from functools import partial
@@ -10,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from canshaper.cli.common import (
+    EXIT_NOT_ENOUGH_DATA,
     PICTURE,
     PROCESSES,
     REPORT,
     SCHEDULER,
-    echo,
     engine,
     loader,
     os_errors,
@@ -27,12 +26,11 @@ if TYPE_CHECKING:
 
     from canshaper.cli.results import Results
     from canshaper.commissioning.identification.report import Advice
-    from canshaper.commissioning.identification.verdict import Finding
+    from canshaper.commissioning.identification.verdict import SwingFinding
     from canshaper.machine.deployment import Deployment
 
 GROUP = "measure"
 
-EXIT_TOO_POOR = 1
 TITLES = ("Swing, identified", "Pump, measured")
 
 
@@ -110,16 +108,22 @@ def identify(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.log_folders import check_only_folders, identified, run_fleet, show_periods
     from canshaper.cli.results import Results
+    from canshaper.commissioning.calibration.pump import drives_in, pair_of, pump_lines
     from canshaper.commissioning.identification.canlog import messages_of
     from canshaper.commissioning.identification.data import (
         axis_named,
         logged,
         measured_in,
-        pump_in,
+        paths_of,
         signals_named,
         timed_by_hand,
     )
-    from canshaper.commissioning.identification.report import advice_on, as_dict, write_sway
+    from canshaper.commissioning.identification.report import (
+        advice_on,
+        as_dict,
+        headlines,
+        write_sway,
+    )
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)() if file else None
@@ -139,8 +143,12 @@ def identify(
     if together:
         if deployment is None or as_json or picture:
             raise UsageError("--together: expected --file, and neither --json nor --picture")
-        results.print(pump_in(deployment, logs or [], signal or [], write=write, channel=channel))
-        results.write()
+        speeds = signals_named(signal or [], deployment)
+        axes = pair_of(deployment, [*speeds])
+        drives = drives_in(deployment, paths_of(logs or []), axes, speeds, channel)
+        origin = measured_in(logs or [], deployment.messages) if write else None
+        pump = pump_lines(deployment, axes, drives, origin)
+        results.conclude(lambda to: to.print("\n".join(pump)))
         return
     with os_errors(out):
         timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
@@ -152,45 +160,34 @@ def identify(
                 messages = messages_of(dbc or [], deployment)
                 findings = logged(logs or [], *named, messages, **options, on_progress=on_progress)
         advice = advice_on(findings, deployment)
-        path = _draw(findings, advice, out, results)
         written = []
         if write and deployment:
             origin = measured_in(logs or [], messages_of(dbc or [], deployment))
             written = write_sway(deployment, findings, advice, origin)
-    if as_json:
-        result = as_dict(findings, advice)
-        result |= {"picture": str(path) if path else None, "written": written}
-        echo(json.dumps(result, indent=2))
-    _print_result(findings, advice, deployment, written, results)
-    if any(f.free or f.driven for f in findings):
-        results.picture_line(path)
-    results.write(0 if all(f.usable for f in findings) else EXIT_TOO_POOR)
-
-
-def _draw(
-    findings: Sequence["Finding"], advice: Sequence["Advice"], out: Path, results: "Results"
-) -> Path | None:
-    """Draw the picture; None where there is nothing to draw."""
-    seen = [f for f in findings if f.free or f.driven]
+    seen = [one for one in findings if one.free or one.driven]
 
     def figure() -> "Figure":
         from canshaper.commissioning.identification.plot import figure as of_swings
-        from canshaper.commissioning.identification.report import headlines
 
         return of_swings(seen, headlines(findings, advice))
 
-    return results.picture(out / "identify.png", figure) if seen else None
+    def data(path: Path | None) -> dict[str, Any]:
+        return as_dict(findings, advice) | {"picture": path, "written": written}
+
+    results.conclude(
+        partial(_print, findings, advice),
+        figure=figure if seen else None,
+        path=out / "identify.png",
+        data=data if as_json else None,
+        after=_next_steps(advice, deployment, written) if deployment else (),
+        code=0 if all(one.usable for one in findings) else EXIT_NOT_ENOUGH_DATA,
+    )
 
 
-def _print_result(
-    findings: Sequence["Finding"],
-    advice: Sequence["Advice"],
-    deployment: "Deployment | None",
-    written: Sequence[str],
-    results: "Results",
+def _print(
+    findings: Sequence["SwingFinding"], advice: Sequence["Advice"], results: "Results"
 ) -> None:
     from canshaper.commissioning.identification.report import lines, set_lines
-    from canshaper.shaping.registry import KINDS
 
     for finding in findings:
         results.print("\n".join(lines(finding)))
@@ -198,20 +195,27 @@ def _print_result(
         results.print(f"\n{one.text}", style="bold")
         if one.gain_schedule:
             results.print("\n".join(set_lines(one)))
-    if not deployment:
-        return
-    if written:
-        results.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
+
+
+def _next_steps(
+    advice: Sequence["Advice"], deployment: "Deployment", written: Sequence[str]
+) -> list[str]:
+    """Return what was written, and the command that designs the filter of each axis again."""
+    from canshaper.commissioning.origins import written_line
+    from canshaper.shaping.registry import KINDS
+
+    lines = [written_line(deployment.path)] if written else []
     for one in advice:
         axis = deployment.axes[one.axis].config
         if one.axis in written and axis.gain_schedule:
-            results.print(
+            lines.append(
                 f"{one.axis} has a gain schedule, which stays as it is: change it by hand."
             )
         if one.sway and (keeps := KINDS[axis.filter.kind].designed_by):
             of_axis = f"{deployment.path} --axis {one.axis}"
             covers = f" --range {one.cover_pct}" if one.cover_pct else ""
-            results.print(f"Then fit the filter: canshaper robust {of_axis}{covers}")
+            lines.append(f"Then fit the filter: canshaper robust {of_axis}{covers}")
             if keeps != "robust":
                 replaced = f"that replaces the filter {axis.filter.kind}"
-                results.print(f"  {replaced}, which canshaper {keeps} {of_axis} keeps")
+                lines.append(f"  {replaced}, which canshaper {keeps} {of_axis} keeps")
+    return lines

@@ -1,13 +1,13 @@
 """``canshaper robust``: design the robust shaper of an axis."""
 
-import json
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, echo, loader, refuse_shipped
+from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, loader, refuse_shipped
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
@@ -98,15 +98,15 @@ def robust(
       canshaper robust config/forwarder-robust.yaml --fleet --duration 2 --picture front.svg
     """
     from canshaper.cli.results import Results
-    from canshaper.commissioning.filter_file import refuse_scheduled, written_line
+    from canshaper.commissioning.origins import refuse_scheduled, written_line
     from canshaper.commissioning.robust import design_loads, design_robust
     from canshaper.commissioning.robust_report import (
         figure,
+        lines_for_file,
         print_design,
         print_loads,
         write_design,
     )
-    from canshaper.edit.edit import flow
 
     deployment = loader(file)()
     if write:
@@ -130,26 +130,25 @@ def robust(
     options |= {"duration_s": duration_s, "second": second}
     if loads:
         designs = design_loads(deployment, axis, **options)
-        print_loads(deployment, designs, results)
+        show = partial(print_loads, deployment, designs)
     else:
         designs = [design_robust(deployment, axis, lengths_m=lengths_m, **options)]
-        print_design(deployment, designs[0], results)
-    if path := results.picture(None, lambda: figure(designs[0])):
-        results.picture_line(path)
+        show = partial(print_design, deployment, designs[0])
     useless = any(one.verdict.useless for one in designs) and not force
     write = write and not useless
     changed = write_design(deployment, *designs) if write else []
-    if as_json:
+
+    def data(path: Path | None) -> dict[str, Any]:
         data = {"loads": [*map(_result, designs)]} if loads else _result(designs[0])
-        files = {"picture": path, "written": deployment.path if write else None}
-        echo(json.dumps(data | files, indent=2, default=str))
-    tasks = [one.task for one in designs]
-    sways = [one.sway | ({"length": one.rope} if one.rope else {}) for one in tasks]
-    lines = [f"sway: {flow(sway)}" for sway in sways if sway]
-    lines += [f"filter: {flow(one.section)}" for one in designs]
-    lines = [*changed, written_line(deployment.path)] if write else lines
-    results.print("\n".join(lines), soft_wrap=True)
-    results.write(EXIT_USELESS if useless else 0)
+        return data | {"picture": path, "written": deployment.path if write else None}
+
+    results.conclude(
+        show,
+        figure=lambda: figure(designs[0]),
+        data=data if as_json else None,
+        after=[*changed, written_line(deployment.path)] if write else lines_for_file(designs),
+        code=EXIT_USELESS if useless else 0,
+    )
 
 
 def for_fleet(
@@ -162,9 +161,9 @@ def for_fleet(
 ) -> None:
     """Design filters of a kind for a fleet, of all swinging axes, print and write them."""
     from canshaper.campaign.fleet import design_fleet
-    from canshaper.campaign.fleet_report import figure, table, verdict, write_fleet
+    from canshaper.campaign.fleet_candidates import figure, table, verdict, write_fleet
     from canshaper.cli.results import Results
-    from canshaper.commissioning.filter_file import written_line
+    from canshaper.commissioning.origins import written_line
     from canshaper.design.parallel import Processes
     from canshaper.edit.edit import flow
     from canshaper.report.console import progress_bar

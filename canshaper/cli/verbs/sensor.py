@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import typer
 
 from canshaper.cli.common import (
     CHANNEL,
+    EXIT_NOT_ENOUGH_DATA,
     FILE,
     INTERFACE,
     NETWORK,
@@ -26,12 +28,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from canshaper.cli.results import Results
-    from canshaper.commissioning.sensor.finding import Finding
+    from canshaper.commissioning.sensor.verdict import SensorFinding
     from canshaper.machine.deployment import Deployment
 
 GROUP = "measure"
-
-EXIT_TOO_POOR = 1
 
 
 def sensor(
@@ -74,8 +74,9 @@ def sensor(
     # Its matrices are small: threads of the linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.results import Results
-    from canshaper.commissioning.sensor.finding import examine, write_sensors
+    from canshaper.commissioning.origins import written_line
     from canshaper.commissioning.sensor.fit import read_sensors
+    from canshaper.commissioning.sensor.verdict import examine, write_sensors
 
     if live and log:
         raise UsageError(f"expected a log or --live, got {log} and --live")
@@ -102,16 +103,19 @@ def sensor(
         series = read_sensors(log, deployment, axes)
         findings = [examine(deployment.axes[name], series[name]) for name in axes]
         written = write_sensors(deployment, findings, given, live=live) if write else []
-    _print(deployment, findings, written, results)
-    if any(finding.fit for finding in findings):
 
-        def figure() -> "Figure":
-            from canshaper.commissioning.plots import of_sensors
+    def figure() -> "Figure":
+        from canshaper.commissioning.plots import of_sensors
 
-            return of_sensors(findings)
+        return of_sensors(findings)
 
-        results.picture_line(results.picture(out / "sensor.png", figure))
-    results.write(EXIT_TOO_POOR if any(finding.problems for finding in findings) else 0)
+    results.conclude(
+        partial(_print, deployment, findings),
+        figure=figure if any(one.fit for one in findings) else None,
+        path=out / "sensor.png",
+        after=[*written, written_line(deployment.path)] if written else (),
+        code=0 if all(one.usable for one in findings) else EXIT_NOT_ENOUGH_DATA,
+    )
 
 
 def _axes(deployment: "Deployment", axis: str | None) -> list[str]:
@@ -158,23 +162,13 @@ def _simulate(deployment: "Deployment", axes: Sequence[str], log: Path, changes:
 
 
 def _print(
-    deployment: "Deployment",
-    findings: Sequence["Finding"],
-    written: Sequence[str],
-    results: "Results",
+    deployment: "Deployment", findings: Sequence["SensorFinding"], results: "Results"
 ) -> None:
-    from canshaper.commissioning.filter_file import written_line
-    from canshaper.commissioning.sensor.finding import heading, table
+    from canshaper.commissioning.sensor.verdict import heading, table
 
     for finding in findings:
         results.print(heading(finding))
         if finding.fit:
             results.print(table(deployment.axes[finding.axis], finding))
-        for note in finding.notes:
-            results.print(f"  note: {note}")
-        for fault in finding.problems:
-            results.print(f"  not enough data: {fault}")
-    for line in written:
-        results.print(line)
-    if written:
-        results.print(written_line(deployment.path))
+        for line in finding.remarks():
+            results.print(line)

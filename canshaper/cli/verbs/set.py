@@ -50,7 +50,7 @@ def set(
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
     from canshaper.commissioning import control_client as client
-    from canshaper.commissioning.assumed import write_numbers
+    from canshaper.commissioning.origins import write_numbers
     from canshaper.report.console import SafeConsole
 
     deployment = loader(file)()

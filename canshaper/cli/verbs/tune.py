@@ -103,7 +103,7 @@ def tune(
     """
     from canshaper.cli.results import Results
     from canshaper.cli.verbs.robust import for_fleet
-    from canshaper.commissioning.filter_file import refuse_scheduled, written_line
+    from canshaper.commissioning.origins import refuse_scheduled, written_line
     from canshaper.commissioning.tuned import (
         as_dict,
         design_tuned,

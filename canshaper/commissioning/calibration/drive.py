@@ -11,10 +11,10 @@ from dataclasses import replace
 
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
+from canshaper.commissioning.calibration.pump import Moment
 from canshaper.commissioning.calibration.ramp import EndStopDetector, Ramp, SpeedFeedback
-from canshaper.commissioning.calibration.together import Moment
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
@@ -33,7 +33,7 @@ class _RampJoystick:
     """A joystick that is held in neutral with its enable on; the ramp replaces its deflection.
 
     Attributes:
-        deflection: command of the ramp; that of an axis which is not measured stays 0.
+        deflection: command of the ramp; 0 for an axis that is not measured.
         moved: whether the joystick itself is not in neutral.
     """
 
@@ -65,7 +65,8 @@ class CalibrationDrive:
         axis: name of one of its axes.
         speed: (message, signal) of the feedback of its speed.
         ramp: the command.
-        also: the same of another axis by its name: driven alone after the first, then both at once.
+        also: (message, signal) of a second axis, by its name; it is driven alone after the first,
+            then both at once.
 
     Attributes:
         axis: as above.
@@ -85,13 +86,13 @@ class CalibrationDrive:
         speeds = {axis: speed, **(also or {})}
         for name in speeds:
             _check_top(deployment, name, ramp)
-        # What may be set while the daemon runs bounds no measurement: the numbers of the file do.
+        # Numbers that may be adjusted while the daemon runs do not bound a measurement.
         config = deployment.config.model_copy(update={"control": None})
         deployment = replace(deployment, config=config)
         feedback = {name: SpeedFeedback(deployment, name, *one) for name, one in speeds.items()}
         self._controller = Controller(deployment)
-        self._guarded = Guarded(self._controller)
-        # Nothing moves but these axes: no other one gets its joystick, nor moves for another one.
+        self._gated = GatedController(self._controller)
+        # Only these axes move: the others get a neutral joystick and take no part in a motion.
         self._joysticks: dict[str, _RampJoystick] = {}
         for name, one in self._controller.axes.items():
             joystick = _RampJoystick(self._controller.joysticks[one.bound.config.command.joystick])
@@ -126,11 +127,11 @@ class CalibrationDrive:
         """Condition that the axis still waits for before the ramp begins; empty afterwards."""
         if self._begun_ns is not None:
             return ""
-        for runner, joystick, _ in self._driven.values():
+        for control, joystick, _ in self._driven.values():
             if joystick.moved:
                 return Reason.JOYSTICK_NOT_NEUTRAL.name
-            if runner.axis.state is not State.READY:
-                return runner.axis.reason.name
+            if control.axis.state is not State.READY:
+                return control.axis.reason.name
         return f"the joystick of {moved}" if (moved := self._moved) else "feedback"
 
     @property
@@ -141,13 +142,13 @@ class CalibrationDrive:
     @property
     def moves(self) -> bool:
         """Whether the frame that was handed out last is that of a valve, and any axis moves."""
-        return self._guarded.moves
+        return self._gated.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; return the frame for the other bus of a gateway, or None."""
         for *_, speed in self._driven.values():
             speed.receive(frame, arrived_ns)
-        return self._guarded.receive(frame, arrived_ns)
+        return self._gated.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run one tick, and yield the frames to send."""
@@ -163,7 +164,8 @@ class CalibrationDrive:
             done, into_s = divmod(time_s, self.ramp.duration_s)
             turn = self.turns[min(int(done), len(self.turns) - 1)]
             self._sample(time_s)
-            # One that another takes the oil of stands too, and had that room before, alone.
+            # An axis also stands where the other one takes its oil, so only one that is driven
+            # alone is watched; both have the same room when they are driven at once.
             ramp, part = self.ramp.command(into_s), self.ramp.part(into_s)
             speed = self._driven[turn[0]][2].value
             if time_s >= self.duration_s:
@@ -179,29 +181,29 @@ class CalibrationDrive:
                 room = f"give it room for {self.ramp.travel_s:.1f} s at full deflection"
                 self.ended = f"stopped: {text}: its end? {room}"
             if not self.ended and State.STOPPING not in [one.state for one in waits]:
-                command = ramp  # where one stops no other moves on
+                command = ramp  # while one axis stops, the other does not move on
         for name, (_, joystick, _) in self._driven.items():
             joystick.deflection = command if name in turn else 0.0
-            self._guarded.demand(name, joystick.deflection)
-        yield from self._guarded.tick(now_ns, missed)
+            self._gated.demand(name, joystick.deflection)
+        yield from self._gated.tick(now_ns, missed)
         self._controller.events.clear()
 
     def send_failed(self, frame: Frame) -> None:
         """Take note that a frame did not reach its bus; the axes of a valve frame trip."""
-        self._guarded.send_failed(frame)
+        self._gated.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
         """Whether a valve frame that comes too late must not leave."""
-        return self._guarded.withhold(frame)
+        return self._gated.withhold(frame)
 
     def stalled(self) -> None:
         """Take note that the loop stood still; moving axes go to neutral."""
-        self._guarded.stalled()
+        self._gated.stalled()
 
     def _sample(self, time_s: float) -> None:
         moment = [time_s]
         for name, (one, _, speed) in self._driven.items():
-            sample = Sample(one.axis.raw / one.bound.valve.steps, speed.value)
+            sample = Sample(one.axis.output.steps / one.bound.valve.steps, speed.value)
             if name == self.axis:
                 self._samples.setdefault(self.ramp.part(time_s), []).append(sample)
             limits = one.bound.config.limits.output_limits()
@@ -210,7 +212,7 @@ class CalibrationDrive:
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve."""
-        return self._guarded.neutral_frames()
+        return self._gated.neutral_frames()
 
     def check_ended(self) -> None:
         """Raise CalibrationError where the ramp was not driven to its end."""
@@ -230,7 +232,7 @@ class CalibrationDrive:
         noise, zero = statistics.pstdev(rest), statistics.fmean(rest)
         ways = []
         for sign, mark in ((1.0, "+"), (-1.0, "-")):
-            # The feedback may count the other way round than the command.
+            # The feedback may have the opposite sign of the command.
             parts = [self._samples.get(f"{way}{mark}", []) for way in ("up", "held", "down")]
             way = 1.0 if sum(s.speed - zero for s in parts[0]) >= 0.0 else -1.0
             up, held, down = (

@@ -1,16 +1,19 @@
-"""Curve of a valve from a slow ramp.
+"""Curve of a valve from a slow ramp: computed, shown, written into the file.
 
-A valve follows with a delay, so on the way up it opens at a larger command than it should, and on
-the way down it closes at a smaller one. With a ramp as fast up as down the mean of both is right.
+A valve follows its command with a delay: on the way up it opens at a larger command, on the way
+down it closes at a smaller one. With a ramp as fast up as down the mean of both is right.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from canshaper.commissioning.origins import confirmed
+from canshaper.edit.edit import Change, change, note
 from canshaper.errors import CalibrationError
+from canshaper.machine.deployment import Deployment
 
 
 class Sample(NamedTuple):
@@ -32,7 +35,8 @@ class Direction:
     Attributes:
         opens: command at which it begins to move, part of full.
         points: (command, speed) from there to the top of the ramp, speed in the unit of feedback.
-        delay: by how much of a command up and down differ at the opening: the delay of the valve.
+        delay: difference of the commands at which it opens on the way up and closes on the way
+            down, part of full; the delay of the valve makes it.
         full: speed at full command, in a straight line through the first and the last point.
     """
 
@@ -44,13 +48,16 @@ class Direction:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Both directions; magnitudes, the negative one too."""
+    """Both directions of a valve; the numbers of the negative one are magnitudes too."""
 
     positive: Direction
     negative: Direction
 
     def curve(self) -> tuple[list[float], list[float]]:
-        """Commands and speeds in % for the deployment file, full speed that of the faster one."""
+        """Return commands and speeds in % for the deployment file.
+
+        Full speed is that of the faster direction.
+        """
         full = max(self.positive.full, self.negative.full)
         commands, speeds = list[float](), list[float]()
         for sign, one in ((-1.0, self.negative), (1.0, self.positive)):
@@ -69,11 +76,12 @@ class Calibration:
 FULL = 0.97
 # Points of the curve between the opening and the top of the ramp.
 POINTS = (0.25, 0.5, 0.75)
-# Above the noise of the feedback by so many standard deviations counts as moving, for so long.
+# An axis moves where its speed exceeds so many standard deviations of the noise, in so many samples
+# one after the other.
 SIGMAS = 5.0
 LASTING = 5
-# Part of the speed at the largest command over which a line is laid to find the opening, and the
-# most that may lie below it as bent by the lag of the valve.
+# A line through the samples within this part of the speed at the largest command finds the opening.
+# At most so much below that part counts as bent by the lag of the valve.
 WINDOW = 0.3
 MOST_BENT = 0.3
 # Less than this part of the largest speed seen is resolution, not motion.
@@ -83,7 +91,7 @@ LEAST = 0.01
 def fit(
     up: Sequence[Sample], held: Sequence[Sample], down: Sequence[Sample], noise: float
 ) -> Direction:
-    """One direction from its ramp, as magnitudes.
+    """Compute one direction of a valve from its ramp; all numbers are magnitudes.
 
     Args:
         up: samples while the command rose, in order.
@@ -109,8 +117,8 @@ def fit(
     for way in (rising, falling):
         _moves_steadily(way, moving)
     settled = sum(s.speed for s in held) / len(held)
-    # A lag bends the foot of both ways, up later and down longer; three of its times on they run
-    # straight, as far before and behind the valve.
+    # The lag of the valve bends the foot of both ways: it opens later and closes later. Three time
+    # constants farther both are straight, and equally far from the curve of the valve.
     opens, delay = _opening(rising, falling, 0.5, settled, moving)
     low = min(3.0 * delay / (top - opens), MOST_BENT) if top > opens else MOST_BENT
     opens, delay = _opening(rising, falling, low + 0.5 * WINDOW, settled, moving)
@@ -145,7 +153,7 @@ def _opening(
     settled: float,
     moving: float,
 ) -> tuple[float, float]:
-    """Command at which the valve opens, and the delay: the difference between both ways.
+    """Return the command at which the valve opens, and the difference between both ways.
 
     Args:
         rising: samples of the way up.
@@ -169,7 +177,7 @@ def _opening(
 
 
 def _line(samples: Sequence[Sample]) -> tuple[float, float]:
-    """Command at speed zero and slope of the straight line through samples (least squares)."""
+    """Return command at speed zero and slope of the least-squares line through samples."""
     n = len(samples)
     c, s = sum(x.command for x in samples) / n, sum(x.speed for x in samples) / n
     spread = math.fsum((x.command - c) ** 2 for x in samples)
@@ -180,9 +188,54 @@ def _line(samples: Sequence[Sample]) -> tuple[float, float]:
 
 
 def _speed_at(samples: Sequence[Sample], command: float, top: float) -> float:
-    """Speed at a command: mean of the samples nearest to it."""
+    """Return the speed at a command: the mean of the samples near it."""
     width = 0.03 * top
     near = [s.speed for s in samples if abs(s.command - command) <= width]
     if not near:
         raise CalibrationError("too few samples of the feedback; is its message cyclic?")
     return sum(near) / len(near)
+
+
+def curve_lines(
+    deployment: Deployment, axis: str, result: Calibration, top_pct: float
+) -> list[str]:
+    """Return the lines that show a measured curve, after the numbers of the file."""
+    limits = deployment.axes[axis].config.limits
+    now = f"deadband_pct {limits.deadband_pct:g}"
+    if limits.curve_command_pct and limits.curve_speed_pct:
+        pairs = zip(limits.curve_command_pct, limits.curve_speed_pct, strict=True)
+        ends = [f"{command:g}" for command, speed in pairs if speed == 0.0]
+        now = f"a curve with the dead band at {' to '.join(ends)} %"
+    lines = [f"axis {axis}: the file has {now}"]
+    full = max(result.positive.full, result.negative.full)
+    for name, one in (("positive", result.positive), ("negative", result.negative)):
+        lines.append(
+            f"  {name}: opens at {100 * one.opens:.1f} % of the command, full speed"
+            f" {one.full:.4g} ({100 * one.full / full:.0f} %), delay of the valve worth"
+            f" {100 * one.delay:.1f} %"
+        )
+    commands, speeds = result.curve()
+    lines += [f"  curve_command_pct: {commands}", f"  curve_speed_pct: {speeds}"]
+    if top_pct < 100:
+        lines.append(f"  above {top_pct:g} % of the command this is a straight line, not measured")
+    return lines
+
+
+def write_curve(
+    deployment: Deployment, axis: str, result: Calibration, origin: dict[str, Any]
+) -> None:
+    """Write the curve of a valve, and where it was measured (see ``origin_of``).
+
+    Raises:
+        ConfigError: the file cannot be changed.
+    """
+    commands, speeds = result.curve()
+    values = {
+        "deadband_pct": None,
+        "curve_command_pct": commands,
+        "curve_speed_pct": speeds,
+        "curve_origin": origin,
+    }
+    written: Change = (("axes", axis, "limits"), values, note("calibrate"))
+    measured = (f"axes.{axis}.limits.{key}" for key in values)
+    change(deployment.path, [written, *confirmed(deployment.path, measured)])

@@ -1,4 +1,4 @@
-"""A ramp of the valve: where motion begins, its speed, and whether it ended at a stop."""
+"""The ramp of a measurement, the speed that answers it, and the end stop that ends it."""
 
 import math
 from bisect import bisect_left
@@ -12,10 +12,11 @@ from canshaper.codec.message import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.inputs import InputSection
 from canshaper.config.limits import Limits
-from canshaper.errors import ConfigError, Problem
+from canshaper.errors import ConfigError, Problem, UsageError
 from canshaper.inputs.value import ValueInput, measurable
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
+from canshaper_sim.axes import SPEED_SIGNALS
 
 # Slow enough for a lag of 0.3 s, quick enough for a joint that has room for 2 s of full speed.
 RATE_PER_S, TOP = 0.1, 0.4
@@ -25,7 +26,7 @@ TOGETHER_PER_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """Positive first, then negative, with a rest before each and at the end.
+    """A command that rises and falls: positive first, then negative, with rests around them.
 
     Attributes:
         rate_per_s: how fast the command rises and falls, parts of full command per second.
@@ -56,11 +57,11 @@ class Ramp:
 
     @property
     def travel_s(self) -> float:
-        """How far it goes in one direction, in seconds of full speed; with a dead band less."""
+        """How far the axis goes in one direction, seconds of full speed; less with a dead band."""
         return self.top * (self.up_s + self.hold_s)
 
     def command(self, time_s: float) -> float:
-        """Command at a time; 0 before the beginning and after the end."""
+        """Return the command at a time; 0 before the beginning and after the end."""
         half, into_s = divmod(time_s, self.half_s)
         if half not in (0, 1):
             return 0.0
@@ -86,18 +87,19 @@ class Ramp:
 
 
 def usual_top(limits: Limits) -> float:
-    """Top of the ramp of an axis, part of full command: as fast as the file allows at most."""
+    """Return the default top of the ramp, part of full command; at most what the file allows."""
     return min(TOP, limits.max_pct / 100.0)
 
 
-# So much farther from the middle of its tremble than that goes is motion.
+# An axis moves where its speed is farther from rest than so many times its noise at rest.
 LEAST = 5.0
-# At its end the speed is below this part of what it was, for so long.
+# An axis is at its end where its speed stays below this part of what the same command gave before,
+# for so long.
 PART, LASTING_S = 0.5, 0.5
 
 
 class EndStopDetector:
-    """Watches the speed of an axis on its ramp."""
+    """Notices by its speed that an axis on its ramp has reached an end stop."""
 
     def __init__(self) -> None:
         self._low, self._high = math.inf, -math.inf  # at rest
@@ -131,15 +133,39 @@ class EndStopDetector:
         return time_s - self._moved_s >= LASTING_S
 
 
-# Feedback older than that says nothing of the axis, which must not go on unseen.
+def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[str, str]:
+    """Return message and signal with the speed of an axis.
+
+    Args:
+        deployment: the machine.
+        axis: name of the axis.
+        speed: MESSAGE.SIGNAL; None for the feedback in the file, else that of the simulated crane.
+
+    Raises:
+        UsageError: there is no such axis, or no such signal is known.
+    """
+    bound = deployment.axes.get(axis)
+    if bound is None:
+        names = ", ".join(deployment.axes)
+        raise UsageError(f"--axis: expected an axis, got {axis!r}; there are {names}")
+    if speed is None and bound.config.feedback:
+        return bound.config.feedback.message, bound.config.feedback.signal
+    moved = deployment.coordinates.get(axis, axis)
+    message, dot, signal = (speed or SPEED_SIGNALS.get(moved, "")).partition(".")
+    if not (message and dot and signal):
+        raise UsageError(f"--speed: expected MESSAGE.SIGNAL, got {speed or 'none'}")
+    return message, signal
+
+
+# Older feedback counts as lost: an axis must not move unseen.
 SILENT_MS = 500
 
 
 class SpeedFeedback:
     """Feedback of the speed of one axis.
 
-    Where it is the ``feedback`` of the axis in the deployment, all that stands there holds: bus,
-    source, counter, checksum. Any other message has to come on the bus of the valve.
+    Where the deployment names the signal as ``feedback`` of the axis, its bus, source, counter and
+    checksum hold. Any other message has to come on the bus of the valve.
 
     Args:
         deployment: the machine.
@@ -166,12 +192,12 @@ class SpeedFeedback:
         return self._input.value
 
     def valid(self, now_ns: int) -> bool:
-        """Whether there is a valid speed now: no silence, no error code, a number."""
+        """Return whether there is a valid speed now: no silence, no error code."""
         measured_ns = self._input.measured_ns
         return measured_ns is not None and now_ns - measured_ns <= SILENT_MS * 1_000_000
 
     def receive(self, frame: Frame, arrived_ns: int) -> None:
-        """Take a frame, where it is one of this message."""
+        """Take a frame; those of other messages are ignored."""
         if self._mine(frame):
             self._input.receive(frame.data, arrived_ns)
 

@@ -1,4 +1,4 @@
-"""Where a measurement runs: on the buses of the machine, or on the simulated crane in lock-step."""
+"""Run a measurement: on the buses of the machine, or on the simulated crane in lock-step."""
 
 import signal
 import time
@@ -11,7 +11,7 @@ from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.design.lockstep import LockStep
 from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.deployment import Deployment
@@ -22,9 +22,9 @@ from canshaper_sim.plant import PlantNode
 
 # How often neutral is sent to every valve at the end: a frame may be lost.
 LAST_FRAMES = 3
-# So long the enable, the joystick in neutral and the feedback of the speed are waited for.
+# A measurement waits so long for the enable, a neutral joystick and feedback of the speed.
 WAIT_LIMIT_S = 60.0
-# All that can end or hold a program from its terminal: a valve must not stay open behind it.
+# Signals by which a terminal ends or stops a program: no valve may stay open after them.
 _STOPS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
 STOPS = [getattr(signal, name) for name in _STOPS if hasattr(signal, name)]
 
@@ -34,8 +34,8 @@ def run_live(
 ) -> None:
     """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
 
-    It ends too where the ramp cannot begin within ``WAIT_LIMIT_S``. However it ends, neutral is the
-    last that is sent to every valve.
+    It also ends where the ramp cannot begin within ``WAIT_LIMIT_S``. However it ends, the last
+    frames to every valve are neutral.
 
     Args:
         drive: the measurement.
@@ -97,7 +97,7 @@ def _restore(handlers: dict[signal.Signals, Any]) -> None:
 
 # A measurement that has not begun by then waits for something that never comes.
 LONGEST_WAIT_S = 5.0
-# A person who gives an axis room takes it back slowly, and no longer.
+# To give an axis room, the simulated person drives it back at this level, at most for so long.
 BACK, LONGEST_BACK_S = -0.4, 30.0
 
 
@@ -109,7 +109,7 @@ def run_simulated(
 ) -> None:
     """Drive the axes of the simulated crane, with the enable switch held, to the end.
 
-    Before that they are brought to where they have room for their ramp.
+    Before, each axis is driven back until it has room for its ramp.
 
     Raises:
         ConfigError: the deployment does not fit the machine.
@@ -132,6 +132,6 @@ def _give_room(plant: PlantNode, deployment: Deployment, axis: str, travel_s: fl
     actuator = plant.crane.boom.axes[deployment.coordinates.get(axis, axis)]
     back = Script("back", (Stroke(axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)
-    lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand])
+    lock_step = LockStep(deployment, GatedController(Controller(deployment)), plant, [hand])
     while actuator.room_s < travel_s and lock_step.time_ms < 1000 * LONGEST_BACK_S:
         lock_step.step()

@@ -1,4 +1,4 @@
-"""Interface and device behind a bus: does ``match`` hold now, and what to write where none is."""
+"""Interface and device of a bus: whether its ``match`` holds, and the lines for a file without."""
 
 import errno
 import json
@@ -23,7 +23,7 @@ from canshaper.bus.netlink import kind_and_bitrates
 from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus
 
-# Not in the path of an ordinary user everywhere.
+# The directories of ``ip``, which an ordinary user's path may lack.
 SBIN = ":/usr/sbin:/sbin"
 ARPHRD_CAN = 280  # linux/if_arp.h
 IFF_UP = 0x1  # linux/if.h
@@ -73,7 +73,7 @@ class Link:
 
 
 def read_link(name: str, root: Path = Path("/")) -> Link | None:
-    """The interface of that name by ``ip``, or without one by /sys; None where there is none."""
+    """Return an interface as ``ip`` shows it, else as /sys does; None where there is none."""
     tool = shutil.which("ip", path=os.environ.get("PATH", "") + SBIN)
     if tool:
         command = [tool, "-details", "-statistics", "-json", "link", "show", "dev", name]
@@ -84,7 +84,7 @@ def read_link(name: str, root: Path = Path("/")) -> Link | None:
 
 
 def parse_ip(text: str) -> Link | None:
-    """An interface from the output of ``ip -details -statistics -json link show``."""
+    """Return the interface in the output of ``ip -details -statistics -json link show``."""
     try:
         entries = [entry for entry in json.loads(text) if entry.get("ifname")]
     except ValueError:  # an ip without -json
@@ -107,7 +107,7 @@ def parse_ip(text: str) -> Link | None:
 
 
 def read_sys(name: str, root: Path) -> Link | None:
-    """An interface from /sys/class/net, which has no details of controllers."""
+    """Return an interface as /sys/class/net shows it, without details of its controller."""
     directory = root / "sys/class/net" / name
     try:
         texts = {f: (directory / f).read_text().strip() for f in SYS_FILES}
@@ -127,14 +127,16 @@ def read_sys(name: str, root: Path) -> Link | None:
 
 
 LONGEST_NAME = 15  # IFNAMSIZ of linux/if.h, without its end
-# What udev leaves of a serial number in ID_SERIAL_SHORT; all else is an underscore there.
+# Characters of a serial number that udev replaces by an underscore in ID_SERIAL_SHORT.
 _REPLACED = re.compile(r"[^0-9A-Za-z#+\-.:=@_]")
 
 
 def device_findings(
     name: str, bus: Bus, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates
 ) -> list[Finding]:
-    """Whether the interface of a bus is its device; none where there is no such interface.
+    """Check that the interface of a bus is the device that the file names.
+
+    Without such an interface there is no finding.
 
     Args:
         name: of the bus in the deployment file.
@@ -146,7 +148,7 @@ def device_findings(
     try:
         device = read_device(bus.channel, root, query_kernel)
     except OSError as error:
-        if error.errno == errno.ENODEV:  # said of the interface itself
+        if error.errno == errno.ENODEV:  # a finding on the interface says so
             return []
         level = Level.BAD if bus.match else Level.WARNING
         return [Finding(subject, level, f"cannot be looked at: {error.strerror}")]
@@ -162,7 +164,7 @@ def device_findings(
 
 
 def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
-    """Lines for the deployment file, and for a name of its own: networkd and udev.
+    """Return lines to paste: ``match`` for the deployment file, a name for networkd and udev.
 
     Args:
         name: of the bus in the deployment file.
@@ -199,13 +201,13 @@ def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
 
 
 def rule(new: str, device: Device, root: Path = ROOT) -> str:
-    """Rule of udev, for after 75-net-description.rules, that gives a device the name ``new``."""
+    """Return the udev rule that names a device; it has to run after 75-net-description.rules."""
     parts = ['SUBSYSTEM=="net"', 'ACTION=="add"']
     if device.serial:
         parts.append(f'ATTRS{{serial}}=="{device.serial}"')
     else:
         parts.append(f'ENV{{ID_PATH}}=="{device.path}"')
-    if device.channels > 1:  # in one of them its driver counts the channels
+    if device.channels > 1:  # a driver counts its channels in one of these files
         directory = root / "sys/class/net" / device.name
         for file in ("dev_port", "dev_id"):
             parts.append(f'ATTR{{{file}}}=="{(directory / file).read_text().strip()}"')

@@ -51,8 +51,8 @@ def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
     )
 
 
-# Frames that may wait in the queue: less, and the frames of one tick do not fit; more, and commands
-# go out that are long out of date (20 of 8 bytes are 13 ms at 250 kbit/s).
+# Lengths of the transmit queue, frames. The frames of one tick do not fit into a shorter one; a
+# longer one sends commands that are long out of date (20 frames of 8 bytes: 13 ms at 250 kbit/s).
 SHORTEST_QUEUE, LONGEST_QUEUE = 10, 20
 ADAPTER = "an adapter with a driver of its own; slcan serves joysticks"
 WRONG_RATE = "one of both is wrong: a wrong bit rate disturbs the whole bus"
@@ -79,7 +79,7 @@ def bus_findings(buses: dict[str, Bus], tick_ms: int) -> list[Finding]:
 
 
 def kernel_fault() -> OSError | None:
-    """Why this kernel has no SocketCAN, or None where it has."""
+    """Return the error of a kernel without SocketCAN; None of one that has it."""
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except OSError as error:
@@ -112,7 +112,7 @@ def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
 
 
 def up(link: Link, bus: Bus) -> Finding:
-    """Check that it is set up."""
+    """Check that the interface is up."""
     if link.up:
         return Finding(link.name, Level.OK, "up")
     rate = link.bitrate or bus.bitrate or 250_000
@@ -122,7 +122,7 @@ def up(link: Link, bus: Bus) -> Finding:
 
 
 def echo(link: Link, bus: Bus) -> list[Finding]:
-    """Check that it says whether a frame of ours got onto the bus."""
+    """Check that the driver confirms which frames got onto the bus."""
     if link.echo:
         return []
     text = "none (no echo, as slcan): a cut line to a valve trips no axis; "
@@ -132,7 +132,7 @@ def echo(link: Link, bus: Bus) -> list[Finding]:
 
 
 def bitrate(link: Link, bus: Bus) -> Finding | None:
-    """Check that its bit rate is that of the file, where that has one."""
+    """Check the bit rate against that of the file, where the file has one."""
     subject = f"{link.name} bit rate"
     if link.bitrate is None:
         return None
@@ -143,7 +143,7 @@ def bitrate(link: Link, bus: Bus) -> Finding | None:
 
 
 def fd(link: Link, bus: Bus) -> list[Finding]:
-    """Check that it carries CAN FD at the bit rates of the file, where the bus is one of CAN FD."""
+    """Check that the interface carries CAN FD at the bit rate of the file, for a bus of CAN FD."""
     if not bus.fd:
         return []
     subject = f"{link.name} CAN FD"
@@ -167,7 +167,7 @@ def fd_options(bus: Bus) -> str:
 
 
 def queue(link: Link) -> Finding:
-    """Check its transmit queue: short enough that no old command goes out."""
+    """Check the length of the transmit queue: a long one sends old commands."""
     subject = f"{link.name} queue"
     remedy = f"sudo ip link set {link.name} txqueuelen 16"
     queue = f"{link.queue} frames"
@@ -181,7 +181,7 @@ def queue(link: Link) -> Finding:
 
 
 def state(link: Link) -> Finding | None:
-    """Check the state of its controller, which counts only while the interface is up."""
+    """Check the state of the controller, which means nothing while the interface is down."""
     state = link.data.get("state")
     if state is None or not link.up:
         return None
@@ -199,7 +199,7 @@ def state(link: Link) -> Finding | None:
 
 
 def errors(link: Link) -> Finding | None:
-    """Check the error counters of its controller, and the faults that it had."""
+    """Check the error counters of the controller, and its earlier faults."""
     if not link.up:
         return None
     counters = link.data.get("berr_counter", {})
@@ -214,7 +214,7 @@ def errors(link: Link) -> Finding | None:
 
 
 def restart(link: Link) -> Finding:
-    """Check that it comes back by itself after bus-off."""
+    """Check that the controller restarts by itself after bus-off."""
     subject = f"{link.name} restart"
     restart_ms = link.data.get("restart_ms", 0)
     if restart_ms:
@@ -231,7 +231,7 @@ def restart(link: Link) -> Finding:
 
 
 def modes(link: Link) -> Finding:
-    """Check for modes that are for tests, or change what a send means."""
+    """Check that no mode is on that drops frames or floods the daemon with errors."""
     on = set(link.data.get("ctrlmode", []))
     subject = f"{link.name} modes"
     low = f"with {link.name} down: sudo ip link set {link.name} type can"

@@ -14,7 +14,7 @@ from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, s
 from canshaper.config.bus import Bus
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.gate.cycle import Standstill, boottime_ns, io_cycle, run_at_deadlines
 from canshaper.machine.binding import load_deployment
@@ -22,7 +22,7 @@ from canshaper.machine.deployment import Deployment
 
 
 class WatchedPort(RawPort):
-    """A bus on one end of a pair of sockets, whose frames are counted and noted.
+    """A bus on one end of a socket pair; it counts received frames and reports sent ones.
 
     Args:
         name: of the bus.
@@ -30,7 +30,7 @@ class WatchedPort(RawPort):
         one: the end.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
-        fd: what is sent in frames of CAN FD.
+        fd: identifier, and whether it is extended, of what is sent in frames of CAN FD.
 
     Attributes:
         received: frames so far.
@@ -53,13 +53,13 @@ class WatchedPort(RawPort):
         )
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame that waits."""
+        """Yield every waiting frame, and count it."""
         for frame in super().frames():
             self.received += 1
             yield frame
 
     def send(self, frame: Frame) -> bool:
-        """Send a frame, or not at all; whether it was sent."""
+        """Send a frame at once or not at all; return whether it was sent."""
         sent = super().send(frame)
         if sent:
             self._on_sent(frame)
@@ -67,7 +67,7 @@ class WatchedPort(RawPort):
 
 
 class Loop:
-    """The ticks of the daemon, and what happened when.
+    """The loop of the daemon, and the record of its ticks.
 
     Args:
         deployment: what is run.
@@ -79,7 +79,7 @@ class Loop:
         self, deployment: Deployment, sockets: dict[str, socket.socket], seconds: float
     ) -> None:
         self._controller = Controller(deployment)
-        self._guarded = Guarded(self._controller)
+        self._gated = GatedController(self._controller)
         faults = self._controller.counters.add
         buses, routes = deployment.config.buses, deployment.routing.buses
         self._ports = {
@@ -102,7 +102,7 @@ class Loop:
         self._moved: set[str] = set()
 
     def run(self) -> None:
-        """Run, as the daemon does, once the first frame of a joystick is there."""
+        """Run as the daemon does, from the first frame of a joystick on."""
         self._collector.freeze()
         say_ready()
         select.select(list(self._ports.values()), [], [])
@@ -112,7 +112,7 @@ class Loop:
             port.close()
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        io_cycle(self._guarded, self._ports, now_ns, missed, self._standstill)
+        io_cycle(self._gated, self._ports, now_ns, missed, self._standstill)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)
@@ -132,7 +132,9 @@ class Loop:
                 t = event.transition
                 self._events.append((event.axis, t.new.name, t.reason.name))
         self._controller.events.clear()
-        self._moved |= {n for n, runner in self._controller.axes.items() if runner.axis.raw}
+        self._moved |= {
+            n for n, control in self._controller.axes.items() if control.axis.output.steps
+        }
         self._collector.pause(now_ns)
 
     def record(self) -> dict[str, Any]:
@@ -151,7 +153,7 @@ class Loop:
 
 
 def main(options: dict[str, Any]) -> None:
-    """Run it as the service's unit would, as far as that is permitted; print the record."""
+    """Run with the priority and memory of the service, where permitted; print the record."""
     deployment = load_deployment(Path(options["file"]))
     sockets = {name: socket.socket(fileno=fd) for name, fd in options["sockets"].items()}
     for one in sockets.values():

@@ -1,7 +1,7 @@
 """The PC itself: what kernel, processor and interpreter do to a loop with deadlines.
 
-Each check takes the root of the file system, or the text that a tool prints, so that it can be
-asked about another machine.
+Each check takes the root of the file system, or the text that a tool prints, so that a test can ask
+about another machine.
 """
 
 import os
@@ -17,14 +17,14 @@ from canshaper.commissioning.doctor.verdict import Finding, Level
 QUICK_CLOCKS = frozenset(
     ("tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page", "timebase")
 )
-# Of systemd: all ways into a suspend need sleep.target.
+# Every kind of suspend of systemd needs sleep.target.
 MASK_SLEEP = "sudo systemctl mask sleep.target"
 # A processor that takes longer than this part of the tick to wake up is late by itself.
 WAKE_SHARE = 0.1
 
 
 def _read(file: Path) -> str | None:
-    """Text of a file of the kernel, or None."""
+    """Return the text of a file of the kernel; None where it cannot be read."""
     try:
         return file.read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
@@ -117,9 +117,9 @@ def swap(root: Path) -> Finding:
 
 
 def huge_pages(root: Path) -> Finding:
-    """Check whose memory the kernel may join to pages of 2 MiB, in steps that nothing interrupts.
+    """Check whether the kernel joins memory into pages of 2 MiB, which nothing can interrupt.
 
-    The daemon refuses it for its own memory; that of other programs is joined on any processor.
+    The daemon refuses it for its own memory; for other programs it happens on any processor.
     """
     modes = _read(root / "sys/kernel/mm/transparent_hugepage/enabled") or ""
     mode = re.search(r"\[(\w+)\]", modes)
@@ -183,7 +183,7 @@ def clock_source(root: Path) -> Finding:
 
 
 def suspend(root: Path) -> Finding:
-    """Check whether the machine can be suspended: by its lid, a key, a desktop that is idle."""
+    """Check whether lid, key or an idle desktop can suspend the machine."""
     states = _read(root / "sys/power/state")
     if not states:
         return Finding("suspend", Level.OK, "the kernel offers none")
@@ -237,7 +237,7 @@ def processors(root: Path, number: int) -> Finding:
 
 
 def others(load: float, number: int) -> Finding:
-    """Check what else was running before the first run: the run called idle has it too.
+    """Check which programs ran before the first run: the run called idle includes them.
 
     Args:
         load: processes that ran or waited for a processor, mean of a minute.

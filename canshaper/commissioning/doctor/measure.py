@@ -1,4 +1,4 @@
-"""One run of the loop with joysticks, and the times that come of it."""
+"""One run of the loop with joysticks, and the times that it shows."""
 
 import json
 import socket
@@ -14,7 +14,7 @@ from canshaper.commissioning.doctor.processes import Children, load_kinds, outpu
 from canshaper.errors import MeasurementError
 from canshaper.machine.deployment import Deployment
 
-# How often the run is looked after, and how much longer than asked it may take.
+# Time between two looks at the run, and how much longer than asked it may take.
 LOOK_S = 0.2
 PATIENCE_S = 120.0
 
@@ -24,9 +24,9 @@ class Run:
     """Measurements of one run; times in ns.
 
     Attributes:
-        late_ns: how late each tick began after its deadline; without the first, which sets them.
-        valve_ns: from the begin of a tick to its last valve frame, where it sent one.
-        tick_ns: from begin to end of each tick.
+        late_ns: delay of each tick after its deadline; without the first, which sets the deadlines.
+        valve_ns: from the start of each tick to its last valve frame, where it sent one.
+        tick_ns: duration of each tick.
         joystick_ns: from each frame of a joystick to the next valve frame computed with it, for
             each axis of the joystick.
         missed: deadlines missed.
@@ -97,7 +97,7 @@ def _result(
     begin = time.monotonic()
     while (passed := time.monotonic() - begin) < seconds + PATIENCE_S:
         on_progress(passed)
-        if hand.poll():  # it fails before the loop can know
+        if hand.poll():  # they failed, and the loop would wait for them
             output(hand, PATIENCE_S)
         with suppress(subprocess.TimeoutExpired):
             result: dict[str, Any] = json.loads(output(loop, LOOK_S))
@@ -108,7 +108,7 @@ def _result(
 def run_of(
     deployment: Deployment, record: dict[str, Any], hand: dict[str, list[tuple[int, int]]]
 ) -> Run:
-    """Bring together what loop and joysticks noted.
+    """Return the run, out of the records of loop and joysticks.
 
     Args:
         deployment: what was run.

@@ -1,4 +1,4 @@
-"""Processes of a measurement, ended whatever happens, and those that keep the PC busy."""
+"""Child processes of a measurement, and those that keep the PC busy; none outlives it."""
 
 import contextlib
 import json
@@ -60,7 +60,7 @@ class Children:
         """
         sockets = dict(sockets or {})
         options |= {"module": module, "parent": os.getpid(), "sockets": sockets}
-        # Isolated, with the path of this process: what finds canshaper here finds it there.
+        # Isolated, with the import path of this process, so that it finds the same canshaper.
         path = [str(Path(entry).resolve()) for entry in sys.path]
         flags = ["-I", *(["-B"] if sys.dont_write_bytecode else [])]
         code = _CODE.format(path=path)
@@ -83,7 +83,7 @@ class Children:
 
 
 def ready(process: "subprocess.Popen[str]") -> None:
-    """Wait until a child says that it is ready; nothing else is printed before its end.
+    """Wait until a child prints that it is ready; it prints nothing else before its end.
 
     Raises:
         MeasurementError: it ended instead.
@@ -108,21 +108,21 @@ def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
 
 
 def be() -> None:
-    """Run a child: tie it to its parent, however that ends; then call its ``main``."""
+    """Run a child: let it end with its parent, then call ``main`` of its module."""
     options: dict[str, Any] = json.loads(sys.argv[1])
     end_with_parent(signal.SIGKILL)
-    if os.getppid() != options["parent"]:  # it ended before that call
+    if os.getppid() != options["parent"]:  # the parent ended before that call
         sys.exit(1)
     import_module(f"canshaper.commissioning.doctor.{options['module']}").main(options)
 
 
 def say_ready() -> None:
-    """Report to the parent that the work can begin."""
+    """Tell the parent that the work can begin."""
     print(READY, flush=True)
 
 
 def real_time(priority: int) -> str | None:
-    """Ask for SCHED_FIFO with this priority; None, or why it is not permitted."""
+    """Ask for SCHED_FIFO with this priority; return None, or why it is refused."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError as error:
@@ -131,10 +131,10 @@ def real_time(priority: int) -> str | None:
 
 
 def before_the_rest() -> None:
-    """Let this thread come after the daemon and before all else, where that is permitted.
+    """Give this thread the priority just below that of the daemon, where that is permitted.
 
-    A browser that draws without a graphics card takes every processor, and joysticks that are late
-    are a fault. What is started from here does not inherit it.
+    A browser that draws without a graphics card keeps every processor busy, and late joysticks are
+    a fault. Child processes do not inherit the priority.
     """
     with contextlib.suppress(OSError, AttributeError):  # only Linux has it
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
@@ -153,7 +153,7 @@ def _busy() -> None:
 
 
 def _memory() -> None:
-    """Take memory, touch all of it, give it back."""
+    """Allocate memory, touch all of it, free it."""
     block = bytearray(b"\1") * BLOCK_BYTES
     block.reverse()
 
@@ -182,12 +182,12 @@ KINDS: dict[str, Callable[[], None]] = {
 
 
 def load_kinds() -> list[str]:
-    """Processes of the load: a busy one for each processor, and one of each other kind."""
+    """Return the kinds of the load: a busy one for each processor, and one of each other kind."""
     return ["busy"] * len(os.sched_getaffinity(0)) + ["memory", "disk", "timers"]
 
 
 def main(options: dict[str, Any]) -> None:
-    """Be one of them until killed."""
+    """Run one process of the load until it is killed."""
     step = KINDS[options["kind"]]
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     say_ready()

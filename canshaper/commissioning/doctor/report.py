@@ -67,7 +67,7 @@ def print_report(
     findings: list[Finding],
     console: Console,
 ) -> None:
-    """Histograms, figures, findings with their remedies, verdict."""
+    """Print histograms, figures, findings with their remedies, and the verdict."""
     names = " and ".join(runs)
     console.print(
         f"{deployment.path}: tick {deployment.config.tick_ms} ms, {len(deployment.axes)} axes;"
@@ -83,7 +83,7 @@ def print_report(
 
 
 def _histograms(title: str, series: dict[str, list[int]]) -> Table:
-    """Bars side by side, one row for each bin."""
+    """Return histograms side by side, a row for each bin."""
     head = f"{title}, us"
     table = new_table("up to", title=head)
     counts = {name: histogram(times) for name, times in series.items()}
@@ -101,7 +101,7 @@ def _histograms(title: str, series: dict[str, list[int]]) -> Table:
 
 
 def _bar(count: int, most: int) -> str:
-    """A bar in eighths of a character; one frame in a thousand is still to be seen."""
+    """Return a bar in eighths of a character; a single count still shows."""
     if count == 0:
         return ""
     eighths = max(round(8 * BAR * count / most), 1)

@@ -1,4 +1,4 @@
-"""Findings of the doctor, what they mean together, and their figures."""
+"""Findings of the doctor: figures of its runs, the checks that judge them, the verdict."""
 
 import math
 from bisect import bisect_left
@@ -31,12 +31,12 @@ class Summary:
 
 
 def quantile(ordered: Sequence[int], share: float) -> int:
-    """The smallest of the values (in order) that at least this share of all does not exceed."""
+    """Return the smallest value that at least this share of all values (in order) keeps to."""
     return ordered[max(math.ceil(share * len(ordered)), 1) - 1]
 
 
 def summary(times_ns: Sequence[int]) -> Summary | None:
-    """Figures of times in ns; None where there are none."""
+    """Return the quantiles of times in ns; None without times."""
     if not times_ns:
         return None
     ordered = sorted(times_ns)
@@ -45,9 +45,9 @@ def summary(times_ns: Sequence[int]) -> Summary | None:
 
 
 def histogram(times_ns: Sequence[int]) -> dict[int, int]:
-    """Number of times in each bin, by its upper end in us (which belongs to it).
+    """Return the number of times in each bin, by the upper end of the bin in us, included.
 
-    Bins from the first to the last that is not empty.
+    The bins go from the first to the last that is not empty.
     """
     counts = [0] * len(ENDS_US)
     for time_ns in times_ns:
@@ -72,7 +72,14 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding; ``remedy`` says what to do where there is something to do."""
+    """Result of a check.
+
+    Attributes:
+        subject: what was checked.
+        level: how severe it is.
+        found: what was found.
+        remedy: what to do; empty where there is nothing to do.
+    """
 
     subject: str
     level: Level
@@ -81,20 +88,20 @@ class Finding:
 
 
 def fit(findings: list[Finding]) -> bool:
-    """Whether nothing is bad."""
+    """Return whether no finding is bad."""
     return all(finding.level is not Level.BAD for finding in findings)
 
 
 # Names of the runs.
 IDLE, LOADED = "idle", "under load"
-# Parts of the tick, of the 99.9 % quantile: good up to the first, bad above the second.
+# The 99.9 % quantile as a part of the tick: good up to the first, bad above the second.
 LATE_SHARES = (0.1, 0.5)
 BUSY_SHARES = (0.25, 0.5)
 # One in so many deadlines may be missed under load: as rare as the quantile counts.
 MISSED_ONE_IN = 1000
 # Reasons for which only a PC that is too slow is to blame.
 OVERLOADED = frozenset(("LOOP_OVERRUN", "LOOP_STALLED"))
-# States of an axis that lost its input, and what is said of it.
+# States of an axis that lost its input.
 LOST = frozenset(("STOPPING", "TRIPPED"))
 
 UNIT = "canshaper@.service"
@@ -116,7 +123,7 @@ def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Find
 
 
 def waiting(deployment: Deployment) -> list[Finding]:
-    """Note that joystick frames wait for the tick unnecessarily; measured without that wait."""
+    """Note that joystick frames wait for the tick, where ticks could follow a joystick."""
     config = deployment.config
     subject = "wait for the tick"
     if config.tick:
@@ -148,7 +155,7 @@ def _share_finding(
 
 
 def _held_up(run: Run) -> str:
-    """Return a remedy where other processes kept the loop from running."""
+    """Return what to do where other processes kept the loop from running."""
     return AS_ROOT if run.policy else REAL_TIME
 
 
@@ -166,7 +173,7 @@ def processing(name: str, run: Run, tick_ns: int) -> Finding:
 
 
 def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
-    """Judge deadlines at which nothing was computed; the valves held their last command."""
+    """Judge missed deadlines: nothing was computed, and the valves held their last command."""
     subject = f"deadlines {name}"
     of = len(run.late_ns) + run.missed
     measured = f"{run.missed} of {of} missed"
@@ -181,7 +188,7 @@ def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
 
 
 def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
-    """Judge joystick to valve: the wait for the next valve frame, and what comes on top."""
+    """Judge the time from joystick to valve beyond the wait for the next valve frame."""
     subject = f"joystick to valve {name}"
     quantiles = summary(run.joystick_ns)
     if quantiles is None:
@@ -199,7 +206,7 @@ def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
 
 
 def motion(name: str, run: Run, axes: list[str]) -> Finding:
-    """Check that the axes were at work as on the machine, and that none stopped."""
+    """Check that every axis moved as on the machine, and that none stopped."""
     subject = f"axes {name}"
     stops = Counter(
         f"{axis} {state} {reason}" for axis, state, reason in run.events if state in LOST

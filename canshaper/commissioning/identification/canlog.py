@@ -4,8 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from ipaddress import ip_address
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +21,6 @@ from canshaper.commissioning.identification.series import (
     ordered,
     unit_of,
 )
-from canshaper.commissioning.identification.table import is_table
 from canshaper.errors import ConfigError, CutOffError, IdentificationError, LogError
 from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages, load_dbc
@@ -34,7 +31,7 @@ from canshaper.shipped import data_directory
 
 @dataclass
 class _Reader:
-    """A signal that is looked for in a log; ``merit`` is the signal of its figure of merit."""
+    """Reader of one signal of a log; ``merit`` names the signal of its figure of merit."""
 
     name: str
     message: Message
@@ -55,7 +52,7 @@ class _Reader:
         self._low, self._high = (low, high) if bounded else (-math.inf, math.inf)
 
     def wants(self, can_id: int, extended: bool) -> bool:
-        """Whether an identifier is that of its message, of J1939 whatever its priority."""
+        """Return whether an identifier is that of the message; of J1939 with any priority."""
         own = self.message.frame_id
         if extended != self.message.is_extended_frame:
             return False
@@ -81,7 +78,7 @@ class _Reader:
 
 
 def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
-    """Message, signal and unit of "Message.Signal".
+    """Return message, signal and unit of the name "Message.Signal".
 
     Raises:
         IdentificationError: it is not in the DBC files, or cannot be used.
@@ -116,7 +113,7 @@ def read_can(
     sources: Mapping[str, int | None] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> dict[str, Series]:
-    """Signals of a log by axis.
+    """Read the signal of each axis from a log.
 
     Args:
         path: the log.
@@ -166,7 +163,7 @@ Seen = Counter[tuple[int, bool]]  # frames of each identifier
 def _read(
     log: LogFile, path: Path, channel: str | None, readers: Sequence[_Reader], commands: Commands
 ) -> tuple[Seen, list[str]]:
-    """Hand every frame to who reads it: which there were, and what to note."""
+    """Hand every frame to its readers; return how often each identifier came, and notes."""
     readers_of: dict[tuple[int, bool], list[_Reader]] = {}
     seen: Seen = Counter()
     notes: list[str] = []
@@ -196,7 +193,7 @@ def _read(
 
 
 def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> list[str]:
-    """Notes on what was left out of a signal.
+    """Return notes on the values of a signal that were left out.
 
     Raises:
         IdentificationError: nothing is left, or it is from two senders.
@@ -225,46 +222,8 @@ def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> li
     return notes
 
 
-# Of the simulated crane alone: no sensor of a machine reports the swing in both directions.
-_OWN = "GrappleSway"
-# So many frames hold every message of a bus; the simulated crane sends its own every 20 ms.
-_FRAMES = 5000
-
-
-def is_simulated(log: Path, messages: Messages) -> bool:
-    """Whether a log was recorded on a virtual bus, or has what only the simulated crane sends.
-
-    A table is of a machine.
-
-    Raises:
-        LogError: the log cannot be read.
-    """
-    if is_table(log):
-        return False
-    message = messages.find(_OWN)
-    own = None if isinstance(message, str) else (message[1].frame_id, message[1].is_extended_frame)
-    try:
-        return any(
-            (frame.can_id, frame.extended) == own or _is_virtual(frame.channel)
-            for frame in islice(LogFile(log), _FRAMES)
-        )
-    except CutOffError:
-        return False
-
-
-def _is_virtual(channel: str) -> bool:
-    """Whether a channel of a log is one of vcan, or the address of a bus over UDP."""
-    if channel.startswith(("vcan", "vxcan")):
-        return True
-    try:
-        ip_address(channel)
-    except ValueError:
-        return False
-    return True
-
-
 def messages_of(files: Sequence[Path], deployment: Deployment | None) -> Messages:
-    """Messages that name the signals."""
+    """Return the messages of DBC files, else of the deployment, else of the forwarder."""
     if not files and deployment:
         return deployment.messages
     paths = files or [data_directory() / "dbc" / "forwarder.dbc"]

@@ -1,4 +1,4 @@
-"""Input of ``canshaper identify``, logs and tables, a phone or a stopwatch, to findings."""
+"""Findings from the input of ``canshaper identify``: CAN logs, tables, phone, stopwatch."""
 
 import math
 from collections.abc import Sequence
@@ -9,29 +9,31 @@ from typing import Any
 
 import numpy as np
 
-from canshaper.commissioning.calibration.write import pair_of, pump_lines, speed_signal
-from canshaper.commissioning.identification.canlog import is_simulated, read_can
+from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.decay import free_columns
 from canshaper.commissioning.identification.segments import find_free
 from canshaper.commissioning.identification.series import Array, Series, Value, ordered
-from canshaper.commissioning.identification.table import Table, is_table, read_table
-from canshaper.commissioning.identification.verdict import Finding, identify
+from canshaper.commissioning.identification.table import Table, read_table
+from canshaper.commissioning.identification.verdict import SwingFinding, identify
+from canshaper.commissioning.origins import origin_of
 from canshaper.edit.edit import written_by
 from canshaper.errors import IdentificationError, UsageError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.tables import is_table
 from canshaper.report.console import OnProgress
+from canshaper_sim.axes import SWAY_SIGNALS
 
-# Width of the ellipse that is swung, part of its length, from which on it is reported.
+# A swing draws an ellipse; one that is wider than this part of its length is reported.
 ROUND = 0.3
-# Swings from the start of the best free one that are looked at for it.
+# So many swings from the start of the best free one show how wide it gets.
 SWINGS = 6
 
 
 def series_of(table: Table, column: str | None, about_s: float | None = None) -> Series:
-    """The swing in a table: a column, or without one what the gyroscope turns about most.
+    """Return the swing in a table: a column, or the rate about the axis that it turns about most.
 
-    ``about_s``: the period as far as it is known, s.
+    ``about_s`` is the approximate period, s; None where it is not known.
 
     Raises:
         IdentificationError: no such column, no gyroscope, or a clock that goes back.
@@ -44,7 +46,7 @@ def series_of(table: Table, column: str | None, about_s: float | None = None) ->
             f"{table.path}: expected the columns of a gyroscope, got {', '.join(table.columns)};"
             " name the column of the swing with --signal AXIS=COLUMN"
         )
-    # One without any number would leave none of the sum of all.
+    # A column without any number would make the sum of all columns NaN.
     names = [n for n in gyroscope if np.isfinite(table.columns[n]).any()]
     if not names:
         raise IdentificationError(
@@ -72,7 +74,7 @@ def series_of(table: Table, column: str | None, about_s: float | None = None) ->
 
 
 def _series(table: Table, column: str, name: str = "", values: Array | None = None) -> Series:
-    """A column, or other values in its unit, under a name of their own."""
+    """Return the series of a column, or of other values in its unit under another name."""
     unit = table.unit(column)
     name, values = (column, table.columns[column]) if values is None else (name, values)
     time, value = ordered(f"{table.path}: {name}", table.time_s, values * unit.factor)
@@ -80,7 +82,7 @@ def _series(table: Table, column: str, name: str = "", values: Array | None = No
 
 
 def _direction(columns: Sequence[Series], about_s: float | None) -> tuple[Array, float]:
-    """Unit vector of the axis it swings about, and how round the swing is, 0 to 1."""
+    """Return the unit vector of the axis of the swing, and its width by its length, 0 to 1."""
     spreads = np.array([float(np.std(one.value)) for one in columns])
     wide = [one for one, s in zip(columns, spreads, strict=True) if s > 0.3 * spreads.max()]
     free = [swings for one in wide if (swings := find_free(one, about_s))]
@@ -92,7 +94,7 @@ def _direction(columns: Sequence[Series], about_s: float | None) -> tuple[Array,
 
 
 def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[Array, float]:
-    """Direction of a swing at its start, and the roundest that it gets: an ellipse turns."""
+    """Return the direction of a swing where it is longest, and its largest width by length."""
     omega = 2.0 * math.pi / period
     ellipses: list[tuple[float, float, Array]] = []  # length, width, direction
     for k in range(-2, 2 * SWINGS):
@@ -111,17 +113,9 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
     return longest[2], max(widths)
 
 
-# Swing of each axis as `canshaper sim` sends it.
-_PARALLEL = ("near_far", "lift_cylinder", "knuckle", "extension")
-_SIMULATED = {
-    "slew": "GrappleSway.SwayPerpendicular",
-    **dict.fromkeys(_PARALLEL, "GrappleSway.SwayParallel"),
-    "bridge": "LoadSway.SwayBridge",
-    "trolley": "LoadSway.SwayTrolley",
-}
 # Name of the axis where neither a deployment nor an option names one.
 UNNAMED = "swing"
-# What a hand adds at either end, and an eye to an angle, as standard deviations.
+# Standard deviations: of a hand at start and end, s, and of an eye, part of the angle.
 _HAND_S = 0.15
 _EYE_PART = 0.1
 _FACTOR = 1.96
@@ -130,10 +124,13 @@ _FACTOR = 1.96
 def stopwatch(
     swings: float, seconds: float, first_deg: float, last_deg: float
 ) -> tuple[Value, Value]:
-    """Period of small swings in s, and damping ratio.
+    """Return the period of small swings, s, and the damping ratio, out of what a person measured.
 
-    Of full swings (there and back) that were counted, and the seconds that they took; amplitudes at
-    the start and at the end are from rest to one side, in degrees.
+    Args:
+        swings: full swings (there and back) that were counted.
+        seconds: how long they took.
+        first_deg: amplitude at the start, from rest to one side.
+        last_deg: amplitude at the end.
 
     Raises:
         IdentificationError: a number makes no swing, or too few swings were counted.
@@ -160,18 +157,22 @@ def stopwatch(
     return Value(period, period_half), Value(ratio, ratio_half)
 
 
-def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> Finding:
+def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> SwingFinding:
     """Return the finding of a stopwatch."""
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
         got = f"none of {', '.join(missing)}" if missing else f"the log {logs[0]}"
         raise UsageError(f"expected {', '.join(timed)} together, and no log, got {got}")
     period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
-    return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
+    return SwingFinding(axis, "", None, [], period_s=period, damping_ratio=ratio)
 
 
 def axis_named(axis: str | None, deployment: Deployment | None) -> str:
-    """The axis of data that names none."""
+    """Return the axis of data that name none: that of --axis.
+
+    Raises:
+        UsageError: the deployment has no such axis.
+    """
     if deployment is None:
         return axis or UNNAMED
     if axis not in deployment.axes:
@@ -182,7 +183,11 @@ def axis_named(axis: str | None, deployment: Deployment | None) -> str:
 
 
 def signals_named(pairs: Sequence[str], deployment: Deployment | None) -> dict[str, str]:
-    """Name of the signal of each axis."""
+    """Return the name of the signal of each axis, out of AXIS=NAME.
+
+    Raises:
+        UsageError: a pair is none, or an axis has two signals.
+    """
     signals: dict[str, str] = {}
     for pair in pairs:
         axis, _, name = pair.partition("=")
@@ -204,8 +209,14 @@ def logged(
     axis: str | None = None,
     channel: str | None = None,
     about_s: float | None = None,
-) -> list[Finding]:
-    """Return the findings of logs, by axis and label."""
+) -> list[SwingFinding]:
+    """Return the findings of logs, one for each axis and label.
+
+    Raises:
+        UsageError: there is no log, or no signal is named.
+        IdentificationError: a signal is not in a log.
+        LogError: a log cannot be read.
+    """
     if not logs:
         raise UsageError(
             "expected a log or a stopwatch, got neither; see canshaper identify --help"
@@ -238,44 +249,30 @@ def logged(
 
 
 def _slower_s(deployment: Deployment | None, axis: str) -> float | None:
-    """Period in the file where its filter covers a second mode, which may swing as much."""
+    """Return the period in the file where its filter covers a second mode; else None.
+
+    The second mode may swing as much as the first.
+    """
     bound = deployment.axes.get(axis) if deployment else None
     design = bound.config.filter.design() if bound else None
     sway = bound.config.sway if bound and design and design.second else None
     return sway.mode().period_s if sway else None
 
 
-def pump_in(
-    deployment: Deployment, logs: Sequence[str], signals: Sequence[str], *, write: bool, **of: Any
-) -> str:
-    """Measure what the pump delivers by logs with the speeds of two axes; see ``pump_lines``."""
-    speeds, drives = signals_named(signals, deployment), []
-    axes = pair_of(deployment, [*speeds])
-    names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
-    for _, path in map(_labelled, logs):
-        shown = read_can(path, names, deployment.messages, deployment=deployment, **of)
-        columns = [time_s := shown[axes[0]].time_s]
-        for name, one in shown.items():
-            if one.command is None or not len(one.time_s):
-                raise IdentificationError(f"{path}: expected commands and speeds of {name}")
-            columns.append(np.interp(time_s, one.command.time_s, one.command.speed))
-            columns.append(np.interp(time_s, one.time_s, one.value))
-        drives.append(np.stack(columns, axis=1).tolist())
-    origin = measured_in(logs, deployment.messages) if write else None
-    return "\n".join(pump_lines(deployment, axes, drives, origin))
-
-
 def measured_in(logs: Sequence[str], messages: Messages) -> dict[str, Any]:
-    """Origin of values from logs or a stopwatch; whether those are simulated may be unknown."""
+    """Return the origin of values from logs, or of a stopwatch, whose crane is not known."""
     if not logs:
         return written_by("identify", simulated=None, log="stopwatch")
-    paths = [path for _, path in map(_labelled, logs)]
-    simulated = any(is_simulated(path, messages) for path in paths)
-    return written_by("identify", simulated=simulated, log=", ".join(path.name for path in paths))
+    return origin_of("identify", paths_of(logs), messages)
+
+
+def paths_of(logs: Sequence[str]) -> list[Path]:
+    """Return the paths of "LABEL=LOG"."""
+    return [_labelled(log)[1] for log in logs]
 
 
 def _labelled(text: str) -> tuple[str, Path]:
-    """Label and path of "LABEL=LOG"; a file that is there has its name."""
+    """Return label and path of "LABEL=LOG"; an existing file with that name has no label."""
     label, equals, rest = text.partition("=")
     if not equals or Path(text).exists():
         return "", Path(text)
@@ -285,12 +282,12 @@ def _labelled(text: str) -> tuple[str, Path]:
 def simulated_signals(
     deployment: Deployment | None, messages: Messages, axis: str | None = None
 ) -> dict[str, str]:
-    """Signals of the simulated crane by axis, of those that the DBC files have."""
-    moves = deployment.coordinates if deployment else {one: one for one in _SIMULATED}
+    """Return the swing signals of the simulated crane by axis, where the DBC files have them."""
+    moves = deployment.coordinates if deployment else {one: one for one in SWAY_SIGNALS}
     return {
         a: signal
         for a, m in moves.items()
         if axis in (None, a)
-        and (signal := _SIMULATED.get(m))
+        and (signal := SWAY_SIGNALS.get(m))
         and not isinstance(messages.find(signal.partition(".")[0]), str)
     }

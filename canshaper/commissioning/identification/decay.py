@@ -1,4 +1,4 @@
-"""Period and damping of free swings, several at once, with an honest interval.
+"""Period and damping of free swings, fitted together, with their intervals.
 
 In a free swing of a pendulum with small damping
 
@@ -22,25 +22,25 @@ from scipy.stats import t as student
 from canshaper.commissioning.identification.series import Array, Segment, Value
 
 CONFIDENCE: Final = 0.95
-# What the noise does not show: a tool on two joints is not quite the pendulum of the model, and a
-# swing in the other direction takes from it and gives back. So the intervals hold the truth in 95 %
-# of simulated cranes that swing in both directions: python -m
+# Errors of the model, which the noise does not show: a tool on two joints is not quite this
+# pendulum, and a swing in the other direction exchanges energy with it. With them the intervals
+# hold the truth in 95 % of simulated cranes that swing in both directions: python -m
 # tests.commissioning.identification.coverage.
 MODEL_PERIOD: Final = 0.002
 MODEL_RATIO: Final = 0.02
 MODEL_RATIO_ABS: Final = 0.001
-# Beyond this no tool swings, and its unit is wrong.
+# No tool swings farther: the unit of the signal is wrong.
 LARGEST_RAD: Final = math.radians(100.0)
-# Frequencies at which the noise is looked at; more show no more.
+# Most frequencies at which the noise is computed; more do not improve it.
 MOST_FREQUENCIES: Final = 80
 
 
 class DecayProblem:
     """Least squares of several segments over common parameters.
 
-    Parameters: frequency w in rad/s, decay s in 1/s, and on request a dry friction, by which the
-    amplitude falls in a second besides. It and the amplitudes at the start of each segment, which
-    are known about, are in the unit of the data.
+    The parameters are the frequency w (rad/s), the decay s (1/s) and on request dry friction, which
+    takes the same amount off the amplitude in every second. Friction, and the approximate
+    amplitudes at the start of each segment, are in the unit of the data.
     """
 
     def __init__(self, segments: Sequence[Segment], amplitudes: Sequence[float]) -> None:
@@ -49,9 +49,9 @@ class DecayProblem:
         self.weights = [1.0] * len(segments)
 
     def basis(self, i: int, x: Array, at: Array | None = None) -> tuple[Array, Array]:
-        """Columns of the linear parameters of a segment, and the envelope that starts at 1.
+        """Return the columns of the linear parameters of a segment, and its envelope from 1 on.
 
-        ``at``: times from the start of the segment, by default its own.
+        ``at`` gives times from the start of the segment; by default they are its own.
         """
         time = self.segments[i].time_s if at is None else at
         omega, sigma = float(x[0]), float(x[1])
@@ -70,13 +70,13 @@ class DecayProblem:
         return free_columns(time, omega * stretched, envelope), envelope
 
     def linear(self, i: int, x: Array) -> tuple[Array, Array, Array]:
-        """Basis, best linear parameters and residual of a segment."""
+        """Return columns, best linear parameters and residual of a segment."""
         basis, _ = self.basis(i, x)
         best, *_ = np.linalg.lstsq(basis, self.segments[i].value, rcond=None)
         return basis, np.asarray(best), self.segments[i].value - basis @ best
 
     def residual(self, x: Array) -> Array:
-        """Residuals of all segments, weighted."""
+        """Return the weighted residuals of all segments."""
         parts = [self.linear(i, x)[2] * weight for i, weight in enumerate(self.weights)]
         return np.concatenate(parts)
 
@@ -88,7 +88,7 @@ class DecayProblem:
         now = np.clip(np.asarray(x, dtype=np.float64), low, high)
         scale = np.array([0.01 * now[0], 0.01 * now[0], 0.01 * max(self.amplitudes)])[: len(x)]
         ftol, most = (1e-4, 30) if roughly else (1e-8, 100)
-        for _ in range(1 if roughly else 3):  # amplitudes and weights follow, and settle at once
+        for _ in range(1 if roughly else 3):  # amplitudes and weights follow, and converge quickly
             now = least_squares(
                 self.residual, now, x_scale=scale, bounds=(low, high), ftol=ftol, max_nfev=most
             ).x
@@ -103,7 +103,7 @@ class DecayProblem:
 
 
 def free_columns(time: Array, phase: Array, envelope: Array) -> Array:
-    """Columns of the linear parameters of a free swing: cosine, sine, offset and drift."""
+    """Return the columns of a free swing's linear parameters: cosine, sine, offset, drift."""
     columns = [envelope * np.cos(phase), envelope * np.sin(phase), np.ones_like(time), time]
     return np.stack(columns, axis=1)
 
@@ -115,15 +115,15 @@ def covariance_of(
     data: Sequence[Segment],
     omega: float,
 ) -> tuple[Array, float]:
-    """Covariance of the parameters of a fit, and the degrees of freedom it rests on.
+    """Return the covariance of the parameters of a fit, and its degrees of freedom.
 
-    What matters of the noise is its density at the frequency of the swing; that is taken from
-    the residual's spectrum around it, so noise that is not white gives no wrong interval.
+    Only noise near the frequency of the swing matters. Its density comes from the spectrum of the
+    residual there, so that noise which is not white gives right intervals too.
 
     Args:
         residual: of all data, one after the other, by the parameters.
         x: the parameters of the best fit.
-        steps: small changes of them.
+        steps: a small change of each, for the derivative.
         data: in the order of the residual.
         omega: frequency of the swing, rad/s.
     """
@@ -142,7 +142,10 @@ def covariance_of(
 
 
 def density(time: Array, residual: Array, omega: float) -> tuple[float, float]:
-    """Power of the residual around a frequency, white noise has its variance; and its freedom."""
+    """Return the power of the residual around a frequency, and its degrees of freedom.
+
+    The power of white noise is its variance.
+    """
     length = float(time[-1] - time[0])
     resolution = 2.0 * math.pi / length
     near = np.arange(0.5 * omega, 1.8 * omega, 0.5 * resolution)
@@ -152,7 +155,7 @@ def density(time: Array, residual: Array, omega: float) -> tuple[float, float]:
     if len(near) > MOST_FREQUENCIES:
         near = near[:: len(near) // MOST_FREQUENCIES + 1]
     spectrum = np.abs(np.exp(-1j * np.outer(near, time)) @ residual) ** 2 / len(time)
-    # The fit has taken its own part out of the residual.
+    # The fitted parameters have taken their part out of the residual.
     lost = len(time) / max(len(time) - 6, 1)
     return float(np.mean(spectrum)) * lost, len(near)
 
@@ -185,14 +188,14 @@ class DecayFit:
     damping_ratio: Value
     segments: list[SegmentFit]
     swings: float  # full swings that were seen
-    # At the largest and the smallest amplitude seen, where the damping surely changes with it.
+    # At the largest and the smallest amplitude, where the damping surely differs; else None.
     friction: tuple[Damping, Damping] | None
 
 
 def fit_decay(segments: Sequence[Segment], period_s: float, damping_ratio: float) -> DecayFit:
     """Fit one period and one damping to free swings, each of a swing and a half or more.
 
-    The search starts at the period, which has to be known to some 10 %, and the damping ratio.
+    The search starts at these values; the period has to be right to some 10 %.
     """
     omega = 2.0 * math.pi / period_s
     amplitudes = [float(np.ptp(s.value[: max(8, len(s.value) // 4)])) / 2.0 for s in segments]
@@ -227,12 +230,12 @@ def _covariance(problem: DecayProblem, x: Array) -> tuple[Array, float]:
 
 
 def swing_values(omega: float, sigma: float) -> tuple[float, float]:
-    """Period and damping ratio."""
+    """Return period and damping ratio of frequency (rad/s) and decay (1/s)."""
     return 2.0 * math.pi / omega, sigma / math.hypot(omega, sigma)
 
 
 def deviations(x: Array, covariance: Array) -> tuple[float, float]:
-    """Standard deviations of period and damping ratio."""
+    """Return the standard deviations of period and damping ratio."""
     omega, sigma = float(x[0]), float(x[1])
     cube = math.hypot(omega, sigma) ** 3
     slopes = np.array([[-2.0 * math.pi / omega**2, 0.0], [-sigma * omega / cube, omega**2 / cube]])
@@ -241,7 +244,7 @@ def deviations(x: Array, covariance: Array) -> tuple[float, float]:
 
 
 def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
-    """Standard deviation of the weighted mean by how the segments differ; 0 for one segment."""
+    """Return the deviation of the weighted mean as the segments differ; 0 for one segment."""
     weights = [1.0 / max(deviation, 1e-9) ** 2 for _, deviation in alone]
     terms = [(w * (value - common)) ** 2 for w, (value, _) in zip(weights, alone, strict=True)]
     count = len(alone)
@@ -249,7 +252,7 @@ def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
 
 
 def _friction(problem: DecayProblem, x: Array) -> tuple[Damping, Damping] | None:
-    """Damping at both ends, where it surely depends on amplitude."""
+    """Return the damping at largest and smallest amplitude, where it surely differs."""
     if len({s.kind for s in problem.segments}) > 1:
         return None
     ends = [float(problem.basis(i, x)[1][-1]) * a for i, a in enumerate(problem.amplitudes)]

@@ -1,8 +1,8 @@
 """The driven swing: full speed of the tip, and the swing itself where it never was free.
 
-The tip follows its command after a delay, with a lag of first order, and drives the pendulum; a
-free swing, an offset and a drift of each stretch come on top and are eliminated. The full speed is
-common to all stretches, and its sign, which is that of the sensor, goes.
+The tip follows its command after a delay, with a lag of first order, and drives the pendulum. Each
+stretch has a free swing, an offset and a drift of its own, which are eliminated. The full speed is
+common to all stretches; its sign is that of the sensor, and is dropped.
 """
 
 import math
@@ -37,23 +37,23 @@ from canshaper.commissioning.identification.series import (
 )
 from canshaper.shaping.sway import GRAVITY_M_S2
 
-# A stretch begins so many periods before its first command, to know the swing that is there
-# already, goes on so many after the last, and is at most about so many long.
+# In periods: a stretch begins so long before its first command, as a swing may be there already,
+# ends so long after its last one, and lasts about so long at most.
 BEFORE, AFTER, LONGEST = 1.0, 2.0, 8.0
-# So much earlier than a stretch a command may still matter: a second of the filter's past, and the
-# longest delay of a valve.
+# Commands so long before a stretch still matter: a second of the filter's past, and the longest
+# delay of a valve.
 EARLIER_S = 2.0
-SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
+SHORTEST_LAG_S: Final = 0.005  # the model has no form without a lag
 # Longest delay and lag of a valve that are looked for, s.
 LONGEST_DELAY_S, LONGEST_LAG_S = 0.5, 0.6
-# Stretches of a long log, spread over it, that are tried first from every start; all of them then
-# from the best one.
+# Of a long log so many stretches, spread over it, are solved from every start; then all of them
+# from the best solution.
 FIRST_STRETCHES: Final = 16
-# What a linear model with a delay and a lag leaves wrong of the full speed of a real valve: on the
-# simulated crane, with a rate limit, it comes out up to 11 % too low.
+# Error of the full speed by the linear model of the valve, as a part: with the rate limit of the
+# simulated crane it comes out up to 11 % too low.
 MODEL_PART = 0.12
-# The same of the period, and of the damping ratio itself, as large swings are slower and the other
-# direction swings too: as in canshaper.commissioning.identification.decay.
+# Errors of the period, as a part, and of the damping ratio: large swings are slower, and the other
+# direction swings too. See canshaper.commissioning.identification.decay.
 MODEL_PERIOD, MODEL_RATIO_ABS = 0.013, 0.009
 
 
@@ -65,7 +65,7 @@ class Driven(Segment):
 
 
 class Stretch(NamedTuple):
-    """A stretch of driving, the model of it, and the speed that is commanded at its times."""
+    """A stretch of driving, its fitted swing, and the commanded speed at its times."""
 
     data: Driven
     fitted: Array
@@ -79,13 +79,15 @@ class DrivenFit:
     full_speed_m_s: Value | None  # of the tip at full command; None where the signal is no angle
     period_s: Value | None  # of the damped swing, where it was looked for
     damping_ratio: Value | None  # where it was looked for
-    explained: float  # part of what the commands could have made that they explain
+    explained: (
+        float  # part of the swing, without what free swings explain, that the commands explain
+    )
     delay_s: float  # delay and lag of the valve together
     stretches: list[Stretch]
 
 
 def stretches(series: Series, period: float) -> list[Driven]:
-    """Stretches of a series with commands, each with some periods before and after them."""
+    """Return the stretches with commands, each with some periods before and after them."""
     command = series.command
     if command is None or not len(command.time_s):
         return []
@@ -118,10 +120,10 @@ def stretches(series: Series, period: float) -> list[Driven]:
 def swing_filter(
     omega: float, sigma: float, lag: float, kind: Kind, step_s: float = BIN_S
 ) -> tuple[Array, Array]:
-    """Swing by the speed that is commanded, sampled with a zero-order hold: b and a of z^-1.
+    """Return b and a (of z^-1) of the filter from commanded speed to swing, zero-order hold.
 
-    By partial fractions of the step response, as a matrix exponential for every try of the solver
-    takes most of its time. The three poles differ: one is real, two are not.
+    They come from partial fractions of the step response: a matrix exponential would take most of
+    the solver's time. The three poles always differ: one is real, two are complex.
     """
     square = omega**2 + sigma**2
     poles = np.array([-1.0 / lag, complex(-sigma, omega), complex(-sigma, -omega)])
@@ -137,13 +139,13 @@ def swing_filter(
 
 @dataclass(frozen=True, slots=True)
 class DrivenProblem:
-    """Least squares over the model of a driven swing; what is linear in it is eliminated.
+    """Least squares over the model of a driven swing, whose linear parameters are eliminated.
 
     Attributes:
         data: the stretches.
-        model: gives, by the parameters, for each stretch its swing at 1 m/s full speed, and the
-            columns of what else it may hold.
-        low, high, scale: bounds of the parameters, and what is a step of them.
+        model: returns for each stretch, by the parameters, its swing at 1 m/s full speed, and the
+            columns of its free swing and offset.
+        low, high, scale: bounds of the parameters, and the size of a step of each.
         starts: parameters that the solver starts from.
     """
 
@@ -155,13 +157,13 @@ class DrivenProblem:
     starts: list[list[float]]
 
     def solved(self, *starts: Sequence[float] | Array) -> Array:
-        """The best solution from some starts."""
+        """Return the best solution from some starts."""
         solve = partial(least_squares, self.residual, bounds=(self.low, self.high), max_nfev=60)
         fits = [solve(x, x_scale=self.scale) for x in starts]
         return np.asarray(min(fits, key=lambda fit: float(fit.cost)).x)
 
     def projected(self, x: Array) -> list[tuple[Array, Array]]:
-        """Return for each stretch: unit swing and data, both without what free swings explain."""
+        """Return for each stretch swing and data, both without what its columns explain."""
         pairs = []
         for one, (swing, free) in zip(self.data, self.model(x), strict=True):
             q, _ = np.linalg.qr(free)
@@ -169,23 +171,23 @@ class DrivenProblem:
         return pairs
 
     def residual(self, x: Array, gain: float | None = None) -> Array:
-        """What is left of all data, by the best gain or another one."""
+        """Return the residual of all data, with the best gain or a given one."""
         projected = self.projected(x)
         gain = gain_of(projected) if gain is None else gain
         return np.concatenate([y - gain * h for h, y in projected])
 
     def squares(self, x: Array) -> tuple[float, float]:
-        """Sum of the squares of the data without free swings, and of what is left of them."""
+        """Return the sums of squares: of the data without free swings, and of their residual."""
         left = self.residual(x)
         return sum(float(y @ y) for _, y in self.projected(x)), float(left @ left)
 
     def explained(self, x: Array) -> float:
-        """Part of what the commands could have made that they explain."""
+        """Return the part of the data, without free swings, that the commands explain."""
         total, left = self.squares(x)
         return 1.0 - left / max(total, 1e-30)
 
     def fitted(self, x: Array) -> list[tuple[Array, Array]]:
-        """Return for each stretch: the model, and the amounts of what else it holds."""
+        """Return for each stretch its fitted swing, and the factors of its columns."""
         gain, fits = gain_of(self.projected(x)), list[tuple[Array, Array]]()
         for one, (swing, free) in zip(self.data, self.model(x), strict=True):
             amounts, *_ = np.linalg.lstsq(free, one.value - gain * swing, rcond=None)
@@ -194,7 +196,7 @@ class DrivenProblem:
 
 
 def gain_of(projected: Sequence[tuple[Array, Array]]) -> float:
-    """Full speed of least squares, with the sign of the sensor."""
+    """Return the full speed of least squares, with the sign of the sensor."""
     square = sum(float(h @ h) for h, _ in projected)
     return sum(float(h @ y) for h, y in projected) / max(square, 1e-30)
 
@@ -206,8 +208,8 @@ def fit_driven(
 
     Args:
         series: its signals, of which those count that have commands.
-        periods: periods that it may have, about, s; the one that explains most counts.
-        free: period and damping as the free swings show them; None looks for them here.
+        periods: approximate periods to try, s; the one that explains most counts.
+        free: fit of the free swings, which fixes period and damping; None to fit them here.
     """
     fits = []
     for period in periods:
@@ -226,9 +228,9 @@ def fit_driven(
 
 
 def _problem(data: Sequence[Driven], omega: float, free: DecayFit | None) -> DrivenProblem:
-    """Over delay and lag of the valve and, without a free swing, frequency and decay."""
+    """Return the problem over delay and lag of the valve; without ``free``, the swing's too."""
     low, high = [0.0, 0.0], [LONGEST_DELAY_S, LONGEST_LAG_S]
-    # A delay and a lag of the valve do nearly the same; from two starts the better one.
+    # Delay and lag of a valve act nearly alike: of two starts the better solution counts.
     starts = [[0.1, 0.1], [0.3, 0.02]]
     if free is None:
         low += [0.75 * omega, 0.0]
@@ -238,7 +240,7 @@ def _problem(data: Sequence[Driven], omega: float, free: DecayFit | None) -> Dri
 
 
 def _pole(free: DecayFit | None, x: Array) -> tuple[float, float]:
-    """Frequency and decay."""
+    """Return frequency, rad/s, and decay, 1/s."""
     if free is None:
         return float(x[2]), float(x[3])
     omega, ratio = 2.0 * math.pi / free.period_s.value, max(free.damping_ratio.value, 0.0)

@@ -17,7 +17,7 @@ from canshaper.commissioning.identification.decay import DecayFit, SegmentFit
 from canshaper.commissioning.identification.driven import DrivenFit
 from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
-from canshaper.commissioning.identification.verdict import Finding
+from canshaper.commissioning.identification.verdict import SwingFinding
 from canshaper.report import style
 
 ROW_PX, TITLE_PX, FOOT_PX = 640, 38, 150
@@ -33,11 +33,11 @@ _UNITS = {
 }
 
 
-def figure(findings: Sequence[Finding], titles: Sequence[str]) -> Figure:
-    """The picture.
+def figure(findings: Sequence[SwingFinding], titles: Sequence[str]) -> Figure:
+    """Draw the picture of an identification.
 
     Args:
-        findings: those in which something was found, at most ``MOST_ROWS`` are drawn.
+        findings: those with a swing; at most ``MOST_ROWS`` are drawn.
         titles: the recommendations, a line each.
     """
     rows = list(findings)[:MOST_ROWS]
@@ -66,8 +66,8 @@ def figure(findings: Sequence[Finding], titles: Sequence[str]) -> Figure:
     return fig
 
 
-def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
-    """The segment with the largest swing, of the signal with the longest, with what is around."""
+def _draw_free(panel: Axes, finding: SwingFinding, fit: DecayFit) -> None:
+    """Draw the largest free swing of the signal with the longest one, and what is around it."""
     source = max(fit.segments, key=lambda s: float(s.segment.time_s[-1])).segment.source
     same = [s for s in fit.segments if s.segment.source == source]
     largest = max(same, key=lambda s: float(s.envelope[0]))
@@ -98,7 +98,7 @@ def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
 
 
 def _draw_decay(panel: Axes, fit: DecayFit) -> None:
-    """Amplitude of every half swing over the number of swings: a straight line when viscous."""
+    """Draw the amplitude of each half swing; viscous damping makes a straight line."""
     period, ratio = fit.period_s.value, fit.damping_ratio.value
     for one in fit.segments:
         swings, sizes = _half_swings(one, period)
@@ -118,7 +118,7 @@ def _draw_decay(panel: Axes, fit: DecayFit) -> None:
 
 
 def _half_swings(one: SegmentFit, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Swings since the start, and amplitude, of each extreme; the envelope starts at 1."""
+    """Return number of swings since the start and amplitude of each extreme; the first is 1."""
     time = one.segment.time_s
     left = (one.segment.value - one.base) / one.envelope[0]
     samples = period / float(np.median(np.diff(time)))
@@ -130,7 +130,7 @@ def _half_swings(one: SegmentFit, period: float) -> tuple[np.ndarray, np.ndarray
 
 
 def _draw_driven(panel: Axes, fit: DrivenFit) -> None:
-    """The first stretches of driving."""
+    """Draw the first stretches of driving."""
     for data, fitted, speed in fit.stretches[:3]:
         factor, at = data.kind.shown[0], data.start_s + data.time_s
         driven = factor * float(np.abs(data.value).max()) * np.sign(speed)

@@ -1,4 +1,4 @@
-"""Report of an identification, its lines in the file, and the sway data that it recommends."""
+"""Report of an identification: lines, JSON, advice on the sway data, writing it."""
 
 import math
 import statistics
@@ -6,20 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from canshaper.commissioning.assumed import confirmed
 from canshaper.commissioning.identification.series import Value
-from canshaper.commissioning.identification.verdict import Finding
+from canshaper.commissioning.identification.verdict import SwingFinding
+from canshaper.commissioning.origins import confirmed
 from canshaper.config.limits import Sway
-from canshaper.edit.edit import Change, FileValue, change, note
+from canshaper.edit.edit import Change, FileValue, change, flow, note
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.stop_distance import stop_fault
 from canshaper.report.console import axis_title
 
-# Difference of pendulum lengths, +- %, up to which one value in the middle is what we recommend
-# without a signal of the grapple; the robust shaper covers it.
+# Without a signal of the grapple one value in the middle is recommended up to this difference of
+# pendulum lengths, +- %: the robust shaper covers it.
 ONE_VALUE_PCT = 30.0
-# Up to here the difference needs no sets either.
+# Up to this difference, +- %, one value is enough with any filter.
 SAME_PCT = 8.0
 
 SwayNumbers = dict[str, float]  # values for the section ``sway``
@@ -38,13 +38,13 @@ class Advice:
     gain_schedule: list[tuple[float | None, str, SwayNumbers]] = field(default_factory=list)
 
 
-def advice_on(findings: Sequence[Finding], deployment: Deployment | None) -> list[Advice]:
+def advice_on(findings: Sequence[SwingFinding], deployment: Deployment | None) -> list[Advice]:
     """Return the advice on each axis."""
     axes = dict.fromkeys(f.axis for f in findings)
     return [_advise(axis, [f for f in findings if f.axis == axis], deployment) for axis in axes]
 
 
-def _advise(axis: str, findings: Sequence[Finding], deployment: Deployment | None) -> Advice:
+def _advise(axis: str, findings: Sequence[SwingFinding], deployment: Deployment | None) -> Advice:
     """Put the findings of one axis together, one for each state of the grapple.
 
     The full speed of the deployment is kept where none was measured.
@@ -82,7 +82,7 @@ def _advise(axis: str, findings: Sequence[Finding], deployment: Deployment | Non
     return Advice(axis, text, sway, spread, cover)
 
 
-def _values(finding: Finding, speed_m_s: float | None) -> SwayNumbers:
+def _values(finding: SwingFinding, speed_m_s: float | None) -> SwayNumbers:
     """Return the sway values of a finding as they are written."""
     assert finding.period_s and finding.damping_ratio
     values = {
@@ -106,8 +106,8 @@ def _middle(values: Sequence[SwayNumbers]) -> tuple[SwayNumbers, float]:
     return sway, 100.0 * (high - low) / (high + low)
 
 
-def headlines(findings: Sequence[Finding], advice: Sequence[Advice]) -> list[str]:
-    """Recommendations for a picture that has the numbers of each finding: those that say more."""
+def headlines(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> list[str]:
+    """Return the recommendations that say more than the numbers of one finding, for the picture."""
     texts = []
     for one in advice:
         mine = [finding for finding in findings if finding.axis == one.axis]
@@ -116,13 +116,8 @@ def headlines(findings: Sequence[Finding], advice: Sequence[Advice]) -> list[str
     return texts
 
 
-def flow(values: SwayNumbers) -> str:
-    """The values as they stand in a deployment file."""
-    return "{ " + ", ".join(f"{k}: {v:g}" for k, v in values.items()) + " }"
-
-
-def lines(finding: Finding) -> list[str]:
-    """A finding for people, one line a fact: its numbers, and what they rest on."""
+def lines(finding: SwingFinding) -> list[str]:
+    """Return the lines of a finding: its numbers, and the data that they rest on."""
     texts = [heading(finding)]
     if (fit := finding.free) is not None:
         first = max(float(s.envelope[0]) for s in fit.segments)
@@ -142,12 +137,11 @@ def lines(finding: Finding) -> list[str]:
         )
     if finding.at is not None:
         texts.append(f"  load state: {finding.at:g}")
-    texts += [f"  note: {text}" for text in finding.notes]
-    return texts + [f"  not enough data: {fault}" for fault in finding.problems]
+    return texts + finding.remarks()
 
 
-def heading(finding: Finding) -> str:
-    """Name and numbers of a finding: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
+def heading(finding: SwingFinding) -> str:
+    """Return name and numbers of a finding: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
     name = axis_title(finding.axis) + (f", {finding.label}" if finding.label else "")
     if finding.period_s is None or finding.damping_ratio is None:
         return f"{name}: nothing found"
@@ -158,11 +152,11 @@ def heading(finding: Finding) -> str:
     )
     if speed := finding.full_speed_m_s:
         text += f", full speed {speed.value:.2f} ± {speed.half:.2f} m/s"
-    return text if finding.usable else f"{text} (not enough data)"
+    return finding.marked(text)
 
 
 def set_lines(advice: Advice) -> list[str]:
-    """The lines of ``gain_schedule`` for the deployment file; each still needs its filter."""
+    """Return the lines of ``gain_schedule`` for the file; each breakpoint still needs a filter."""
     texts = ["    gain_schedule:"]
     for at, label, sway in sorted(advice.gain_schedule, key=lambda s: (s[0] is None, s[0])):
         shown = "?" if at is None else f"{at:g}"
@@ -172,8 +166,8 @@ def set_lines(advice: Advice) -> list[str]:
     return texts
 
 
-def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, Any]:
-    """Everything as JSON takes it."""
+def as_dict(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> dict[str, Any]:
+    """Return findings and advice as JSON data."""
     return {
         "findings": [
             {
@@ -186,7 +180,7 @@ def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, 
                 "full_speed_m_s": _interval(f.full_speed_m_s),
                 "free_decays": len(f.free.segments) if f.free else 0,
                 "swings": round(f.free.swings, 2) if f.free else None,
-                "too_poor": f.problems,
+                "problems": f.problems,
                 "notes": f.notes,
             }
             for f in findings
@@ -206,7 +200,7 @@ def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, 
 
 
 def _interval(value: Value | None) -> dict[str, float] | None:
-    """Value and its interval of 95 %."""
+    """Return a value with its interval of 95 %; None for none."""
     if value is None:
         return None
     return {"value": value.value, "low": value.value - value.half, "high": value.value + value.half}
@@ -214,11 +208,11 @@ def _interval(value: Value | None) -> dict[str, float] | None:
 
 def write_sway(
     deployment: Deployment,
-    findings: Sequence[Finding],
+    findings: Sequence[SwingFinding],
     advice: Sequence[Advice],
     origin: dict[str, Any],
 ) -> list[str]:
-    """Write what is known of each axis, and where from; the axes that were written.
+    """Write the sway data of each axis with their origin; return the axes that were written.
 
     Raises:
         UsageError: an axis has no section for it, follows its rope, or would travel on for too

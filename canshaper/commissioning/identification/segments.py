@@ -33,15 +33,15 @@ from canshaper.commissioning.identification.swing import (
 )
 
 SHORTEST_S, LONGEST_S = 0.3, 12.0
-# Values of a part of a signal from which on its spectrum shows something, and its length.
+# The spectrum is computed of parts of a signal: least values of a part, and its length, s.
 LEAST_VALUES, PART_S = 24, 30.0
-# Width of the window that smooths, part of a period.
+# Width of the smoothing window, part of a period.
 SMOOTHED = 0.6
-# Windows a period; a segment's end is known to this part of a period.
+# Windows in a period; the ends of a segment are known to this part of it.
 STEPS = 16
 # A window counts when its sinusoid explains all but this part of its own amplitude.
 ROUGHEST = 0.25
-# Of the best segment's energy times time a segment has at least such a part.
+# A segment has at least this part of the best one's worth, which is energy times time.
 LEAST_WORTH = 0.04
 # By how much the frequency of a weak segment may differ from that of the best one.
 ALIKE = 0.03
@@ -52,7 +52,7 @@ SETTLING_S = 0.5
 
 
 class FreeSwings(NamedTuple):
-    """Free swings of a signal, about their period and damping ratio, and energy times time."""
+    """Free swings of a signal, approximate period and damping ratio, and energy times time."""
 
     segments: list[Segment]
     period_s: float
@@ -61,9 +61,9 @@ class FreeSwings(NamedTuple):
 
 
 def find_free(series: Series, about_s: float | None = None) -> FreeSwings | None:
-    """The free swings of a series, each of a period and a half or more; None without any.
+    """Return the free swings of a series, each of a period and a half or more; None without any.
 
-    Where the period is known about, in s, some 30 % around it are searched.
+    ``about_s`` is the approximate period, s, from which the search goes some 30 % either way.
     """
     time, value = binned(series.time_s, series.value)
     if about_s:
@@ -74,7 +74,7 @@ def find_free(series: Series, about_s: float | None = None) -> FreeSwings | None
         idle = [(begin + SETTLING_S, end) for begin, end in series.idle]
     best: FreeSwings | None = None
     for period in _candidates(time, value, about_s):
-        # What swings far less than the best so far need not be looked at.
+        # What swings far less than the best so far is not worth a fit.
         least = LEAST_WORTH * best.worth if best else 0.0
         swings = _with_period(signal, idle, period, least)
         # The period of the windows may be some percent off at first.
@@ -86,7 +86,7 @@ def find_free(series: Series, about_s: float | None = None) -> FreeSwings | None
 
 
 def _smoothed(time: Array, value: Array, period: float) -> tuple[Array, Array]:
-    """A signal without what swings more than twice as fast as a period.
+    """Return a signal without what swings more than twice as fast as a period.
 
     A weighted mean changes amplitude and phase of a damped swing, and neither its frequency nor its
     decay; the amplitude is put right again.
@@ -109,7 +109,7 @@ def _smoothed(time: Array, value: Array, period: float) -> tuple[Array, Array]:
 
 
 def _candidates(time: Array, value: Array, about_s: float | None) -> list[float]:
-    """Periods at which a signal swings most, the strongest first, s."""
+    """Return the periods, s, at which a signal swings most, the strongest first."""
     low, high = (0.7 * about_s, 1.4 * about_s) if about_s else (SHORTEST_S, LONGEST_S)
     frequencies = np.geomspace(1.0 / high, 1.0 / low, 160)
     power = np.zeros_like(frequencies)
@@ -126,7 +126,7 @@ def _candidates(time: Array, value: Array, about_s: float | None) -> list[float]
             power += np.abs(waves @ ((v - base(t)) * window)) ** 2 / len(t)
     if not power.any():
         return []
-    # What drifts has most power at the bottom; weighed by frequency a resonance stands out.
+    # A drift has most power at low frequencies; weighted by frequency a resonance stands out.
     weighed = power * frequencies
     peaks, _ = find_peaks(np.concatenate([[0.0], weighed, [0.0]]))
     strongest = sorted(peaks - 1, key=lambda k: -weighed[k])[:4]
@@ -136,7 +136,7 @@ def _candidates(time: Array, value: Array, about_s: float | None) -> list[float]
 def _with_period(
     signal: Segment, idle: list[Span], period: float, least: float
 ) -> FreeSwings | None:
-    """Free swings of about that period, and at least of such a worth."""
+    """Return the free swings of about that period, each of at least this worth."""
     time = signal.time_s
     unbroken = [(float(t[0]), float(t[-1])) for t in (time[p] for p in pieces(time, period / 3.0))]
     wholes = [cut(signal, begin, end, 0.0) for begin, end in common(unbroken, idle)]
@@ -169,7 +169,7 @@ def _with_period(
 
 
 def _like_the_best(swings: Sequence[Swing]) -> list[Swing]:
-    """Swings that may be of the same pendulum as the best one; a weak one has to show it."""
+    """Return the swings that may be of the best one's pendulum; weak ones by their period."""
     best = max(swings, key=lambda swing: swing.worth)
     return [
         one
@@ -197,7 +197,7 @@ def _joined(swings: Sequence[Swing], period: float) -> list[Swing]:
 
 
 def _runs(time: Array, value: Array, period: float) -> list[Run]:
-    """Runs of windows that seem to swing freely."""
+    """Return the runs of windows that seem to swing freely."""
     if len(time) < SHORTEST_SWINGS * SAMPLES:
         return []
     dt = max(float(np.median(np.diff(time))), 1e-4)

@@ -23,14 +23,14 @@ Span = tuple[float, float]  # start and end, s
 
 # Bins that a fast signal is averaged into; the shortest period that is looked for has 15 of them.
 BIN_S = 0.02
-# Commands, part of full speed, below which an axis stands.
+# Part of full speed below which a command counts as standing.
 STANDS = 0.01
-# Step back that is still taken for reordering by the logger, s.
+# A time that goes back by less is a frame that the logger wrote out of order, s.
 _REORDERED_S = 0.1
 
 
 class Kind(Enum):
-    """Quantity of a signal in the swing."""
+    """Quantity that a signal of a swing measures."""
 
     ANGLE = "angle"  # rad
     RATE = "rate"  # of the angle, rad/s
@@ -38,13 +38,13 @@ class Kind(Enum):
 
     @property
     def shown(self) -> tuple[float, str]:
-        """Factor to the unit for people, and its name; a signal of another kind has its own."""
+        """Factor to the unit for people, and its name; "" for the signal's own unit."""
         if self is Kind.OTHER:
             return 1.0, ""
         return math.degrees(1.0), "degrees" if self is Kind.ANGLE else "degrees/s"
 
     def angle(self, amplitude: float, omega: float) -> float:
-        """Amplitude of the swing in rad, by the frequency in rad/s; 0 where it is not known."""
+        """Return the amplitude of the swing in rad; 0 where it is not known. ``omega`` in rad/s."""
         return {Kind.ANGLE: amplitude, Kind.RATE: amplitude / omega}.get(self, 0.0)
 
 
@@ -83,7 +83,7 @@ _ACCELERATION = re.compile(r"m\s*/\s*s\s*(\^?2|²|/s)|m\s*s-2|m?g", re.IGNORECAS
 
 
 def unit_of(text: str) -> Unit:
-    """The unit of that name.
+    """Return the unit with this name.
 
     Raises:
         IdentificationError: it is that of an acceleration, which does not show a swing.
@@ -108,7 +108,7 @@ class Command:
     speed: Array
 
     def at(self, time_s: Array) -> Array:
-        """Parts of full speed at these times; 0 before the first command."""
+        """Return the parts of full speed at these times; 0 before the first command."""
         return np.append(0.0, self.speed)[np.searchsorted(self.time_s, time_s, side="right")]
 
 
@@ -121,8 +121,8 @@ class Series:
     time_s: Array  # rising
     value: Array
     command: Command | None = None  # of the axis, where the log has them
-    idle: list[Span] | None = None  # no axis was commanded to move; None where that is not known
-    others: list[Span] = field(default_factory=list)  # other axes were commanded
+    idle: list[Span] | None = None  # while every axis was commanded to stand; None: not known
+    others: list[Span] = field(default_factory=list)  # while other axes were commanded to move
     at: float | None = None  # value of the deployment's grapple signal, where the log has it
     notes: list[str] = field(default_factory=list)  # what was left out while reading
 
@@ -137,7 +137,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A stretch of a signal, that begins at ``start_s`` in the log; its times count from there."""
+    """A stretch of a signal from ``start_s`` in the log on; its times count from there."""
 
     source: str
     start_s: float
@@ -152,7 +152,7 @@ class Segment:
 
 
 def ordered(source: str, time_s: Array, value: Array) -> tuple[Array, Array]:
-    """Times in s and values with numbers only, in order; ``source``: file and signal.
+    """Return times, s, and values in order, numbers only; ``source`` is file and signal.
 
     Raises:
         IdentificationError: the time goes back: two clocks or two recordings in one file.
@@ -174,7 +174,7 @@ def ordered(source: str, time_s: Array, value: Array) -> tuple[Array, Array]:
 
 
 def binned(time_s: Array, value: Array) -> tuple[Array, Array]:
-    """Means of times and values in bins, those without samples left out; times rise strictly."""
+    """Return the means of times and values in bins that have samples; times rise strictly."""
     if not len(time_s):
         return time_s, value
     number = np.floor((time_s - time_s[0]) / BIN_S + 1e-6).astype(np.int64)
@@ -184,13 +184,13 @@ def binned(time_s: Array, value: Array) -> tuple[Array, Array]:
 
 
 def pieces(time_s: Array, gap_s: float) -> list[slice]:
-    """Stretches without gaps longer than ``gap_s``."""
+    """Return the stretches without a gap longer than ``gap_s``."""
     near = np.diff(time_s) <= gap_s
     return [slice(a, b + 1) for a, b in runs(np.append(near, False))]
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Each run of True, as the numbers of its first one and of the one behind its last."""
+    """Return each run of True: the index of its first, and the index after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -257,7 +257,7 @@ class Commands:
                     self._joysticks[name].add(time_s, value if moved else 0.0)
 
     def of(self, axis: str) -> Command | None:
-        """Commands of an axis; None where the log has none."""
+        """Return the commands of an axis; None where the log has none."""
         return self._first(axis, self._valves, self._joysticks)
 
     @staticmethod
@@ -266,15 +266,15 @@ class Commands:
         return next((Command(*kind[axis].arrays()) for kind in kinds if axis in kind), None)
 
     def others(self, axis: str) -> list[Span]:
-        """Stretches in which other axes are commanded.
+        """Return the stretches in which other axes are commanded.
 
-        By their joysticks where these are in the log: what a two-axis motion adds makes no swing.
+        Their joysticks count where the log has them: what a two-axis motion adds makes no swing.
         """
         others = [self._first(n, self._joysticks, self._valves) for n in self._axes if n != axis]
         return [span for c in others if c for span in _known(c, np.abs(c.speed) >= STANDS)]
 
     def idle(self) -> list[Span] | None:
-        """Stretches in which every axis stands; None where no command is in the log."""
+        """Return the stretches in which every axis stands; None where the log has no command."""
         known = [c for c in map(self.of, self._axes) if c]
         if not known:
             return None
@@ -285,7 +285,7 @@ class Commands:
 
 
 def _known(command: Command, is_so: NDArray[np.bool_]) -> list[Span]:
-    """Stretches in which something is so of a command, and the next one comes soon."""
+    """Return the stretches in which the flags are set and the next command comes soon."""
     time = command.time_s
     known = is_so[:-1] & (np.diff(time) < _SILENT_S)
     return [(float(time[a]), float(time[b])) for a, b in runs(known)]

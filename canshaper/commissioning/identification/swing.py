@@ -15,7 +15,7 @@ SAMPLES = 8
 SHORTEST_SWINGS = 1.5
 # Periods that a segment may reach beyond the windows that found it.
 FURTHER = 1.5
-# What is left of a segment at the frequency of the swing, part of its amplitude; in noise more.
+# A fit leaves at most this part of the amplitude at the frequency of the swing; in noise more.
 ROUGHEST_FIT = 0.15
 ROUGHEST_IN_NOISE = 0.35
 
@@ -44,10 +44,10 @@ class Swing(NamedTuple):
 
 
 def refined(whole: Segment, run: Run, low_s: float, high_s: float) -> Swing | None:
-    """The part of a run that one damped swing describes, between two times; None without one.
+    """Return the part of a run, between two times, that is one damped swing; None for none.
 
-    What drives the tool reaches into the first and the last window of a run. So the middle is
-    fitted first, and grows from there as long as the data follow the model.
+    The tool is still driven in the first and the last window of a run. So the middle is fitted
+    first; from there the part grows as long as the data follow the model.
     """
     part = cut(whole, low_s, high_s, 0.0)
     period = 2.0 * math.pi / run.omega
@@ -85,7 +85,7 @@ def refined(whole: Segment, run: Run, low_s: float, high_s: float) -> Swing | No
 
 
 def _tolerance(noise: Array, width: int) -> float:
-    """Mean square over so many values that noise of this kind hardly ever has."""
+    """Return a mean square over so many values that such noise hardly ever exceeds."""
     square = float(np.mean(noise**2))
     alike = float(np.mean(noise[1:] * noise[:-1])) / max(square, 1e-30)
     alike = min(max(alike, 0.0), 0.98) ** 2
@@ -94,7 +94,7 @@ def _tolerance(noise: Array, width: int) -> float:
 
 
 def moving_amplitude(residual: Array, time: Array, omega: float) -> float:
-    """Amplitude that the residual has at a frequency, root of the mean square over windows."""
+    """Return the amplitude of a residual at a frequency, root mean square over windows."""
     wave = residual * np.exp(-1j * omega * time)
     width = max(1, round(2.0 * math.pi / omega / float(np.median(np.diff(time)))))
     if len(wave) < width:
@@ -104,13 +104,13 @@ def moving_amplitude(residual: Array, time: Array, omega: float) -> float:
 
 
 def _solved(segment: Segment, omega: float, sigma: float) -> tuple[DecayProblem, Array]:
-    """One segment alone, from a start."""
+    """Return the problem of one segment, and its rough solution from a start."""
     problem = DecayProblem([segment], [float(np.ptp(segment.value)) / 2.0 + 1e-12])
     return problem, problem.solve([omega, sigma], roughly=True)
 
 
 def cut(whole: Segment, first: float, last: float, start: float | None = None) -> Segment:
-    """A part of a segment, its times from its own start or from another."""
+    """Return a part of a segment; its times count from its own start, or from another."""
     inside = (whole.time_s >= first) & (whole.time_s <= last)
     time = whole.time_s[inside]
     if start is None:
@@ -123,7 +123,7 @@ _PAIRS = ((1.0, 1.06), (1.0, 0.94), (0.97, 1.03))
 
 
 def clipped(series: Series, fit: DecayFit | None) -> str | None:
-    """Whether a signal stands at its extreme again and again, as a sensor at its end does."""
+    """Return the fault of a signal that is too coarse, or clipped at its end; None for none."""
     time, value = series.time_s, series.value
     span = float(np.ptp(value))
     period = fit.period_s.value if fit else 2.0
@@ -143,7 +143,7 @@ def clipped(series: Series, fit: DecayFit | None) -> str | None:
 
 
 def mixed(fit: DecayFit) -> str | None:
-    """Whether a second swing of another period is in the longest segment."""
+    """Return the fault of a longest segment with two swings of different periods; else None."""
     longest = max(fit.segments, key=lambda s: float(s.segment.time_s[-1]) * float(s.envelope[0]))
     segment = longest.segment
     time, omega = segment.time_s, 2.0 * math.pi / fit.period_s.value

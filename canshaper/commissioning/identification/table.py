@@ -1,7 +1,7 @@
 """Logs that are tables of numbers: what phone apps and data loggers write as CSV.
 
-Understood are comma, semicolon and tab, decimal point and comma, a header with units, as phyphox
-("Time (s)","Gyroscope x (rad/s)") and Sensor Logger (time,seconds_elapsed,z,y,x) write it.
+The reader takes comma, semicolon and tab, decimal point and comma, and a header with units, as
+phyphox ("Time (s)","Gyroscope x (rad/s)") and Sensor Logger (time,seconds_elapsed,z,y,x) write it.
 """
 
 import csv
@@ -17,27 +17,26 @@ import numpy as np
 
 from canshaper.commissioning.identification.series import Array, Unit, unit_of
 from canshaper.errors import IdentificationError
-from canshaper.recording.tables import is_log
 
 _HEADER = re.compile(r"^(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
 _TIME = re.compile(r"time|zeit|seconds|timestamp|^t$|uptime", re.IGNORECASE)
 _TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
 _GYRO = re.compile(r"gyr|rotation.?rate|angular.?(rate|vel)|omega|drehrate", re.IGNORECASE)
 _ACCELERATION = re.compile(r"acc|beschl", re.IGNORECASE)
-# Time between samples of a phone or a logger, s; shows the unit of times that have none.
+# Least and most time between samples of a phone or a logger, s; shows the unit of bare numbers.
 _SAMPLING_S = (5e-4, 0.5)
 # A table with more wrong lines than one in so many is no table.
 _WRONG_LINES = 50
-# No sensor has more, in whatever unit, and nanoseconds since 1970 are fewer; squares stay finite.
+# More than any sensor has in any unit, and than nanoseconds since 1970; its square is finite.
 _LARGEST = 1e30
-# The year 2286; no clock is there.
+# Seconds since 1970 in the year 2286: no clock is that late.
 _LATEST_S = 1e10
 _REPORT_EVERY = 20_000
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers over time, which counts from the first line, in the order of the file."""
+    """Columns of numbers over time, in the order of the file; time counts from the first line."""
 
     path: Path
     time_s: Array
@@ -62,7 +61,7 @@ class Table:
             raise IdentificationError(f"{self.path}: column {name} {error}") from None
 
     def column(self, name: str) -> str:
-        """The column of that name, with or without its unit, large or small.
+        """Return the column with this name, with or without its unit, in any case.
 
         Raises:
             IdentificationError: there is none; the message lists those that are there.
@@ -76,23 +75,11 @@ class Table:
         )
 
     def gyroscope(self) -> list[str]:
-        """Columns of a gyroscope, its absolute value left out."""
+        """Return the columns of a gyroscope, without that of its absolute value."""
         names = [n for n in self.columns if _GYRO.search(n)]
         if not names and _GYRO.search(self.path.stem):
             names = [n for n in self.columns if re.fullmatch(r"[xyz]", n, re.IGNORECASE)]
         return [n for n in names if not re.search(r"abs|magnitude|norm", n, re.IGNORECASE)]
-
-
-def is_table(path: Path) -> bool:
-    """Whether a file is a table of numbers rather than a log of CAN frames.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
-        return False
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        return not is_log(file.readline(10_000))
 
 
 def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -> Table:
@@ -125,7 +112,7 @@ def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -
 
 
 def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
-    """Line number of the header, its names, and the delimiter."""
+    """Return line number and names of the header, and the delimiter."""
     for number, line in enumerate(file, 1):
         text = line.strip()
         if not text or text.startswith("#"):
@@ -145,7 +132,7 @@ def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
 
 
 def _row(path: Path, number: int, line: str, delimiter: str) -> list[str]:
-    """Fields of a line; of one alone, so that a quote left open swallows no others."""
+    """Return the fields of one line; it is read alone, so that an open quote takes no others."""
     try:
         return next(csv.reader([line.replace("\0", "")], delimiter=delimiter), [])
     except csv.Error as error:  # a field longer than the reader takes
@@ -154,7 +141,7 @@ def _row(path: Path, number: int, line: str, delimiter: str) -> list[str]:
 
 
 def _numbers(row: list[str], delimiter: str) -> list[float] | None:
-    """The numbers of a line, NaN for an empty field; None where something else stands there."""
+    """Return the numbers of a line, NaN for an empty field; None where a field is no number."""
     if delimiter != ",":
         row = [f.replace(",", ".") for f in row]
     try:
@@ -165,7 +152,11 @@ def _numbers(row: list[str], delimiter: str) -> list[float] | None:
 
 
 def _left_out(path: Path, width: int, lines: Array, wrong: list[int]) -> list[str]:
-    """Note on lines that are no numbers, which may be few only."""
+    """Return notes on lines that are no numbers.
+
+    Raises:
+        IdentificationError: they are too many, or no lines are left.
+    """
     count, bad = len(lines), len(wrong)
     if bad * _WRONG_LINES > count + _WRONG_LINES:
         text = f"expected {width} numbers a line, got {bad} lines of {count + bad} without"
@@ -180,9 +171,9 @@ def _left_out(path: Path, width: int, lines: Array, wrong: list[int]) -> list[st
 
 
 def _with_times(path: Path, columns: dict[str, Array], lines: Array, notes: list[str]) -> Table:
-    """Columns over the one that has the times, without the lines that have no time."""
+    """Return the table over its column of times, without lines that have no time."""
     name, factor = _time(path, columns)
-    # Infinite is no number either; two of them would make a warning of a sum.
+    # Infinite values are no numbers: the sum of two would warn.
     others = {
         n: np.where(np.isfinite(c), c, np.nan) for n, c in columns.items() if not _TIME.search(n)
     }
@@ -201,15 +192,15 @@ def _with_times(path: Path, columns: dict[str, Array], lines: Array, notes: list
 
 
 def _named(header: str) -> tuple[str, str]:
-    """Name and unit of "Gyroscope x (rad/s)"; a header without a unit has ""."""
+    """Return name and unit of "Gyroscope x (rad/s)"; "" for a header without a unit."""
     match = _HEADER.match(header)
     return (match[1], match[2]) if match else (header, "")
 
 
 def _time(path: Path, columns: dict[str, Array]) -> tuple[str, float]:
-    """The column of times, and its unit in seconds."""
+    """Return the column of times, and its unit in seconds."""
     named = [n for n in columns if _TIME.search(n)]
-    # One that counts seconds from the start rather than one that counts from 1970.
+    # A column that counts seconds from the start comes before one that counts from 1970.
     named.sort(key=lambda n: (_unit_of_time(n) is None, not re.search("elapsed", n, re.IGNORECASE)))
     for name in named:
         values = columns[name][np.isfinite(columns[name])]

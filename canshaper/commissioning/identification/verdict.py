@@ -20,16 +20,16 @@ from canshaper.design.tuning.modes import SECOND_PERIODS
 
 # Fewer full swings show no damping.
 LEAST_SWINGS = 3.0
-# Widest intervals of what may be used: of the period, and of the damping ratio as a part of it or
-# as such. 3 % of the period are 6 % of the length, which every filter but ZV forgives.
+# Widest intervals that may be used: of the period as a part of it; of the damping ratio as a part
+# of it, or absolute. 3 % of the period are 6 % of the length, which every filter but ZV tolerates.
 WIDEST_PERIOD = 0.03
 WIDEST_RATIO, WIDEST_RATIO_ABS = 0.4, 0.01
-# Largest swing that the correction for amplitude holds for, rad.
+# Largest swing for which the correction for amplitude holds, rad.
 LARGE_RAD = math.radians(60.0)
-# Part of the driven swing that the commands have to explain.
+# Part of the driven swing that the commands have to explain; more where no free swing is good.
 LEAST_EXPLAINED = 0.8
 LEAST_EXPLAINED_ALONE = 0.9
-# Periods from which a driven swing is looked for, each some 30 % around, s.
+# Periods at which the search for a driven swing starts, s; each covers some 30 % around it.
 STARTS_S = (1.2, 1.7, 2.3, 3.2, 4.5)
 SWING_FREELY = (
     "drive the axis shortly, let go of the joysticks so that it swings by some 10 degrees, and"
@@ -38,10 +38,38 @@ SWING_FREELY = (
 
 
 @dataclass
-class Finding:
-    """One axis in one state of the grapple, or timed by hand without any signal."""
+class AxisFinding:
+    """Finding of a measurement of one axis.
+
+    Attributes:
+        axis: name of the axis.
+        problems: why nothing of it may be used, each with what to do; empty where it may be used.
+        notes: what else a person should know.
+    """
 
     axis: str
+    problems: list[str] = field(default_factory=list, kw_only=True)
+    notes: list[str] = field(default_factory=list, kw_only=True)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the data is enough."""
+        return not self.problems
+
+    def marked(self, heading: str) -> str:
+        """Return a heading that says so where the data is not enough."""
+        return heading if self.usable else f"{heading} (not enough data)"
+
+    def remarks(self) -> list[str]:
+        """Return the notes and the problems as lines."""
+        notes = [f"  note: {text}" for text in self.notes]
+        return notes + [f"  not enough data: {text}" for text in self.problems]
+
+
+@dataclass
+class SwingFinding(AxisFinding):
+    """Swing of one axis in one state of the grapple, or timed by hand without any signal."""
+
     label: str  # state of the grapple, may be ""
     at: float | None  # value of the grapple's signal, where it is known
     series: list[Series]
@@ -50,24 +78,22 @@ class Finding:
     period_s: Value | None = None  # of small damped swings; None where nothing was found
     damping_ratio: Value | None = None
     full_speed_m_s: Value | None = None  # of the tip; None where that was not seen
-    problems: list[str] = field(default_factory=list)  # why it cannot be used, with what to do
-    notes: list[str] = field(default_factory=list)  # what else a person should know
 
     @property
     def usable(self) -> bool:
         """Whether period and damping are known well enough."""
-        return not self.problems and self.period_s is not None
+        return super().usable and self.period_s is not None
 
 
 def identify(
     axis: str, label: str, series: Sequence[Series], about_s: float | None = None
-) -> Finding:
-    """Period, damping and full speed of an axis from its signals in one state of the grapple.
+) -> SwingFinding:
+    """Return period, damping and full speed of an axis, of its signals in one state of the grapple.
 
-    ``about_s``: the period as far as it is known, s.
+    ``about_s`` is the approximate period, s; None where it is not known.
     """
     values = [s.at for s in series if s.at is not None]
-    finding = Finding(axis, label, float(np.median(values)) if values else None, list(series))
+    finding = SwingFinding(axis, label, float(np.median(values)) if values else None, list(series))
     finding.notes += dict.fromkeys(note for one in series for note in one.notes)
     good, useless = [], []
     for one in series:
@@ -90,7 +116,7 @@ def identify(
 
 
 def _useless(series: Series) -> str | None:
-    """Why a signal is none at all; None where it may be one."""
+    """Return why a signal cannot show a swing; None where it may."""
     if len(series.time_s) < 3 * SAMPLES:
         return f"only {len(series.time_s)} values; log for at least ten swings"
     if float(np.ptp(series.value)) == 0.0:
@@ -104,7 +130,7 @@ def _useless(series: Series) -> str | None:
 
 
 def _no_swing(series: Sequence[Series]) -> str:
-    """Return what to do where no swing was found in signals that may be ones."""
+    """Return what to do where no swing was found in signals that may show one."""
     if flat := clipped(series[0], None):
         return flat
     names = ", ".join(s.source for s in series)
@@ -114,8 +140,8 @@ def _no_swing(series: Sequence[Series]) -> str:
     return f"{names}: no decaying swing found: {SWING_FREELY}. Is it the right signal?"
 
 
-def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
-    """Free swings of all signals together."""
+def _free(finding: SwingFinding, series: Sequence[Series], about_s: float | None) -> None:
+    """Fit the free swings of all signals together, into the finding."""
     swinging = [(s, f) for s in series if (f := find_free(s, about_s))]
     if not swinging:
         return
@@ -129,8 +155,8 @@ def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> 
     finding.free, finding.period_s, finding.damping_ratio = fit, fit.period_s, fit.damping_ratio
 
 
-def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
-    """Driven swings: full speed, and what free swings did not show."""
+def _driven(finding: SwingFinding, series: Sequence[Series], about_s: float | None) -> None:
+    """Fit the driven swings into the finding: full speed, and what no free swing showed."""
     if not any(s.driven_s for s in series):
         return
     trusted = finding.free if finding.free and not _faults(finding) else None
@@ -156,7 +182,7 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
 
 
 def _second(first: DecayFit, series: Sequence[Series]) -> list[str]:
-    """Note on a quicker swing in what the first one leaves of its own stretches."""
+    """Return a note on a quicker swing in the residual of the first one."""
     omega = 2.0 * math.pi / first.period_s.value
     x = np.array([omega, omega * first.damping_ratio.value])
     best: FreeSwings | None = None
@@ -190,7 +216,7 @@ def _second(first: DecayFit, series: Sequence[Series]) -> list[str]:
 
 
 def _doubts(fit: DecayFit, *, usable: bool) -> list[str]:
-    """Notes on how far one damping and one period hold."""
+    """Return notes where damping or period hold for some of the swings only."""
     notes = []
     if fit.friction and usable:
         (large, at_large), (small, at_small) = fit.friction
@@ -209,8 +235,8 @@ def _doubts(fit: DecayFit, *, usable: bool) -> list[str]:
     return notes
 
 
-def _faults(finding: Finding) -> list[str]:
-    """Why period and damping cannot be used."""
+def _faults(finding: SwingFinding) -> list[str]:
+    """Return why period and damping cannot be used."""
     period, ratio, fit = finding.period_s, finding.damping_ratio, finding.free
     assert period is not None and ratio is not None
     faults = []

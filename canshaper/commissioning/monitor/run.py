@@ -1,4 +1,4 @@
-"""Listening, and drawing now and then."""
+"""Loops of the monitor: they listen to the buses, and draw or print."""
 
 import time
 from collections.abc import Callable
@@ -19,14 +19,14 @@ from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Listener
 
-# How often a bus that has gone is looked for.
+# Time between two attempts to open a lost bus.
 REOPEN_S = 1.0
 GARBLED = "unreadable"
 SECOND_NS = 1_000_000_000
 
 
 class Ear:
-    """Listens to the buses of a deployment; one that goes away is used again when it is back.
+    """Listener to the buses of a deployment; it opens a lost bus again.
 
     Raises:
         BusError: a bus cannot be opened at the start.
@@ -39,7 +39,7 @@ class Ear:
         self._again_s = 0.0
 
     def listen(self, timeout_s: float) -> None:
-        """Take what waits; wait for no longer than the timeout."""
+        """Receive waiting frames; wait for no longer than the timeout."""
         if self._listener is None:
             self._reopen(timeout_s)
             return
@@ -75,7 +75,7 @@ class Ear:
 def run_live(
     deployment: Deployment, console: Console, rate_hz: float, going: Callable[[], bool]
 ) -> None:
-    """Draw until it is enough.
+    """Draw the state of the machine until a person ends it.
 
     Args:
         deployment: the machine.
@@ -113,7 +113,7 @@ def run_live(
 def run_plain(
     deployment: Deployment, write: Callable[[str], None], going: Callable[[], bool]
 ) -> None:
-    """A line for every event, and one with everything every second.
+    """Write a line for every event, and one with the whole state every second.
 
     Raises:
         BusError: a bus cannot be opened.

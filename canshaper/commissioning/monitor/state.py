@@ -1,4 +1,4 @@
-"""State of a machine by the frames on its buses."""
+"""State of a machine, known from the frames on its buses; rows of the monitor's screen."""
 
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
@@ -11,13 +11,12 @@ from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
-from canshaper.recording.history import AxisStatus, History, HistoryEvent
-from canshaper.recording.listen import ReceivedFrame
+from canshaper.recording.listen import AxisStatus, History, HistoryEvent, ReceivedFrame
 
 # Rates are counted over so long.
 WINDOW_NS = 2_000_000_000
-# A message that is missing for so many cycles is silent, a status that long is stale; but not
-# for less than an eye sees, and after a second where the DBC gives no cycle.
+# A message that is missing for LATE_CYCLES is silent, and a status stale; not before LEAST_LATE_NS,
+# which an eye would not see, and after LATE_NS where the DBC has no cycle.
 LATE_CYCLES, LEAST_LATE_NS, LATE_NS = 3, 300_000_000, 1_000_000_000
 MOST_EVENTS = 200
 MOST_SAMPLES = 2000  # of an axis: its status comes ten times a second or more often
@@ -74,7 +73,7 @@ class MessageRate:
 
 
 class Monitor:
-    """Takes every frame that is received.
+    """State of a machine, from every frame that is received.
 
     Args:
         deployment: the machine.
@@ -140,7 +139,7 @@ class Monitor:
         changes.clear()  # for a day there are many
 
     def _compare_identity(self, digest: int, time_ns: int) -> None:
-        """Whether the daemon runs the files and the program that we have here."""
+        """Note whether the daemon runs the files and the program that are here."""
         if digest == self.digest:
             return
         self.digest, ours = digest, self.deployment.identity.digest
@@ -152,7 +151,7 @@ class Monitor:
         self.events.append(HistoryEvent(time_ns, text))
 
     def frames_per_s(self, bus: str, now_ns: int) -> float:
-        """All frames of a bus."""
+        """Return the frames a second of a bus."""
         return self._buses[bus].per_s(now_ns)
 
     def stale_s(self, axis: str, now_ns: int) -> float | None:
@@ -178,17 +177,17 @@ DIM = "dim"
 HALF = 10  # columns of a bar on either side of its middle
 NAME = 11
 NARROW = 66  # columns that a row with its bar needs
-AT, LABEL = 80, 12  # where a line over time begins, and what it is
+AT, LABEL = 80, 12  # column where a line over time begins; width of its label
 LEAST_LINE = 16
 LINE_S = 30.0
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.,-~=*#"
-LEAST_SWAY_DEG = 1.0  # half of the height of a line
+LEAST_SWAY_DEG = 1.0  # least sway that half of the height of a line stands for
 # Fields of an axis that have a place of their own.
 IN_ROWS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway", "ActiveSet")
 
 
 def rows(monitor: Monitor, name: str, now_ns: int, width: int, *, plain: bool) -> Iterator[Text]:
-    """State and joystick, reason and what is sent; on a narrow terminal numbers without bars."""
+    """Yield the rows of an axis: state and demand, reason and setpoint; no bars where narrow."""
     status = monitor.history.axes.get(name)
     if status is None:
         has_status = monitor.deployment.axes[name].status is not None
@@ -227,7 +226,7 @@ def rows(monitor: Monitor, name: str, now_ns: int, width: int, *, plain: bool) -
 
 
 def bar(percent: float, *, plain: bool) -> str:
-    """A bar from the middle to the left or right; full at 100 %."""
+    """Return a bar from the middle to the left or right; full at 100 %."""
     full, empty, middle = ("#", ".", "|") if plain else ("█", "·", "│")
     size = min(HALF, round(abs(percent) / 100.0 * HALF))
     if size == 0 and abs(percent) >= 1.0:
@@ -240,7 +239,7 @@ def bar(percent: float, *, plain: bool) -> str:
 def line_over_time(
     values: Sequence[tuple[int, float]], now_ns: int, columns: int, *, plain: bool
 ) -> str:
-    """The last half minute, the newest at the right; spaces where nothing came.
+    """Return the last half minute as characters, the newest at the right; spaces without values.
 
     Args:
         values: time in ns, and a value of -1 to 1, which is the whole height.
@@ -263,7 +262,7 @@ def line_over_time(
 
 
 def _add(row: Text, label: str, line: str, style: str) -> None:
-    """Put a line over time behind a row."""
+    """Append a line over time to a row."""
     row.pad_right(max(0, AT - 1 - len(row)))
     row.append(f" {label:{LABEL}.{LABEL}}", DIM).append(line, style or "cyan")
 

@@ -1,6 +1,6 @@
-"""The monitor's picture: text for terminals of any width, and one line for pipes.
+"""Screen of the monitor: text for terminals of any width, and one line for pipes.
 
-Nothing is shown by colour alone: what is stale says so, what is late too.
+Colour alone says nothing: stale and late values are marked by words too.
 """
 
 import os
@@ -50,7 +50,7 @@ class Keys:
 
 @contextmanager
 def pressed_keys() -> Iterator[bool]:
-    """Let keys come one by one, without echo; yields whether they can come at all."""
+    """Switch the terminal to keys one by one, without echo; yield whether it has keys."""
     try:
         import termios  # noqa: PLC0415  # not everywhere
         import tty  # noqa: PLC0415
@@ -70,7 +70,7 @@ def pressed_keys() -> Iterator[bool]:
 
 
 def waiting() -> str:
-    """Return the keys that wait."""
+    """Return the keys that were pressed since the last call."""
     file = sys.stdin.fileno()
     if not select.select([file], [], [], 0.0)[0]:
         return ""
@@ -93,7 +93,7 @@ SLOW = 0.8
 def screen(
     monitor: Monitor, now_ns: int, width: int, height: int, *, plain: bool, keys: Keys | None = None
 ) -> Text:
-    """Everything at a moment, in as many lines as there are.
+    """Return the whole state at a moment, in as many lines as the terminal has.
 
     Args:
         monitor: what is known.
@@ -140,7 +140,7 @@ def _events(monitor: Monitor, only: str | None, width: int) -> list[Text]:
 
 
 def _wrapped(line: Text, width: int) -> list[Text]:
-    """A line as it is, on a narrow terminal in several where it is longer."""
+    """Return a line, as several where a narrow terminal needs them."""
     if width >= NARROW or len(line) <= width:
         return [line]
     first, *others = line.wrap(Console(), width, tab_size=8)
@@ -150,7 +150,7 @@ def _wrapped(line: Text, width: int) -> list[Text]:
 
 
 def status_line(monitor: Monitor, now_ns: int) -> str:
-    """One line with the state of everything, for pipes."""
+    """Return the state of all axes and buses as one line, for pipes."""
     parts = []
     for name in monitor.deployment.axes:
         status = monitor.history.axes.get(name)
@@ -172,7 +172,7 @@ def status_line(monitor: Monitor, now_ns: int) -> str:
 
 
 def clock(time_ns: int) -> str:
-    """Time of the day, as the terminal's owner has it."""
+    """Return the local time of day."""
     return f"{datetime.fromtimestamp(time_ns / 1e9):%H:%M:%S.%f}"[:-3]
 
 
@@ -214,7 +214,7 @@ def _counters(monitor: Monitor, now_ns: int) -> Iterator[Text]:
 
 
 def _rates(monitor: Monitor, now_ns: int, width: int) -> list[Text]:
-    """Rates of the messages, as many in a line as fit."""
+    """Return the rates of the messages, as many in a line as fit."""
     cells = [_rate(rate, now_ns) for rate in monitor.messages.values()]
     if not cells:
         return []

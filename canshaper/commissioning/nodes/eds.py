@@ -1,7 +1,6 @@
-"""An EDS or DCF as CiA 306 has it, read by the library ``canopen``.
+"""Reader of EDS and DCF files (CiA 306) on top of the library ``canopen``.
 
-What the library passes over in silence, or answers with an error that says no place, is an error
-here, with the section.
+Faults that the library ignores, or reports without a place, are errors here with their section.
 """
 
 import configparser
@@ -16,7 +15,7 @@ from canopen.objectdictionary.eds import import_eds
 from canshaper.config.source import encoding_of, read_bounded
 from canshaper.errors import ConfigError, Problem
 
-# What canopen thinks of types that no PDO has is not for the operator's terminal.
+# canopen warns of types that no PDO has, which is nothing for the operator's terminal.
 logging.getLogger("canopen.objectdictionary").setLevel(logging.ERROR)
 MOST_BYTES = 4 << 20
 _OBJECT = re.compile(r"([0-9A-F]{4})(sub[0-9A-F]+)?", re.IGNORECASE)
@@ -30,7 +29,7 @@ _VARIABLES = (0x2, 0x7)  # DOMAIN, VAR
 
 
 class Eds:
-    """A file of CiA 306.
+    """An EDS or DCF file.
 
     Args:
         path: an EDS or DCF.
@@ -40,7 +39,7 @@ class Eds:
 
     Raises:
         OSError: it cannot be read.
-        ConfigError: it is none.
+        ConfigError: it is no EDS or DCF.
     """
 
     def __init__(self, path: Path) -> None:
@@ -93,12 +92,12 @@ class Eds:
         return objects
 
     def elements(self, index: int) -> int:
-        """Number of elements of an array with one section for all (CompactSubObj), else 0."""
+        """Return the number of elements of an array with one section (CompactSubObj), else 0."""
         section, key = f"{index:04X}", "CompactSubObj"
         return self._whole(section, key, self._file.get(section, key, fallback="0"))
 
     def problem(self, section: str, text: str) -> Problem:
-        """A problem at a section, with its line."""
+        """Return a problem at a section, with its line."""
         pattern = re.compile(rf"^\s*\[{re.escape(section)}\]", re.IGNORECASE | re.MULTILINE)
         place = pattern.search(self._text) if section else None
         line = self._text.count("\n", 0, place.end()) + 1 if place else None
@@ -108,7 +107,7 @@ class Eds:
         return ConfigError([self.problem(section, text)])
 
     def _not_one(self, error: configparser.Error) -> ConfigError:
-        """Why it is no file of sections, at its line."""
+        """Return why the file has no sections, with the line."""
         several = getattr(error, "errors", ())  # of a ParsingError, with their lines
         line = several[0][0] if several else getattr(error, "lineno", None)
         got = self._text.splitlines()[line - 1].strip()[:40] if line else "another"
@@ -141,7 +140,7 @@ class Eds:
 
 
 def _canonical(file: configparser.RawConfigParser) -> configparser.RawConfigParser:
-    """A file with sections and keys as the standard writes them, without those that are empty."""
+    """Return the file with sections and keys as the standard writes them, without empty ones."""
     result = configparser.RawConfigParser()
     result.optionxform = str  # type: ignore[method-assign,assignment]
     for section in file.sections():

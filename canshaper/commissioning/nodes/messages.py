@@ -11,7 +11,7 @@ from canshaper.codec.signals import FULL_SET_POINT
 from canshaper.commissioning.nodes.node import Mapped, Node, Pdo
 
 CYCLE_MS = 20
-"""Cycle of messages that we send: how often nodes of RPDOs want them is in no EDS."""
+"""Cycle of messages that we send, ms; no EDS says how often a node wants an RPDO."""
 IO, VALVE, INCLINOMETER = 401, 408, 410  # numbers of device profiles
 CONTROL_WORD, STATUS_WORD = (0x6040, 0), (0x6041, 0)
 DEVICE_MODE, BY_CAN = (0x6042, 0), 1
@@ -25,7 +25,7 @@ _BYTE = (8, 16, 32)
 
 
 def bytes_of(node: Node) -> dict[str, bool]:
-    """Objects that a node sends which may be eight switches or more, and whether they are."""
+    """Return the objects that a node sends that may be switches, and whether they are."""
     digital_by_name = {}
     for pdo in node.pdos:
         for one, name in zip(pdo.objects, labels(pdo.objects), strict=True):
@@ -37,7 +37,7 @@ def bytes_of(node: Node) -> dict[str, bool]:
 def messages(
     node: Node, name: str, switches: Collection[str], cycle_ms: int | None = None
 ) -> list[Message]:
-    """Messages of a node's PDOs.
+    """Return the messages of a node's PDOs.
 
     Args:
         node: the node.
@@ -49,12 +49,12 @@ def messages(
 
 
 def message_name(node: str, pdo: Pdo) -> str:
-    """Name of the message of a PDO."""
+    """Return the name of the message of a PDO."""
     return f"{node}_{pdo.name}"
 
 
 def dbc(all_messages: Sequence[Message]) -> str:
-    """Text of a DBC file."""
+    """Return the text of a DBC file."""
     senders = dict.fromkeys([_OURS, *(sender for m in all_messages for sender in m.senders)])
     text = Database([*all_messages], [Sender(name, None) for name in senders]).as_dbc_string()
     return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
@@ -84,7 +84,7 @@ def _message(
 
 
 def _signals(node: Node, one: Mapped, name: str, receiver: str, *, split: bool) -> Iterator[Signal]:
-    """The signal of an object, or those of its bits."""
+    """Yield the signal of an object, or those of its bits."""
     if split:
         for bit in range(one.bits):
             label = f"{name[: _LETTERS - 3]}_{bit + 1}"
@@ -126,7 +126,7 @@ def labels(objects: Sequence[Mapped]) -> list[str]:
 
 
 def _word(text: str) -> str:
-    """A text as a name in a DBC file."""
+    """Return a text as a name for a DBC file."""
     parts = "".join(c if c.isascii() and c.isalnum() else " " for c in text).split()
     word = "".join(part[0].upper() + part[1:] for part in parts)[:_LETTERS]
     return word if word and not word[0].isdigit() else f"S{word}"[:_LETTERS]

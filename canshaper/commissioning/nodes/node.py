@@ -26,7 +26,7 @@ class Mapped:
         name: its ParameterName.
         parent: that of the array or record that it is in, or "".
         start: its first bit.
-        bits: of it; of a BOOLEAN one, however long its entry is.
+        bits: its length; 1 of a BOOLEAN, however long its entry is.
         low, high: LowLimit and HighLimit, None where the file has none.
     """
 
@@ -48,7 +48,7 @@ class Pdo:
 
     Attributes:
         index: of its communication parameters.
-        on: whether the node sends or takes it as it is.
+        on: whether the node sends or takes it without a change of its parameters.
         can_id: its identifier.
         transmission: transmission type; None where the file has none.
         event_timer_ms: of a TPDO how often it is sent, of an RPDO how long it may stay away; 0 is
@@ -79,7 +79,7 @@ class Pdo:
 
 
 class Node:
-    """A node by its file.
+    """A node of CANopen, as its file describes it.
 
     Args:
         eds: its file.
@@ -111,7 +111,7 @@ class Node:
             raise ConfigError(self.faults or [none])
 
     def variable(self, index: int, subindex: int) -> ODVariable | None:
-        """An object of it, or None."""
+        """Return an object of the node; None where it has none there."""
         entry = self.objects.indices.get(index)
         if isinstance(entry, ODArray) and 0 < subindex <= self.eds.elements(index):
             entry = entry[subindex]  # like the first, where it has no name
@@ -148,7 +148,7 @@ class Node:
                 self.faults += error.problems
 
     def _pdo(self, index: int) -> Pdo | None:
-        """A PDO; where it has no identifier or objects, that is noted."""
+        """Return a PDO; None, and a note in ``left_out``, for one without identifier or objects."""
         cob_id, section = self.value(index, COB_ID) or 0, _section(index, COB_ID)
         count, can_id = self.value(index + MAPPING, 0), cob_id & ID_BITS
         name = f"{'T' if index >= TRANSMIT else 'R'}PDO{index % MAPPING + 1}"
@@ -172,7 +172,7 @@ class Node:
         return Pdo(index, on, can_id, extended, transmission, timer, objects, bits)
 
     def _mapped(self, index: int, count: int) -> tuple[tuple[Mapped, ...], int]:
-        """The objects of a PDO, and its length in bits."""
+        """Return the objects of a PDO, and its length in bits."""
         if count > MOST_BITS:
             text = f"expected {MOST_BITS} objects at most, got {count}"
             raise ConfigError([self.eds.problem(_section(index, 0), text)])

@@ -27,7 +27,7 @@ from canshaper.errors import NodeError
 HEARTBEAT_MS = 200
 """Heartbeat period of a node that is set to send heartbeats."""
 HEARTBEATS = 2.5
-"""Heartbeats of a node in the time after which it is lost."""
+"""A node counts as lost after the time of so many of its heartbeats."""
 _EMCY, _GUARD_TIME, _HEARTBEAT, _STORE = (0x1014, 0), (0x100C, 0), (0x1017, 0), (0x1010, 1)
 _ANALOGUE_ON = (0x6423, 0)
 _SAVE = int.from_bytes(b"save", "little")
@@ -45,7 +45,7 @@ class MessageTiming:
 
 @dataclass(frozen=True)
 class Parameter:
-    """An object of a node, and what it has to be.
+    """An object of a node, and the value that it needs.
 
     Attributes:
         node: name of the node.
@@ -69,7 +69,7 @@ class Parameter:
 
 
 def heartbeat_ms(node: Node) -> int | None:
-    """Silence after which a node is lost; None where it can send no heartbeats."""
+    """Return the silence after which a node is lost, ms; None where it has no heartbeat."""
     if node.variable(*_HEARTBEAT) is None:
         return None
     return round(HEARTBEATS * (node.value(*_HEARTBEAT) or HEARTBEAT_MS))
@@ -138,7 +138,7 @@ def _of_pdo(node: Node, pdo: Pdo, use: MessageTiming) -> Iterator[_Setting]:
 
 
 def write(bus: Bus, nodes: Mapping[str, Node], parameters: Sequence[Parameter]) -> Iterator[str]:
-    """Set parameters one after the other, each read before and after; says what was done.
+    """Set parameters one after the other, each read before and after; yield what was done.
 
     Raises:
         BusError: the bus cannot be opened.
@@ -188,7 +188,7 @@ def _connected(bus: Bus) -> Iterator[canopen.Network]:
 
 
 class _GoesOn:
-    """A bus whose errors cost an answer, and not the thread that waits for it."""
+    """A bus on which an error loses one answer and does not end the receiving thread."""
 
     def __init__(self, bus: can.BusABC) -> None:
         self._bus = bus

@@ -1,4 +1,4 @@
-"""Where a step drives and measures: on the machine, or on the simulated crane, also as a log."""
+"""The place where a step drives and measures; the simulated one, and the logs of its drives."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -11,7 +11,7 @@ from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.run import run_simulated
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.design.lockstep import LockStep
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
@@ -38,7 +38,7 @@ class _Releasing(JoystickNode):
         self._released_ms = [1000.0 * time_s for time_s in released]
 
     def frames(self, time_ms: int) -> list[Frame]:
-        """Frames that are due at this time of the script; both hands count their frames."""
+        """Return the frames that are due now; both hands are asked, as both count their frames."""
         joysticks = {a: self.script.command(a, time_ms / 1000.0) for a in self._deployed}
         begin_ms, end_ms = self._released_ms
         without = self._without.frames(time_ms, Held(joysticks, enable=False))
@@ -65,11 +65,11 @@ def log_simulated(
         script: what the operator does.
         on_progress: called with the part that is driven, 0 to 1.
         bypass: the operator has switched anti-sway off.
-        released: from when to when the enable switch is not held, s; None for always held.
+        released: when the enable switch is let go and held again, s; None for always held.
 
     Raises:
         ConfigError: the deployment does not fit the machine.
-        DesignError: nor does the script.
+        DesignError: the script does not fit the machine.
         OSError: the log cannot be written.
     """
     plant = PlantNode(deployment, parameters)
@@ -85,7 +85,9 @@ def log_simulated(
             time_ns, channel = round(1e9 * time_s), buses[frame.bus].channel
             log.write(ReceivedFrame(time_ns, frame.bus, channel, *frame[1:], "").line())
 
-        lock_step = LockStep(deployment, Guarded(Controller(deployment)), plant, [hand], write)
+        lock_step = LockStep(
+            deployment, GatedController(Controller(deployment)), plant, [hand], write
+        )
         while lock_step.time_ms < 1000.0 * script.duration_s:
             lock_step.step()
             if lock_step.time_ms % 1000 == 0:
@@ -120,7 +122,7 @@ class Task:
         words: what to do, for the person.
         script: the same for the simulated operator, and how long it takes.
         mode: who moves the valves.
-        released: from when to when the simulated operator does not hold the enable switch, s.
+        released: when the simulated operator lets the enable switch go and holds it again, s.
     """
 
     words: str
@@ -130,16 +132,16 @@ class Task:
 
 
 class Person(Protocol):
-    """Who is led through the steps."""
+    """The person who is led through the steps."""
 
     def ready(self, words: str) -> None:
-        """Say what to do, and wait until they are about to do it."""
+        """Tell them what to do, and wait until they are about to do it."""
 
     def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
-        """Ask for a word, one of those that are allowed; the default where they say no other."""
+        """Ask for a word, one of ``allowed`` where there are any; return it, or the default."""
 
     def progress(self, what: str) -> AbstractContextManager[OnProgress]:
-        """A bar, from 0 to 1."""
+        """Show a bar of progress, from 0 to 1."""
 
 
 class Bench(Protocol):
@@ -164,7 +166,7 @@ class Bench(Protocol):
         """
 
     def raw_mode(self, step: str) -> Mode:
-        """Who moves the valves without filters before the first motion."""
+        """Return who moves the valves without filters before the first motion."""
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:
         """Drive an axis through its ramp; its valve is neutral afterwards, however it ends.
@@ -172,7 +174,7 @@ class Bench(Protocol):
         Args:
             deployment: the machine.
             drive: the measurement.
-            words: what the person has to know and to hold.
+            words: what the person has to know, and which switch to hold.
 
         Raises:
             BusError: a bus cannot be opened.
@@ -180,7 +182,7 @@ class Bench(Protocol):
 
 
 def check_rehearsal(deployment: Deployment) -> None:
-    """Refuse what the simulated crane cannot stand for.
+    """Refuse a deployment that the simulated crane cannot stand for.
 
     Raises:
         UsageError: several cranes.

@@ -1,4 +1,4 @@
-"""Where the procedure keeps what it makes, the sheet to sign, and who may work on it."""
+"""Files of the procedure: paths, lock, copies of the deployment; the sheet of a step."""
 
 import fcntl
 import io
@@ -51,7 +51,7 @@ class Files:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """No other process works on it meanwhile.
+        """Keep other processes from working on the same deployment meanwhile.
 
         Raises:
             UsageError: one does.
@@ -75,14 +75,14 @@ class Files:
 
 
 def rehearsal_of(path: Path) -> Path:
-    """Name of the copy that a rehearsal works on; a copy is its own."""
+    """Return the path of the copy that a rehearsal works on; that of a copy is its own."""
     if path.stem.endswith(REHEARSAL):
         return path
     return path.with_name(f"{path.stem}{REHEARSAL}.yaml")
 
 
 def copy_for_rehearsal(path: Path) -> Path:
-    """The copy, which is made where it is not there yet."""
+    """Return the copy for a rehearsal; make it where there is none yet."""
     copy = rehearsal_of(path)
     if not copy.exists():
         shutil.copyfile(path, copy)
@@ -152,7 +152,7 @@ class Sheet(SafeConsole):
 
 
 def shown(part: Part) -> str | Table:
-    """A part as it is printed again."""
+    """Return a part of a sheet, to print it again."""
     if "text" in part:
         return str(part["text"])
     table = new_table(*part["columns"], title=part["title"] or None)

@@ -74,7 +74,7 @@ class Machine:
     def _daemon(
         self, deployment: Deployment, log: Path, mode: Mode
     ) -> "Iterator[subprocess.Popen[bytes] | None]":
-        """The daemon, where the mode has one; however the block ends, its valves are neutral."""
+        """Run the daemon, where the mode has one; its valves are neutral however the block ends."""
         if mode is Mode.LISTEN:
             yield None
             return
@@ -122,7 +122,7 @@ def _wait_for_start(daemon: "subprocess.Popen[bytes]", said: Path) -> None:
 
 
 def _failed(daemon: "subprocess.Popen[bytes]", said: Path) -> BusError | UsageError:
-    """Return why it has ended."""
+    """Return the error of a daemon that has ended, with what it said."""
     text = said.read_text(encoding="utf-8", errors="replace").strip()
     kind = BusError if daemon.returncode == EXIT_BUS else UsageError
     return kind(f"canshaper run ended with status {daemon.returncode}:\n{text}")

@@ -1,4 +1,4 @@
-"""The procedure: runs steps, keeps their state, writes what a person has accepted."""
+"""The procedure: it runs steps, keeps their state, and writes what a person has accepted."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,17 +20,13 @@ from canshaper.commissioning.procedure.state import (
     stamped,
     write_state,
 )
-from canshaper.commissioning.procedure.steps.buses import BUSES
-from canshaper.commissioning.procedure.steps.check import CHECK
+from canshaper.commissioning.procedure.steps.check import CHECK, REPORT
 from canshaper.commissioning.procedure.steps.drive import DRIVE
-from canshaper.commissioning.procedure.steps.dry import DRY
 from canshaper.commissioning.procedure.steps.filter import FILTER
-from canshaper.commissioning.procedure.steps.joysticks import JOYSTICKS
-from canshaper.commissioning.procedure.steps.motion import FIRST_MOTION
-from canshaper.commissioning.procedure.steps.report import REPORT
-from canshaper.commissioning.procedure.steps.sensor import SENSOR
+from canshaper.commissioning.procedure.steps.joysticks import BUSES, JOYSTICKS
+from canshaper.commissioning.procedure.steps.motion import DRY, FIRST_MOTION
 from canshaper.commissioning.procedure.steps.swing import SWING
-from canshaper.commissioning.procedure.steps.valve import VALVE
+from canshaper.commissioning.procedure.steps.valve import SENSOR, VALVE
 from canshaper.edit.edit import replace_text
 from canshaper.errors import BusError, CanshaperError, UsageError
 from canshaper.machine.deployment import Deployment
@@ -68,7 +64,7 @@ class Procedure:
 
     Raises:
         ConfigError: the deployment file is no good one.
-        UsageError: the state is not one, or of the other bench.
+        UsageError: the state file is damaged, or of another machine or simulated crane.
     """
 
     def __init__(
@@ -120,15 +116,15 @@ class Procedure:
         raise UsageError(f"--step: expected one of {names}, got {name!r}")
 
     def next_open(self) -> Step | None:
-        """The first step that is open; None where none is."""
+        """Return the first step that is open; None where all are done or skipped."""
         return next((s for s in self.steps if self.state.of(s.name).status is Status.OPEN), None)
 
     # -- one step ------------------------------------------------------------------------------
 
     def run(self, step: Step) -> Outcome:
-        """Run a step: its results, and what it would write; nothing is written yet.
+        """Run a step; return its results and what it would write. Nothing is written yet.
 
-        What it lacks is no error.
+        Missing data is no error but a problem of the outcome.
 
         Raises:
             ConfigError: the deployment file is no good one.
@@ -157,10 +153,11 @@ class Procedure:
         return outcome
 
     def accept(self, outcome: Outcome) -> None:
-        """Write what a step proposes; it is done, and what used its results is open again.
+        """Write what a step proposes. It is done; the steps that used its results are open again.
 
         Raises:
-            UsageError: it lacks something, or the file was changed meanwhile: the step stays open.
+            UsageError: the outcome has problems, or the file was changed meanwhile; the step stays
+                open.
             OSError: a file cannot be written.
         """
         if outcome.problems:
@@ -180,7 +177,7 @@ class Procedure:
         self._save()
 
     def skip(self, step: Step) -> None:
-        """Leave a step out; what it has shown stays."""
+        """Leave a step out; what it has shown stays in the state."""
         record = stamped(self.state.of(step.name))
         record.status, record.why = Status.SKIPPED, "left out"
         self._save()
@@ -188,7 +185,7 @@ class Procedure:
     # -- parts ---------------------------------------------------------------------------------
 
     def _propose(self, outcome: Outcome) -> None:
-        """Let the step write into a copy of the file, and see what that changes."""
+        """Let the step write into a copy of the file, and note what that changes."""
         assert outcome.edit
         path, copy = self.files.deployment, self.files.proposal
         before = path.read_bytes()
@@ -236,7 +233,7 @@ class Procedure:
                     record.status, record.why = Status.OPEN, why
 
     def _notice_changes(self) -> None:
-        """Report a file that someone else has changed: what it was checked for is open again."""
+        """Note that another program has changed the file: the steps that need it are open again."""
         now = hash_of(self.files.deployment)
         if self.state.left and self.state.left != now:
             why = f"{self.files.deployment.name} was changed by another program"

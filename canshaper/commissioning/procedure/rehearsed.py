@@ -25,7 +25,7 @@ STOP, TRIP, NONE = "shaped stop", "trip", "no stop"
 WORDS = {Reaction.SHAPED_STOP: STOP, Reaction.NEUTRAL: TRIP}
 WORDS_OF = {State.STOPPING.name: STOP, State.TRIPPED.name: TRIP}
 SAID = {"R1": STOP, "R2": TRIP, "BUS_OFF": TRIP}
-"""Reaction to what has no reason of its own, and stops; see docs/safety.md."""
+"""Reactions to claims that stop an axis but have no reason of their own; see docs/safety.md."""
 
 _INTERFACE = "it is seen at the interface: pull its cable, or `ip link set can0 down`"
 _PROGRAM = "an error of the program, which no input makes"
@@ -43,20 +43,20 @@ NEVER = {
     "R15": "fill the disk",
     "LENGTH_LOST": "unplug the sensor of the rope's length",
 }
-"""Why what no input makes is not rehearsed, or how else it is tried."""
+"""Claims that no input can cause: why they are not rehearsed, or how else they are tried."""
 
 Row = dict[str, str]
 """A fault that was rehearsed, by ``HEADS``."""
 
 
 def reaction_of(claim: str) -> str:
-    """The reaction to what can be rehearsed: of its reason, where it has one."""
+    """Return the reaction to a claim: that of its reason, where it has one."""
     reason = Reason.__members__.get(claim)
     return SAID.get(claim) or WORDS.get(REACTION_OF[reason] if reason else Reaction.NONE, NONE)
 
 
 def expected(fault: Fault) -> str:
-    """Return the reaction that the page on safety gives for a fault, and within which time."""
+    """Return the reaction to a fault by the page on safety, and within which time."""
     if (reaction := reaction_of(fault.claim)) == NONE:
         return NONE
     within = f"{reaction} within {fault.within_ns / MS:g} ms"
@@ -90,7 +90,7 @@ def judged(fault: Fault, report: Mapping[str, Any], deployment: Deployment) -> R
 
 
 def refused(deployment: Deployment) -> dict[str, str]:
-    """Return the rows that no input can cause, here or at any machine, with the reasons."""
+    """Return the claims that no input can cause, here or at any machine, with the reasons."""
     made = {one.claim for one in rehearsed_faults(deployment).values()}
     stops = [one.name for one in Reason if REACTION_OF[one] is not Reaction.NONE]
     here = [one for one in stops if one not in made]
@@ -98,7 +98,7 @@ def refused(deployment: Deployment) -> dict[str, str]:
 
 
 def chosen(deployment: Deployment, names: Iterable[str]) -> list[Fault]:
-    """The faults with these names, kinds or rows; all without any.
+    """Return the faults with these names, kinds or claims; all of them without any.
 
     Raises:
         UsageError: there is none, or it cannot be rehearsed.
@@ -116,7 +116,7 @@ def chosen(deployment: Deployment, names: Iterable[str]) -> list[Fault]:
 
 
 def made(control: Path, fault: Fault, deployment: Deployment) -> Row:
-    """Let the daemon make a fault, and wait until it is over; however this ends, the fault does.
+    """Let the daemon make a fault, and wait until it is over; it ends however this returns.
 
     Raises:
         ControlError: the daemon refuses, or is gone.
@@ -142,7 +142,7 @@ def table(rows: Iterable[Row]) -> "Table":
 
 
 def kept(folder: Path) -> list[Row]:
-    """Rows that were kept, for the report; none where there are none yet."""
+    """Return the rows that were kept for the report; none before the first."""
     path = folder / RESULTS
     rows: list[Row] = json.loads(path.read_text("utf-8")) if path.exists() else []
     return rows

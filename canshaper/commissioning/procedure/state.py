@@ -36,14 +36,14 @@ class Record:
 
     Attributes:
         status: of the step.
-        at: when it was last run, accepted or skipped, in ISO 8601; empty before.
-        why: what is said of it: why it is open again, how it was judged.
-        parts: what it has shown.
+        at: time of the last run, acceptance or skip, ISO 8601; empty before.
+        why: why it is open again, or how it was judged.
+        parts: lines and tables that it has shown.
         numbers: what it measured.
-        problems: what was missing.
+        problems: what is missing, each with what to do.
         pictures: files of its picture, in the folder.
         files: its logs, there too.
-        diff: what it has written into the deployment file, as a unified diff.
+        diff: its change of the deployment file, as a unified diff.
         deployment: SHA-256 of the deployment file as it left it.
         version: of the program.
     """
@@ -85,7 +85,7 @@ class State:
 
 
 def now() -> str:
-    """The time as it stands in the file."""
+    """Return the time now, as the state file has it."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
@@ -101,10 +101,10 @@ def hash_of(path: Path) -> str:
 
 
 def read_state(path: Path) -> State | None:
-    """The state out of its file; None where there is none yet.
+    """Read the state from its file; None where there is none yet.
 
     Raises:
-        UsageError: it is no such file.
+        UsageError: the file is no state of a commissioning.
         OSError: it cannot be read.
     """
     if not path.exists():
@@ -114,7 +114,7 @@ def read_state(path: Path) -> State | None:
         if data.pop("version") != VERSION:
             raise ValueError("another version")
         steps = {
-            # An older program has written its problems as poor.
+            # An older program has called the problems poor.
             name: Record(
                 **{"problems": one.pop("poor", []), **one, "status": Status(one["status"])}
             )
@@ -136,7 +136,7 @@ def write_state(path: Path, state: State) -> None:
 
 
 FILE = "file"
-"""Among what a step needs: the deployment file as it is, whichever program has changed it."""
+"""In ``Step.needs``: the deployment file, whichever program changes it."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Context:
 
     @property
     def numbers(self) -> dict[str, Mapping[str, Any]]:
-        """Numbers of the steps that are done, by their names."""
+        """Numbers of the steps that are done, by name of the step."""
         steps = self.state.steps.items()
         return {name: one.numbers for name, one in steps if one.status is Status.DONE}
 
@@ -170,11 +170,11 @@ class Outcome:
         sheet: its lines and tables.
         numbers: what it measured, of JSON types, by names with units.
         problems: what is missing, each with what to do; a step with one stays open.
-        figures: draw its pictures, by the end of their names; empty for a single one.
+        figures: functions that draw its pictures, by the end of their names; "" for a single one.
         files: logs it has written.
-        note: what is said of the step once it is done; empty for nothing.
-        edit: writes what it proposes into the file of a deployment, and says what a person has to
-            know of that, if anything; None for nothing.
+        note: remark on the step once it is done; empty for none.
+        edit: function that writes its proposal into the file of a deployment, and returns notes on
+            that for the person; None for no proposal.
 
     The procedure adds:
 
@@ -210,8 +210,8 @@ class Step:
         does: the same in a sentence, for the table of docs/commission.md.
         writes: keys of the file that it may change.
         run: does it.
-        needs: steps whose results it uses, or ``FILE``: it is open again when these change.
-        applies: whether a deployment has what it is about.
+        needs: steps whose results it uses, or ``FILE``; when one changes, it is open again.
+        applies: whether a deployment has this step.
     """
 
     name: str

@@ -12,7 +12,7 @@ from cantools.database.can import Message
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
 from canshaper.commissioning import suggest
-from canshaper.commissioning.doctor.listen import inputs_of
+from canshaper.commissioning.doctor.joysticks import inputs_of
 from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.series import (
     Array,
@@ -28,8 +28,7 @@ from canshaper.machine.joysticks import BoundJoystick
 from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
 from canshaper.recording.channels import InputFinder, joystick_commands, valve_part
-from canshaper.recording.history import History
-from canshaper.recording.listen import ReceivedFrame
+from canshaper.recording.listen import History, ReceivedFrame
 from canshaper.recording.log import LogFile
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import Recorder
@@ -84,7 +83,7 @@ class Traffic:
 
 
 class _Reader:
-    """Takes the frames of a log."""
+    """Reader of a log, frame by frame."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.traffic = Traffic(axes={name: AxisTraffic() for name in deployment.axes})
@@ -131,7 +130,7 @@ class _Reader:
                 self.traffic.axes[name].enabled.add(time_s, float(raw[bound.enable] == 1))
 
     def _move(self, message: Message, layout: Layout, data: bytes) -> None:
-        """Extremes of its signals that could be a velocity."""
+        """Note the extremes of the signals of a message that may be a velocity."""
         if len(data) != message.length:
             return
         raw = layout.decode(data)
@@ -181,7 +180,7 @@ MOST_SILENT_S = 0.5  # a fifth of the swing of most grapples
 def simulated_recording(
     log: Path, deployment: Deployment, parameters: CraneParameters
 ) -> Recording:
-    """A drive of the simulated crane, which says how it moves.
+    """Return the recording of a drive of the simulated crane, out of its messages.
 
     Raises:
         LogError: the log cannot be read.
@@ -196,15 +195,15 @@ def simulated_recording(
 
 
 def machine_recording(log: Path, deployment: Deployment, signals: Mapping[str, str]) -> Recording:
-    """A drive of a machine, with the signals that show its swing.
+    """Return the recording of a drive of a machine, with the signals that show its swing.
 
-    The speed of an axis is taken to be what was sent to its valve. A rate is an angle by the period
-    of the swing. The total swing is that of all signals together; where the tip is, no one says.
+    An axis counts as moving with the speed that its valve was sent. A rate becomes an angle by the
+    period of the swing. The total swing is that of all signals; the place of the tip is not known.
 
     Args:
         log: of the drive.
         deployment: the machine.
-        signals: MESSAGE.SIGNAL of the swing by axis; at least one. Axes may share one.
+        signals: MESSAGE.SIGNAL of the swing by axis, at least one; axes may share one.
 
     Raises:
         IdentificationError: a signal is not in the log, shows no angle and no rate, or was silent.
@@ -233,7 +232,7 @@ def machine_recording(log: Path, deployment: Deployment, signals: Mapping[str, s
 
 
 def _check_complete(name: str, series: Series, duration_s: float) -> None:
-    """Check that the sensor did not fall silent: a gap would show no swing.
+    """Check that the sensor was never silent: in a gap no swing would show.
 
     Raises:
         IdentificationError: it has a gap.

@@ -1,8 +1,8 @@
 """A sway sensor against the model of its axis: least squares over delay, frequency and decay.
 
 The tip follows its command with the lag that the deployment names, and drives the pendulum as in
-`canshaper.shaping.sway`; the sensor shows that swing so much later, times a gain, whose sign is its
-own. Each stretch of driving has a free swing and an offset of its own too.
+`canshaper.shaping.sway`. The sensor shows that swing after a delay, times a gain with a sign. Each
+stretch of driving has a free swing and an offset of its own.
 """
 
 from collections.abc import Sequence
@@ -28,9 +28,9 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shaping.sway import SwayMode
 from canshaper_sim.strokes import Script, Stroke
 
-# Delays that are looked for; a valve that is quicker than the deployment says makes it negative.
+# Range of delays, s; a valve that is quicker than the deployment says makes one negative.
 LEAST_DELAY_S, MOST_DELAY_S = -0.2, 0.7
-# The same of the frequency of the swing, as a part of that of the deployment.
+# Range of the frequency of the swing, as a part of that of the deployment.
 SLOWEST, FASTEST = 0.6, 1.6
 GRID_S: Final = 0.005
 # Delays from which the solver starts: half a swing further it would find the other sign.
@@ -47,7 +47,7 @@ class SensorFit:
         omega, sigma: frequency and decay of the swing, rad/s, 1/s.
         offsets: of each stretch, rad or rad/s.
         fitted: the model, for each stretch.
-        square: sum of squares of what no free swing explains; ``left`` of that beyond the model.
+        square: sum of squares of the data without free swings; ``left``: of its residual.
         count: measurements.
         deviations: standard deviations of delay (s), frequency, decay, and relative of the gain.
     """
@@ -64,7 +64,7 @@ class SensorFit:
     deviations: tuple[float, float, float, float]
 
     def explained(self, noise: float) -> float:
-        """Part of what is beyond noise, rad or rad/s, that the commands explain."""
+        """Return the part of the signal beyond noise (rad or rad/s) that the commands explain."""
         beyond = self.square - self.count * noise**2
         return 1.0 - max(0.0, self.left - self.count * noise**2) / beyond if beyond > 0.0 else 0.0
 
@@ -102,7 +102,7 @@ def _model(
 
 
 def _held(one: Driven) -> tuple[Array, Array]:
-    """Commanded speed on a grid that begins with a command: times from the stretch's, speeds."""
+    """Return a grid of times from the stretch's start, and the commanded speed on it."""
     first, last = float(one.command.time_s[0]) - one.start_s, float(one.time_s[-1])
     grid = np.arange(first, last - LEAST_DELAY_S + GRID_S, GRID_S)
     return grid, one.command.at(one.start_s + grid + 1e-6)
@@ -151,12 +151,12 @@ def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dic
     )
 
 
-# As a person drives who is asked to: a slow stroke, a pause of two swings, and back.
+# A drive as a person is asked for: slow strokes forth and back, with pauses of two swings.
 FIRST_S, STROKE_S, PAUSE_S, LEVEL, STROKES = 2.0, 1.0, 4.0, 0.4, 4
 
 
 def hand_driven(axes: Sequence[str]) -> Script:
-    """Slow strokes of one axis after the other."""
+    """Return a script of slow strokes, of one axis after the other."""
     strokes, start_s = [], FIRST_S
     for axis in axes:
         for number in range(STROKES):

@@ -1,1 +1,1 @@
-"""Faults rehearsed at the running machine; loaded where its file allows them only."""
+"""Faults rehearsed at the running machine; loaded only if its deployment file allows them."""

@@ -1,4 +1,4 @@
-"""A fault that is rehearsed, and the rule that keeps it from moving anything."""
+"""A rehearsed fault, and the rule that keeps it from moving an axis."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -13,35 +13,36 @@ from canshaper.machine.inputs import Bound
 from canshaper.shaping.states import Reason
 
 MS, S = 1_000_000, 1_000_000_000
-# A held joystick is not still: less than this part of full deflection is no letting go.
+# A hand does not hold a joystick still: a smaller reduction, in parts of full deflection, is no
+# release.
 SLACK = 0.05
 
 Asked = Mapping[str, float]
-"""Demands of frames by signal: a velocity in [-1, 1]; 1 of a switch that allows motion, else 0."""
+"""Demands by signal: a velocity in [-1, 1]; for a switch, 1 if it allows motion, otherwise 0."""
 Alter = Callable[[Frame], tuple[Frame, ...]]
-"""Function that returns the frames to receive in place of a frame."""
+"""Function that returns the frames to receive instead of a frame."""
 Begin = Callable[[Recorder, int], object]
-"""Function that acts once on the recorder, at a time."""
+"""Function that makes a fault once, through the recorder, at a time in ns."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault as the input side makes it.
+    """One fault, made on the input side of controller and gate.
 
     Attributes:
-        name: how a person asks for it, KIND:PART.
+        name: name by which a person requests it, KIND:PART.
         claim: its row in the table of reactions, see docs/safety.md.
-        axes: of these one has to move; none: every axis is at rest.
-        within_ns: when the reaction has to begin.
-        alter: what is received in place of a frame.
-        once: only one frame is altered.
-        age_ns: how much older an altered frame arrives.
-        begin: what is made once.
-        end: frame of another sender, when it is over.
+        axes: axes of which one has to move; if empty, every axis has to be at rest.
+        within_ns: time in which the reaction has to begin.
+        alter: returns the frames to receive instead of a frame.
+        once: whether only one frame is altered.
+        age_ns: time by which an altered frame arrives earlier.
+        begin: makes the fault once.
+        end: frame of another sender that ends the fault.
         late: numbers of the ticks that are late.
-        stands: the late ticks are a standstill, in which nothing is read.
-        unsent: frames are reported as not sent, though they are.
-        lasts_ns: it is over by itself after that; 0 until its reaction is over.
+        stands: whether the late ticks are a standstill, in which no frame is read.
+        unsent: whether frames are reported as not sent, although they are sent.
+        lasts_ns: time after which it is over by itself; 0: with its reaction.
     """
 
     name: str
@@ -60,14 +61,14 @@ class Fault:
 
 
 class Editor:
-    """Recognises the frames of one message, and changes their bits; the check is made again."""
+    """Recognises the frames of one message, and changes their bits and their checksum."""
 
     def __init__(self, bound: Bound[Any]) -> None:
         self.bound, self._protection = bound, bound.protection
         self._keys, self._length = frozenset(bound.keys), bound.message.length
 
     def has(self, frame: Frame) -> bool:
-        """Whether it is a frame of this message, of its length and its value of the multiplexor."""
+        """Return whether a frame is of this message, with its length and multiplexor value."""
         bus, can_id, extended = self.bound.key
         its = frame[:3] in self._keys
         if self.bound.any_source:
@@ -78,13 +79,13 @@ class Editor:
         return its and (chosen is None or self.raw(frame)[chosen.signal] == chosen.value)
 
     def raw(self, frame: Frame) -> dict[str, Any]:
-        """Raw values."""
+        """Return the raw values of a frame by signal."""
         return self.bound.layout.decode(frame.data)
 
     def changed(self, frame: Frame, values: Mapping[str, Any]) -> Frame:
-        """The frame with other raw values: of all other bits none changes, but those of its check.
+        """Return a frame with other raw values and a right checksum; no other bit changes.
 
-        The counter of an E2E header is that of the frame.
+        The counter of an E2E header stays that of the frame.
         """
         encode, raw = self.bound.layout.encode, self.raw(frame)
         bits = zip(frame.data, encode(raw), encode({**raw, **values}), strict=True)
@@ -95,7 +96,7 @@ class Editor:
         return frame._replace(data=data)
 
     def counted(self, frame: Frame, new: Callable[[int], int]) -> Frame:
-        """The frame with another alive counter, by its own one."""
+        """Return a frame with another alive counter; ``new`` computes it from its own one."""
         check, counts = self._protection.check, self._protection.counts
         if isinstance(check, E2e):
             count = new(check.count(frame.data)) % counts
@@ -104,19 +105,19 @@ class Editor:
         return self.changed(frame, {name: new(self.raw(frame)[name]) % counts})
 
     def spoiled(self, frame: Frame) -> Frame:
-        """The frame with one bit of its check wrong, and every signal as it was."""
+        """Return a frame with one wrong bit in its checksum, and all other signals unchanged."""
         data, check = bytearray(frame.data), self._protection.check
         data[getattr(check, "byte", 0)] ^= 1 << getattr(check, "shift", 0)
         return frame._replace(data=bytes(data))
 
 
 def no_more(altered: Asked, real: Asked) -> bool:
-    """Whether a frame asks for no more than the real one, and in no other direction."""
+    """Return whether a frame demands no more than the real one, and in no other direction."""
     return all(min(0.0, of) <= altered.get(key, 0.0) <= max(0.0, of) for key, of in real.items())
 
 
 def takes_back(real: Asked, applied: Asked) -> bool:
-    """Whether a frame asks for less than what is applied, for nothing, or the other way."""
+    """Return whether a frame demands less than what is applied, or the opposite direction."""
     pairs = [(of, applied.get(key, 0.0)) for key, of in real.items()]
     return any(was and (of * was <= 0.0 or abs(of) < abs(was) - SLACK) for of, was in pairs)
 
@@ -124,21 +125,23 @@ def takes_back(real: Asked, applied: Asked) -> bool:
 class Demands:
     """Demands of joysticks, switches and emergency stop: a fault only reduces them.
 
-    Nothing moves that the joystick did not ask for, and what it takes back acts as without a fault:
+    No axis moves unless its joystick demands that. A joystick that reduces its demand acts as if
+    there were no fault:
 
-    - A frame is replaced only by one that asks, signal by signal, for no more than it does itself,
-      and in no other direction (``no_more``).
-    - A frame that takes something back from what the controller has applied, or holds, is never
-      replaced, held or dropped: it passes as it is and ends the fault (``takes_back``).
-    - Where the controller does not follow that frame, what moves trips: it refuses the frame and so
-      holds more than it asks for, because frames before were lost or had other counts; or an axis
-      runs out against it, in a stop of the fault (``Rehearsal.receive``).
+    - A frame is replaced only by frames that demand, signal by signal, no more than it does, and in
+      no other direction (``no_more``).
+    - A frame that demands less than the controller has applied, or holds, is never replaced, held
+      or dropped: it passes unchanged and ends the fault (``takes_back``).
+    - If the controller does not follow that frame, the axes that move trip (``Rehearsal.receive``).
+      Either it refuses the frame, because earlier frames were lost or had other counts, and so
+      holds more than the frame demands; or an axis still runs out against the demand, in a stop
+      that the fault caused.
 
-    Gate and controller get the same frames, behind the fault. The end of a release that was
-    rehearsed is the edge of a switch: in neutral it resets, and moves nothing.
+    Gate and controller receive the same altered frames. When a rehearsed release of a switch ends,
+    the switch has an edge: in neutral that edge resets, and moves no axis.
 
     Attributes:
-        keys: by axis, the key of its demand.
+        keys: key of the demand of each axis, by name of the axis.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -159,7 +162,7 @@ class Demands:
             self._bands[key] = min(band, self._bands.get(key, 1.0))
 
     def read(self, frame: Frame) -> Asked:
-        """Return the demands of a frame; none of another message."""
+        """Return the demands of a frame; empty for a frame that has none."""
         for name, editor, velocities, switches in self._inputs:
             if editor.has(frame):
                 raw = editor.raw(frame)
@@ -184,39 +187,42 @@ class Demands:
 
 
 def tick_ns(deployment: Deployment, ticks: int = 2) -> int:
-    """So many ticks, of the slowest valve: its axis looks at what came when it is its turn."""
+    """Return the longest time in which so many ticks of every axis pass, ns.
+
+    An axis computes its command only in the ticks of its valve, so the slowest valve counts.
+    """
     slowest = max(axis.period_ticks for axis in deployment.axes.values())
     return (ticks + slowest) * deployment.config.tick_ms * MS
 
 
 def lost_ns(deployment: Deployment, bound: Bound[Any]) -> int:
-    """Until a message that is silent is lost."""
+    """Return the longest time until a silent message counts as lost, ns."""
     timeout_ms: int = bound.config.timeout_ms
     return timeout_ms * MS + tick_ns(deployment)
 
 
 def dropped(has: Callable[[Frame], bool]) -> Alter:
-    """Drop some frames."""
+    """Return a function that drops the frames for which ``has`` is true."""
     return lambda frame: () if has(frame) else (frame,)
 
 
 def edited(editor: Editor, edit: Callable[[Frame], Frame]) -> Alter:
-    """Edit the frames of one message."""
+    """Return a function that edits the frames of one message."""
     return lambda frame: (edit(frame) if editor.has(frame) else frame,)
 
 
 def put(editor: Editor, values: Mapping[str, Any]) -> Alter:
-    """Put raw values into the frames of one message."""
+    """Return a function that puts raw values into the frames of one message."""
     return edited(editor, lambda frame: editor.changed(frame, values))
 
 
 def sent(frame: Frame) -> Begin:
-    """Another sender sends a frame."""
+    """Return a function that receives a frame, as from another sender."""
     return lambda recorder, now_ns: Recorder.receive(recorder, frame, now_ns)
 
 
 def reports(*faults: FrameFault, off: str = "") -> Begin:
-    """Faults are reported, and that we are off a bus."""
+    """Return a function that reports faults, and that we are off the bus ``off`` if it is named."""
 
     def begin(recorder: Recorder, _now_ns: int) -> None:
         for fault in faults:

@@ -1,4 +1,4 @@
-"""Every fault that can be rehearsed at a machine."""
+"""Table of the faults that can be rehearsed at a machine."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,10 +22,10 @@ ACTIVE = ids.ValveState.ACTIVE.value
 
 
 def rehearsed_faults(deployment: Deployment) -> dict[str, Fault]:
-    """Every fault that can be made on the input side of a machine, by its name.
+    """Return every fault that can be made on the input side of a machine, by name.
 
-    Those after which the daemon has to be started again are the last ones; each lasts until its
-    reaction is over, where it does not say how long.
+    Faults after which the daemon has to be restarted are the last ones. A fault without a time of
+    its own lasts until the reaction is over.
     """
     demands, faults = Demands(deployment), list[Fault]()
     for joystick in deployment.joysticks.values():
@@ -89,7 +89,7 @@ def _of_valves(deployment: Deployment) -> Iterator[Fault]:
 
 
 def _active(word: Bound[Any]) -> Callable[[Frame], bool]:
-    """Whether a frame is a status word that says *active*."""
+    """Return a function that recognises frames whose status word says *active*."""
     editor, signal = Editor(word), word.config.signal
     return lambda frame: editor.has(frame) and editor.raw(frame)[signal] & ACTIVE == ACTIVE
 
@@ -111,7 +111,7 @@ def _of_nodes(deployment: Deployment) -> Iterator[Fault]:
             axes = tuple(by_joystick or by_valve)
             claim = "NODE_FAULT" if by_joystick else "VALVE_FAULT"
             alarm, over = (Frame(bus, ids.EMERGENCY + node.id, False, d) for d in (ALARM, NO_ALARM))
-            beat = Frame(bus, ids.HEARTBEAT + node.id, False, RUNS)  # any other one passes
+            beat = Frame(bus, ids.HEARTBEAT + node.id, False, RUNS)  # other states pass
             drop, lost_ns = make.dropped(beat.__eq__), node.heartbeat_ms * MS + tick
             if axes:
                 begin = make.sent(alarm)

@@ -1,4 +1,4 @@
-"""Faults of a joystick that are rehearsed."""
+"""Table of the faults of a joystick that can be rehearsed."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,13 +14,14 @@ from canshaper.machine.joysticks import BoundJoystick
 from canshaper.shaping.states import Reason
 
 OTHER_SOURCE = 0xFC
-LONGEST_STUCK_S = 25.0  # until a joystick is frozen: nobody holds it for longer
+# Longest time until a joystick counts as frozen that is rehearsed: a person has to hold it so long.
+LONGEST_STUCK_S = 25.0
 
 
 def joystick_faults(
     deployment: Deployment, joystick: BoundJoystick, demands: Demands
 ) -> Iterator[Fault]:
-    """Those of one joystick."""
+    """Yield the faults of one joystick."""
     config, of, protection = joystick.config, joystick.name, joystick.protection
     editor, tick = Editor(joystick), make.tick_ns(deployment)
     axes = tuple(n for n, a in deployment.axes.items() if a.config.command.joystick == of)
@@ -70,7 +71,7 @@ def joystick_faults(
 
 
 def _parts(velocity: Velocity) -> list[VelocitySignal]:
-    """Signals of a velocity that have a size."""
+    """Return the signals of a velocity that are measurements."""
     if isinstance(velocity, FlaggedVelocity):
         return [velocity.magnitude]
     if isinstance(velocity, RockerVelocity):
@@ -79,14 +80,18 @@ def _parts(velocity: Velocity) -> list[VelocitySignal]:
 
 
 def _flags(velocity: Velocity) -> list[str]:
-    """Signals of a velocity that are flags."""
+    """Return the names of the signals of a velocity that are flags."""
     if isinstance(velocity, FlaggedVelocity):
         return [velocity.neutral, velocity.negative, velocity.positive]
     return []
 
 
 def _frozen(editor: Editor, joystick: BoundJoystick, demands: Demands) -> Alter:
-    """Where a joystick was, or was nearer to neutral since: it never stands farther than it is."""
+    """Return a function that freezes a joystick at its first position.
+
+    Once the joystick is nearer to neutral than the frozen position, that nearer position is frozen:
+    no frame demands more than the joystick.
+    """
     kept: dict[str, Any] = {}
     names = [
         name
@@ -106,7 +111,7 @@ def _frozen(editor: Editor, joystick: BoundJoystick, demands: Demands) -> Alter:
 
 
 def fault_codes(joystick: BoundJoystick) -> dict[Reason, dict[str, dict[str, Any]]]:
-    """Raw values by which its velocities have no measurement: by reason and velocity."""
+    """Return raw values that are no measurement of a velocity, by reason and by velocity."""
     found: dict[Reason, dict[str, dict[str, Any]]] = {}
     for velocity in joystick.velocities:
         for part in _parts(velocity):
@@ -127,7 +132,7 @@ def _full(part: VelocitySignal) -> int:
 
 
 def _codes(part: VelocitySignal, signal: Signal) -> list[Any]:
-    """Raw values that may be no measurement: with a name, or at or beyond an end."""
+    """Return raw values that may be no measurement: those with a name, and at or beyond an end."""
     if signal.is_float:
         return [float("nan"), 2.0 * part.full / part.scale]
     top = (1 << signal.length - signal.is_signed) - 1
@@ -135,7 +140,7 @@ def _codes(part: VelocitySignal, signal: Signal) -> list[Any]:
 
 
 def _twice(editor: Editor) -> Alter:
-    """Each frame comes from another address too."""
+    """Return a function that receives each frame from a second address, too."""
 
     def twice(frame: Frame) -> tuple[Frame, ...]:
         other = frame._replace(can_id=with_source(frame.can_id, OTHER_SOURCE))

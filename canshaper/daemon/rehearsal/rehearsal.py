@@ -1,7 +1,7 @@
-"""Faults rehearsed at the running machine: made on the input side, in front of controller and gate.
+"""Rehearses faults at the running machine, on the input side, in front of controller and gate.
 
-Loaded by a daemon whose file has ``control.rehearse_faults`` only. Why nothing can move by it that
-the joystick did not ask for: see ``fault.Demands``.
+Only a daemon whose file has ``control.rehearse_faults`` loads this module. ``fault.Demands`` says
+why no axis can move by a rehearsed fault unless its joystick demands that.
 """
 
 import logging
@@ -14,20 +14,21 @@ from canshaper.codec.frame import Frame
 from canshaper.config.bus import REDUCED_PCT
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.rehearsal.fault import MS, Asked, Demands, Fault, S, no_more, takes_back
 from canshaper.daemon.rehearsal.faults import rehearsed_faults
 from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")
 
-# How long a fault waits for its axis to move, and the axis has moved when it is made.
+# Longest time that a fault waits for its axis to move; time that the axis has moved by at least
+# LEAST_DEMAND before the fault is made.
 ARMED_NS, HELD_NS = 60 * S, S // 2
 LEAST_DEMAND = 0.2
-# A client that has not asked for so long is gone.
+# A client that has sent no request for so long is gone.
 GONE_NS = 3 * S
-# How long is looked at after it is over, beyond the timeout of a joystick; and where the reaction
-# is not over by then.
+# Time after the end of a fault in which events are noted, in addition to the timeout of a joystick;
+# longest such time while a stop is not over.
 AFTER_NS, LONGEST_AFTER_NS = 300 * MS, 5 * S
 MOST_EVENTS = 50
 STOPS = (State.STOPPING.name, State.TRIPPED.name)
@@ -36,10 +37,10 @@ NOTHING = Fault("", "", (), 0)
 
 
 class Rehearsal(Recorder):
-    """A recorder whose frames pass at most one rehearsed fault first; arguments as ``Recorder``."""
+    """A recorder that alters received frames by at most one fault; arguments as ``Recorder``."""
 
-    def __init__(self, guarded: Guarded, controller: Controller, ring: Ring) -> None:
-        super().__init__(guarded, controller, ring)
+    def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
+        super().__init__(gated, controller, ring)
         deployment = controller.deployment
         self._demands, self._now_ns = Demands(deployment), 0
         self._valves = frozenset(axis.valve.message.key for axis in deployment.axes.values())
@@ -49,26 +50,30 @@ class Rehearsal(Recorder):
 
     def _begin(self, fault: Fault, phase: str = ARMED) -> None:
         self._fault, self._phase, self._why = fault, phase, ""
-        # When the phase began, its client has asked last, its axis did not move last.
+        # Time when the phase began, of the client's last request, when no axis of it last moved.
         self._since_ns = self._asked_ns = self._still_ns = self._now_ns
-        self._made_ns: int | None = None  # when the first input was another one
-        self._neutral_ms: float | None = None  # after that
+        self._made_ns: int | None = None  # when the first input was altered
+        self._neutral_ms: float | None = None  # time from then until neutral
         self._tick = self._missed = 0
-        self._applied: dict[str, float] = {}  # what frames that passed have asked for
+        self._applied: dict[str, float] = {}  # demands of frames that passed
         self._events: list[list[object]] = []
-        self._spoken = False  # the sender of what ends it has sent the same message itself
+        self._spoken = False  # the real sender has sent the message of ``end``
 
-    # -- what a client asks ----------------------------------------------------------------------
+    # -- requests of a client ---------------------------------------------------------------------
 
     def rehearse(self, what: object, who: str) -> Mapping[str, Any]:
-        """Begin a fault by its name, or say what has become of it.
+        """Arm a fault by its name, or report on the armed one.
 
         Args:
-            what: name of a fault, ``report`` or ``end``; who asks nothing for some seconds is gone.
-            who: who asks, for the log.
+            what: name of a fault, ``report`` or ``end``. A client that asks nothing for some
+                seconds counts as gone, which ends the fault.
+            who: text that names the client in the log.
+
+        Returns:
+            Phase of the fault, whether it was made, time until neutral, events, why it ended.
 
         Raises:
-            ValueError: why it cannot be; nothing has changed.
+            ValueError: the fault cannot be armed; no state has changed.
         """
         if what == "end":
             self._end("ended by its client", stops=True)
@@ -90,21 +95,21 @@ class Rehearsal(Recorder):
             raise ValueError(f"expected one of {', '.join(faults)}, got {name!r}")
         if self._phase != DONE:
             raise ValueError(f"expected one fault at a time, {self._fault.name} is not over")
-        for axis, runner in self._controller.axes.items():
-            if (fast := runner.bound.config.limits.max_pct) > REDUCED_PCT:
+        for axis, control in self._controller.axes.items():
+            if (fast := control.bound.config.limits.max_pct) > REDUCED_PCT:
                 text = f"expected max_pct up to {REDUCED_PCT:g}, got {fast:g}"
                 raise ValueError(f"axes.{axis}.limits: {text}: faults need reduced speed")
-            if not runner.axis.neutral:
-                state = runner.axis.state.name
+            if not control.axis.neutral:
+                state = control.axis.state.name
                 raise ValueError(f"expected every axis at rest, {axis} is {state}: let go first")
         self._begin(faults[name])
 
     def reloads(self) -> None:
-        """End what is rehearsed: another controller follows."""
+        """End the fault, because a reload replaces the controller."""
         self._end("the file was read again")
 
     def _end(self, why: str, *, stops: bool = False) -> None:
-        """From now on every frame passes as it is; ``stops``: what moves trips."""
+        """End the fault: every frame now passes unchanged; ``stops``: axes that move trip."""
         if self._phase not in (ARMED, MADE):
             return
         if self._phase == MADE and self._fault.end and not self._spoken:
@@ -117,7 +122,7 @@ class Rehearsal(Recorder):
     # -- frames and ticks ------------------------------------------------------------------------
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Take a frame from a bus, see ``Guarded``."""
+        """Receive a frame as the fault alters it; return the frame for the other bus, or None."""
         fault = self._fault
         if self._phase == DONE:
             return super().receive(frame, now_ns)
@@ -141,21 +146,23 @@ class Rehearsal(Recorder):
             log.warning("fault=over name=%s the joystick is not followed: it trips", fault.name)
             self.stalled()
         if passed is not None and self._phase == MADE and fault.unsent:
-            self.send_failed(passed)  # of a gateway
+            self.send_failed(passed)  # a gateway forwards it
         return passed
 
     def _holds_more(self, asked: Asked, now_ns: int) -> bool:
-        """Whether the controller goes by more than a frame asks for."""
+        """Return whether the controller holds a larger demand than that of a frame."""
         return bool(asked) and takes_back(asked, self._demands.held(self._controller, now_ns))
 
     def _runs(self, asked: Asked) -> bool:
-        """Whether an axis runs out against what a frame asks for, in a stop."""
+        """Return whether an axis, in a stop, runs out against the demand of a frame."""
         keys, axes = self._demands.keys, self._controller.axes
         stopping = {n: one.axis for n, one in axes.items() if one.axis.state is State.STOPPING}
-        return any(axis.raw * asked.get(keys[name], 0.0) < 0.0 for name, axis in stopping.items())
+        return any(
+            axis.output.steps * asked.get(keys[name], 0.0) < 0.0 for name, axis in stopping.items()
+        )
 
     def _altered(self, frame: Frame, asked: Asked) -> tuple[Frame, ...]:
-        """Return the frames to receive in place of a frame: none asks for more than it does."""
+        """Return the frames to receive instead of a frame; none demands more than it."""
         if self._fault.once and self._made_ns is not None:
             return (frame,)
         altered = self._fault.alter(frame)
@@ -163,7 +170,7 @@ class Rehearsal(Recorder):
         return altered if less else (frame,)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """Run one tick, and yield the frames to send now; see ``Controller``."""
+        """Run one tick unless the fault makes it late, and yield the frames to send now."""
         self._now_ns = now_ns
         if self._phase == DONE:
             yield from super().tick(now_ns, missed)
@@ -186,12 +193,12 @@ class Rehearsal(Recorder):
         self._look(now_ns)
 
     def _made(self, now_ns: int) -> None:
-        """Note when something was first other than on the bus."""
+        """Note the time of the first altered input."""
         if self._made_ns is None:
             self._made_ns = now_ns
 
     def _step(self, now_ns: int) -> None:
-        """Go on to the next phase, where it is time."""
+        """Enter the next phase if it is time."""
         lasted_ns = now_ns - self._since_ns
         if self._phase == OVER:
             stops = any(event[2] in STOPS for event in self._events)
@@ -208,9 +215,9 @@ class Rehearsal(Recorder):
             self._end("its time is over")
 
     def _held(self, now_ns: int) -> bool:
-        """Whether it is to be made now: its axis moves as announced, or all are at rest."""
+        """Return whether to make the fault now: an axis of it has moved, or all are at rest."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
-        if not any(one.state is State.ACTIVE and abs(one.command) >= LEAST_DEMAND for one in axes):
+        if not any(one.state is State.ACTIVE and abs(one.demand) >= LEAST_DEMAND for one in axes):
             self._still_ns = now_ns
         return now_ns - self._still_ns >= HELD_NS if axes else self._controller.neutral
 
@@ -223,7 +230,7 @@ class Rehearsal(Recorder):
             self._made(now_ns)
 
     def _look(self, now_ns: int) -> None:
-        """Note what has changed since the fault was made, and when its valves are neutral."""
+        """Note the events since the fault was made, and when its valves are neutral."""
         if self._made_ns is None:
             return
         since_ms = (now_ns - self._made_ns) / MS
@@ -238,6 +245,6 @@ class Rehearsal(Recorder):
 
     @property
     def _neutral(self) -> bool:
-        """Whether the valves of its axes are neutral, and stay so."""
+        """Whether the valves of its axes are neutral and stay neutral."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
-        return all(one.neutral and not one.raw for one in axes)
+        return all(one.neutral and not one.output.steps for one in axes)

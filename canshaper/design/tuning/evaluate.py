@@ -237,10 +237,10 @@ def _press_and_release(
     count = round(hold_s / tick_s)
     moves = []
     for command in (1.0, 0.0):
-        before, sent = axis.sent, []
+        before, sent = axis.output.setpoint, []
         for _ in range(count):
             axis.tick(CommandInput(command))
-            sent.append(axis.sent)
+            sent.append(axis.output.setpoint)
         moves.append((before, sent))
     return moves
 

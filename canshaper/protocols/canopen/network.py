@@ -148,8 +148,8 @@ class CanopenNetwork(BusProtocol):
         self.nodes = {n: CanopenBus(n, b.canopen) for n, b in buses.items() if b.canopen}
         self.controls: dict[str, ValveControl] = {}
         self.bound: list[tuple[BoundInput, MessageInput]] = []
-        for name, runner in axes.items():
-            self._interlock(deployment, name, runner)
+        for name, driven in axes.items():
+            self._interlock(deployment, name, driven)
         self.inputs: dict[MessageKey, MessageInput] = {
             key: control
             for bound, control in self.bound
@@ -161,24 +161,24 @@ class CanopenNetwork(BusProtocol):
             for can_id, one in nodes.inputs.items()
         }
 
-    def _interlock(self, deployment: Deployment, name: str, runner: DrivenAxis) -> None:
-        config, bound = runner.bound.config, runner.bound.status_word
+    def _interlock(self, deployment: Deployment, name: str, driven: DrivenAxis) -> None:
+        config, bound = driven.bound.config, driven.bound.status_word
         joystick, valve = deployment.config.joysticks[config.command.joystick], config.valve
         control = None
         if bound and valve.cia408:
-            control = ValveControl(bound, valve.cia408.control, runner.valve)
+            control = ValveControl(bound, valve.cia408.control, driven.valve)
             self.controls[name] = control
             self.bound.append((bound, control))
         if own := valve.cia408.node if valve.cia408 else valve.node:
             node = self.nodes[valve.bus].nodes[own]
-            runner.stops.interlocks.append(NodeGate(node, Reason.VALVE_FAULT, control))
+            driven.stops.interlocks.append(NodeGate(node, Reason.VALVE_FAULT, control))
         if joystick.node:
             node = self.nodes[joystick.bus].nodes[joystick.node]
-            runner.stops.interlocks.append(NodeGate(node, Reason.NODE_FAULT))
+            driven.stops.interlocks.append(NodeGate(node, Reason.NODE_FAULT))
         if control is not None:
-            runner.stops.interlocks.append(control.gate)
-        if (sensor := runner.bound.sway_sensor) and sensor.config.node:
-            runner.measured_by(self.nodes[sensor.config.bus].nodes[sensor.config.node])
+            driven.stops.interlocks.append(control.gate)
+        if (sensor := driven.bound.sway_sensor) and sensor.config.node:
+            driven.measured_by(self.nodes[sensor.config.bus].nodes[sensor.config.node])
 
     def usual(self, frame: Frame) -> bool:
         """Return whether the frame is of a CANopen service, which DBC files do not list."""

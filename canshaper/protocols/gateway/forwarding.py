@@ -25,7 +25,7 @@ class ForwardedJoystick:
         message: sender of the rewritten frames.
         cycle_ms: time between two frames of the joystick.
         joystick: the joystick.
-        runners: axes whose velocities are in the message.
+        controls: axes whose velocities are in the message.
 
     Attributes:
         moves: whether the last frame may move a valve.
@@ -36,11 +36,11 @@ class ForwardedJoystick:
         message: RewritingSender,
         cycle_ms: int,
         joystick: JoystickInput,
-        runners: Sequence[DrivenAxis],
+        controls: Sequence[DrivenAxis],
     ) -> None:
         self._message = message
         self._joystick = joystick
-        self._runners = runners
+        self._controls = controls
         self._seen = joystick.raw
         self._releases = 0  # releases of the joystick that the axes have seen
         self.moves = False
@@ -62,17 +62,17 @@ class ForwardedJoystick:
         """
         self._passed_ns = arrived_ns
         stopped = stopped or self._joystick.releases != self._releases  # they trip with the tick
-        for runner in self._runners:
-            if stopped or runner.stops.trip:  # the loop stood still, or the like: this is old
-                runner.put(0)
+        for control in self._controls:
+            if stopped or control.stops.trip:  # the loop stood still, or the like: this is old
+                control.put(0)
         self.moves = self._any_moves() and not stopped
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:
         """Return a frame of our own where joystick frames are missing and a motion has to end."""
         self._releases = self._joystick.releases
-        stopping = any(runner.axis.state in MOVING for runner in self._runners)
-        tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
+        stopping = any(control.axis.state in MOVING for control in self._controls)
+        tripped = any(control.axis.state is State.TRIPPED for control in self._controls)
         lost = self._joystick.lost(now_ns) is not None
         late = tripped and now_ns - self._passed_ns > self._late_ns
         if not (lost or late) or not (stopping or self.moves):
@@ -85,7 +85,9 @@ class ForwardedJoystick:
         return [self._message.own(enabled=False)] if self.moves else []
 
     def _any_moves(self) -> bool:
-        return any(runner.axis.raw and not runner.stops.trip for runner in self._runners)
+        return any(
+            control.axis.output.steps and not control.stops.trip for control in self._controls
+        )
 
 
 class Gateway(BusProtocol):
@@ -107,15 +109,15 @@ class Gateway(BusProtocol):
         assert gateway is not None  # only such deployments have one
         self._buses = gateway.between
         by_message: dict[MessageKey, list[DrivenAxis]] = {}
-        for runner in (runner for runner in axes.values() if runner.bound.rewrites):
-            by_message.setdefault(runner.valve.key, []).append(runner)
+        for control in (control for control in axes.values() if control.bound.rewrites):
+            by_message.setdefault(control.valve.key, []).append(control)
         self.forwarding: dict[MessageKey, ForwardedJoystick] = {}
-        for key, runners in by_message.items():
-            bound, message = runners[0].bound, runners[0].valve
+        for key, controls in by_message.items():
+            bound, message = controls[0].bound, controls[0].valve
             assert isinstance(message, RewritingSender)  # of an axis that rewrites
             joystick = joysticks[bound.config.command.joystick]
             cycle_ms = bound.valve_message.cycle_time or 0
-            self.forwarding[key] = ForwardedJoystick(message, cycle_ms, joystick, runners)
+            self.forwarding[key] = ForwardedJoystick(message, cycle_ms, joystick, controls)
 
     def usual(self, frame: Frame) -> bool:
         """Return whether the frame is on a bus of the gateway, where no id is unknown."""

@@ -37,7 +37,7 @@ class AnySource:
         message: name of the message.
         received: the input.
         timeout_ns: age limit of the input, nanoseconds.
-        runners: axes that the input moves. Another address is another joystick: when it takes
+        controls: axes that the input moves. Another address is another joystick: when it takes
             over, the axes need neutral first.
 
     Attributes:
@@ -50,13 +50,13 @@ class AnySource:
         message: str,
         received: Receiver,
         timeout_ns: int,
-        runners: Sequence[DrivenAxis] = (),
+        controls: Sequence[DrivenAxis] = (),
     ) -> None:
         self.events: list[SourceEvent] = []
         self._bus, self._message = bus, message
         self._input = received
         self._timeout_ns = timeout_ns
-        self._runners = runners
+        self._controls = controls
         self._source: int | None = None
         self._ignored: set[int] = set()
         self._last_frame_ns = 0
@@ -70,8 +70,8 @@ class AnySource:
                     return self._other(source, self._source)
                 # No tick need have seen the silence in between.
                 self._input.invalidate()
-                for runner in self._runners:
-                    runner.stops.invalid = True
+                for control in self._controls:
+                    control.stops.invalid = True
             self._source = source
             self._ignored.clear()
             self.events.append(SourceEvent(self._bus, self._message, source, source))
@@ -123,17 +123,17 @@ class ReceivedGroup:
 class CommandedByOthers:
     """Receives other nodes' commands to our valves, from any address and at any priority."""
 
-    def __init__(self, runners: Sequence[DrivenAxis]) -> None:
-        self._runners = [
-            (runner, _destination(runner.bound.valve.message.key[1])) for runner in runners
+    def __init__(self, controls: Sequence[DrivenAxis]) -> None:
+        self._controls = [
+            (control, _destination(control.bound.valve.message.key[1])) for control in controls
         ]
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
         """Trip the axes whose valves are addressed: two controllers must not drive one crane."""
         to, fault = _destination(frame.can_id), FrameFault.NONE
-        for runner, destination in self._runners:
+        for control, destination in self._controls:
             if to in (destination, GLOBAL):
-                runner.stops.foreign_sender(arrived_ns)
+                control.stops.foreign_sender(arrived_ns)
                 fault = FrameFault.SECOND_SENDER
         return fault
 

@@ -68,9 +68,9 @@ class J1939Network(BusProtocol):
         self._groups: dict[tuple[str, int], FrameHandler] = {}
         self._any: dict[tuple[str, int], tuple[AnySource, Part]] = {}
         for bus, node in self.nodes.items():
-            for runner in () if deployment.listen_only else axes.values():
-                if runner.bound.config.valve.bus == bus and not runner.bound.rewrites:
-                    runner.stops.interlocks.append(node.gate)
+            for control in () if deployment.listen_only else axes.values():
+                if control.bound.config.valve.bus == bus and not control.bound.rewrites:
+                    control.stops.interlocks.append(node.gate)
         for (bus, group), route in routing.groups.items():
             if route.axes:
                 commanded = [axes[name] for name in route.axes]
@@ -165,12 +165,12 @@ class J1939Network(BusProtocol):
     def _active_faults(self, bus: str) -> list[tuple[int, int]]:
         """Return (SPN, FMI) of axes that cannot move as demanded and valves that do not follow."""
         first, active = self._configs[bus].first_spn, []
-        for i, runner in enumerate(self._axes.values()):
-            if runner.bound.config.valve.bus != bus:
+        for i, control in enumerate(self._axes.values()):
+            if control.bound.config.valve.bus != bus:
                 continue
-            if (fmi := FMI_OF.get(runner.axis.reason)) is not None:
+            if (fmi := FMI_OF.get(control.axis.reason)) is not None:
                 active.append((first + 2 * i, fmi))
-            following = runner.feedback.following if runner.feedback else Following.UNKNOWN
+            following = control.feedback.following if control.feedback else Following.UNKNOWN
             if (fmi := FMI_OF_FOLLOWING.get(following)) is not None:
                 active.append((first + 2 * i + 1, fmi))
         return active

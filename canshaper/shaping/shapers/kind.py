@@ -16,7 +16,7 @@ Parameters = dict[str, Any]
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 # Reserved names: the section of the file, ``build_shaper`` or a constructor uses them already.
-_RESERVED = {"kind", "parameters", "sway", "tick_s", "valve_rate_per_s"}
+_RESERVED = {"kind", "parameters", "runs_ahead", "sway", "tick_s", "valve_rate_per_s"}
 
 
 class Shaper(Protocol):
@@ -106,6 +106,9 @@ class ShaperKind:
         follows: returns the parameters that the filter has while it follows a rope to ``factor``
             times the period, by ``follow(factor)``; None where it cannot follow.
         designed_by: verb of ``canshaper`` that finds the parameters, "" without one.
+        runs_ahead: whether the output may travel farther than the demand by more than 0.4 s of full
+            speed, as one that damps swing may; the gate allows it 1.5 s or more. A kind of another
+            package must say so; of those of this package the gate has its own table.
 
     Raises:
         ValueError: a name is no word, is reserved, or stands twice.
@@ -120,6 +123,7 @@ class ShaperKind:
         ...     lambda tick_s, *, first: Fir([first, 1.0 - first]),
         ...     lambda mode, tick_s: {"halved": {"first": 0.5}},
         ...     (Parameter("first", 0.0, 1.0, "", "part that comes at once"),),
+        ...     runs_ahead=False,
         ... )
         >>> shaper = kind.build(0.02, first=0.5)
         >>> [shaper.step(command) for command in (1.0, 1.0, 0.0)]
@@ -139,6 +143,7 @@ class ShaperKind:
     stretched: Callable[[Parameters, float], Parameters] | None = None
     follows: Callable[[Parameters, float], Parameters] | None = None
     designed_by: str = ""
+    runs_ahead: bool | None = None
 
     def __post_init__(self) -> None:
         names = [parameter.name for parameter in self.parameters]

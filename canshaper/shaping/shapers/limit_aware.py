@@ -123,7 +123,7 @@ class LimitAware:
         self._unlimited = old._unlimited
         self._shaper.copy_state(old._shaper)
 
-    def swing_anew(self) -> None:
+    def swing_again(self) -> None:
         """Give the twin the swing that it would have had with these taps from the start."""
         shaper, twin = self._shaper, SwayModel(self._sway.mode, self._sway.tick_s)
         angles, rates = [], []

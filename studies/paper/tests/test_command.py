@@ -7,7 +7,7 @@ from typing import NoReturn
 import pytest
 from typer.testing import CliRunner, Result
 
-from studies.paper.__main__ import app
+from studies.paper.__main__ import PAGE, app
 from studies.paper.study import Study
 
 
@@ -18,7 +18,11 @@ def run(*options: str, columns: int = 80) -> Result:
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     out = tmp_path_factory.mktemp("reproduce") / "new" / "paper"
-    return out, run("--out", str(out))
+    page = out.parents[1] / "README.md"
+    page.write_text(PAGE.read_text("utf-8").replace("**95**", "95"), encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("studies.paper.__main__.PAGE", page)
+        return out, run("--out", str(out), "--write")
 
 
 @pytest.mark.slow
@@ -27,6 +31,7 @@ def test_everything_is_written(done: tuple[Path, Result]) -> None:
     assert result.exit_code == 0, result.output
     expected = {f"figure-{n}.{kind}" for n in (3, 4, 6, 7, 8) for kind in ("png", "json")}
     assert {path.name for path in out.iterdir()} == expected | {"paper.json"}
+    assert (out.parents[1] / "README.md").read_text("utf-8") == PAGE.read_text("utf-8")
     for path in out.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
 

@@ -15,6 +15,8 @@ from studies.paper.printed import optimal_poles
 from studies.paper.reductions import CLAIMS
 from studies.paper.runs import METRICS, Metric, Plane
 from studies.paper.study import Study
+from studies.paper.table import page_sections
+from tools.marks import with_sections
 
 pytestmark = pytest.mark.slow  # the whole study is computed
 
@@ -54,17 +56,9 @@ def test_slew_poles_agree_with_an_independent_program() -> None:
             assert run.swing(plane, metric).shaped_deg == pytest.approx(shaped, abs=0.02)
 
 
-def test_the_document_has_these_numbers(table: dict[str, Any]) -> None:
+def test_the_page_has_these_tables(table: dict[str, Any]) -> None:
     text = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
-    for claim in table["reductions"]:
-        cells = [
-            f"**{value:.0f}**" if metric in claim["holds_for"][plant] else f"{value:.0f}"
-            for plant, values in claim["ours_pct"].items()
-            for metric, value in values.items()
-        ]
-        assert f"| > {claim['more_than_pct']:g} | {' | '.join(cells)} |" in text
-    for fact in table["others"]:
-        assert f"| {fact['paper']} | {fact['ours']} |" in text
+    assert with_sections(text, page_sections(table), "measured") == text, "studies.paper --write"
 
 
 def row(table: dict[str, Any], index: int, plant: str) -> dict[str, float]:

@@ -11,9 +11,8 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.velocity import ValveCodec
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration, Direction, Sample, fit
-from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.ramp import Ramp, speed_signal
 from canshaper.commissioning.calibration.run import run_simulated
-from canshaper.commissioning.calibration.write import speed_signal
 from canshaper.config.section import Origin
 from canshaper.edit.edit import written_by
 from canshaper.errors import CalibrationError, ConfigError

@@ -9,9 +9,14 @@ from typer.testing import CliRunner
 from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, EndStopDetector, Ramp
+from canshaper.commissioning.calibration.ramp import (
+    RATE_PER_S,
+    TOP,
+    EndStopDetector,
+    Ramp,
+    speed_signal,
+)
 from canshaper.commissioning.calibration.run import run_simulated
-from canshaper.commissioning.calibration.write import speed_signal
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

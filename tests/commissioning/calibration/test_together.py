@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
+from canshaper.commissioning.calibration.pump import Direction, Moment, measured, pump_lines
 from canshaper.commissioning.calibration.ramp import TOGETHER_PER_S, Ramp
-from canshaper.commissioning.calibration.together import Direction, Moment, measured
-from canshaper.commissioning.calibration.write import pump_lines
 from canshaper.config.section import Origin
 from canshaper.edit.edit import written_by
 from canshaper.errors import CalibrationError
@@ -213,7 +212,7 @@ def test_the_flow_goes_into_the_file_rounded_down(file: Path, before: str) -> No
     said = lines(drive(ramped(), 1.2), file, **origin)
     assert said[-2:] == [
         "hydraulics: { flow: 1.17 } # lower end; shares: slew 1, near_far 1",
-        f"written: {file}",
+        f"Written to {file}; a running daemon takes it with SIGHUP.",
     ]
     config = load_deployment(file).config
     assert config.hydraulics

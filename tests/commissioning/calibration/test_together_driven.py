@@ -9,8 +9,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.pump import Moment
 from canshaper.commissioning.calibration.ramp import Ramp
-from canshaper.commissioning.calibration.together import Moment
 from canshaper.commissioning.procedure.bench import log_simulated
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment

@@ -14,8 +14,8 @@ import pytest
 from canshaper.bus.packet import CAN_FRAME, SO_TIMESTAMPNS
 from canshaper.cli.verbs.doctor import _listened
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.doctor import listen as listening
-from canshaper.commissioning.doctor.listen import arrival_findings
+from canshaper.commissioning.doctor import joysticks as listening
+from canshaper.commissioning.doctor.joysticks import arrival_findings
 from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.binding import load_deployment

@@ -102,9 +102,9 @@ def test_the_hand_moves_every_axis(name: str, request: pytest.FixtureRequest) ->
             controller.receive(frame, time_ms * MS)
         if time_ms % tick_ms == 0:
             list(controller.tick(time_ms * MS))
-        for axis, runner in controller.axes.items():
-            if runner.axis.raw:
-                moved[axis].add(runner.axis.raw > 0)
+        for axis, control in controller.axes.items():
+            if control.axis.output.steps:
+                moved[axis].add(control.axis.output.steps > 0)
     assert all(ways == {False, True} for ways in moved.values()), moved
     assert not any(controller.counters.values.values())
 
@@ -117,7 +117,7 @@ def children() -> list[int]:
 def test_no_process_outlives_its_block() -> None:
     before = children()
     with pytest.raises(ZeroDivisionError), Children() as processes:
-        busy = processes.start("load", kind="busy")
+        busy = processes.start("processes", kind="busy")
         ready(busy)
         assert children() == [*before, busy.pid]
         raise ZeroDivisionError

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from canshaper.commissioning.identification.canlog import read_can
-from canshaper.commissioning.identification.verdict import Finding, identify
+from canshaper.commissioning.identification.verdict import SwingFinding, identify
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.grapple import Grapple, SwayMode
 from tests.commissioning.identification.machine import FILE, Push, candump, driven, period_of
@@ -31,7 +31,7 @@ class Case(NamedTuple):
 
     driving: str
     mode: SwayMode
-    finding: Finding
+    finding: SwingFinding
 
 
 def drawn(seed: int) -> list[Case]:

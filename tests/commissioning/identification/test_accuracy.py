@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from canshaper.commissioning.identification.series import Array, Kind, Series, Unit
-from canshaper.commissioning.identification.verdict import Finding, identify
+from canshaper.commissioning.identification.verdict import SwingFinding, identify
 from canshaper_sim.grapple import Grapple, Sway
 from studies.crane.config import load_crane
 from studies.crane.tests.mujoco_crane import model_of, simulate
@@ -49,7 +49,7 @@ def truth(grapple: Grapple, direction: int) -> tuple[float, float]:
 
 
 def check(
-    finding: Finding, expected: tuple[float, float], *, period: float, ratio: float = math.inf
+    finding: SwingFinding, expected: tuple[float, float], *, period: float, ratio: float = math.inf
 ) -> None:
     """Good enough to use, and the period and the damping ratio within such parts of the truth."""
     assert finding.usable, finding.problems
@@ -150,7 +150,7 @@ def test_never_free_but_driven(kind: Kind) -> None:
     assert any("from driven motion" in note for note in finding.notes)
 
 
-def check_driven(finding: Finding) -> None:
+def check_driven(finding: SwingFinding) -> None:
     check(finding, truth(EMPTY, NEAR_FAR), period=0.01, ratio=0.2)
     assert finding.full_speed_m_s
     assert finding.full_speed_m_s.value == pytest.approx(1.0, rel=0.12)

@@ -189,7 +189,7 @@ def test_an_axis_that_follows_its_rope_keeps_the_rope(tmp_path: Path) -> None:
     assert file.read_bytes() == before
 
 
-def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: Path) -> None:
+def test_without_enough_data_nothing_is_written(tmp_path: Path, file: Path, logs: Path) -> None:
     before = file.read_bytes()
     result = run(tmp_path, logs / "still.log", "--file", file, "--write")
     assert result.exit_code == 1
@@ -200,7 +200,7 @@ def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: 
 
 
 @pytest.mark.slow
-def test_one_state_that_is_too_poor_keeps_the_axis_from_being_written(
+def test_a_state_without_enough_data_keeps_the_axis_from_being_written(
     tmp_path: Path, file: Path, logs: Path
 ) -> None:
     before = file.read_bytes()

@@ -9,10 +9,10 @@ from canshaper.commissioning.identification.data import timed_by_hand
 from canshaper.commissioning.identification.plot import figure
 from canshaper.commissioning.identification.report import advice_on, headlines
 from canshaper.commissioning.identification.series import Kind, Series, Unit
-from canshaper.commissioning.identification.verdict import Finding, identify
+from canshaper.commissioning.identification.verdict import SwingFinding, identify
 
 
-def by_hand(axis: str) -> Finding:
+def by_hand(axis: str) -> SwingFinding:
     timed = {"swings": 10.0, "seconds": 23.6, "first": 20.0, "last": 6.0}
     return timed_by_hand(dict(timed), [], axis)
 

@@ -9,9 +9,10 @@ import pytest
 
 from canshaper.commissioning.identification.data import series_of
 from canshaper.commissioning.identification.series import Kind
-from canshaper.commissioning.identification.table import is_table, read_table
+from canshaper.commissioning.identification.table import read_table
 from canshaper.commissioning.identification.verdict import identify
 from canshaper.errors import IdentificationError
+from canshaper.recording.tables import is_table
 from canshaper_sim.grapple import Grapple, Sway
 from tests.commissioning.identification.machine import driven, period_of, phone
 

@@ -110,7 +110,7 @@ def test_a_measured_swing_is_judged_as_that_of_the_simulated_crane(machine: Path
 
 
 @pytest.mark.slow
-def test_a_filter_that_takes_no_swing_away_is_too_poor(machine: Path) -> None:
+def test_a_filter_that_takes_no_swing_away_is_a_problem(machine: Path) -> None:
     text = machine.read_text()
     lines = [
         "    filter: { kind: off }" if "kind: robust" in one else one for one in text.split("\n")

@@ -15,8 +15,7 @@ import pytest
 from canshaper.cli.verbs.commission import Prompts
 from canshaper.commissioning.calibration import run
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.ramp import Ramp
-from canshaper.commissioning.calibration.write import speed_signal
+from canshaper.commissioning.calibration.ramp import Ramp, speed_signal
 from canshaper.commissioning.procedure.bench import Mode, Task
 from canshaper.commissioning.procedure.machine import Machine
 from canshaper.commissioning.procedure.traffic import read_traffic

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from canshaper.commissioning.identification.series import Series
 from canshaper.commissioning.procedure.bench import log_simulated
-from canshaper.commissioning.sensor.finding import Finding, examine
 from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
+from canshaper.commissioning.sensor.verdict import SensorFinding, examine
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
@@ -67,6 +67,6 @@ class Drive:
         log_simulated(path, self.deployment, crane, script)
         return read_sensors(path, self.deployment, [self.axis])[self.axis]
 
-    def finding(self, **sensor: float) -> Finding:
+    def finding(self, **sensor: float) -> SensorFinding:
         """The finding about its sensor."""
         return examine(self.deployment.axes[self.axis], self.series(**sensor))

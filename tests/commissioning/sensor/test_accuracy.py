@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from canshaper.commissioning.sensor.finding import WIDEST_DELAY_S, Finding, changes
+from canshaper.commissioning.sensor.verdict import WIDEST_DELAY_S, SensorFinding, changes
 from tests.commissioning.sensor.drives import AXES, FILE, GYRO, Drive, machine
 
 ROBUST = FILE.parent / "j1939-sensor.yaml"
@@ -16,7 +16,7 @@ EVERY = list(itertools.product(SIGNS, DELAYS_S, OFFSETS_DEG, NOISES_DEG, LENGTHS
 SOME = [(case, AXES[i % 2]) for i, case in enumerate(EVERY[::11])]
 
 
-def judge(drive: Drive, case: Sequence[float], part: float = 1.0) -> Finding:
+def judge(drive: Drive, case: Sequence[float], part: float = 1.0) -> SensorFinding:
     """Hold what is found against the truth; ``part`` of the noise of an angle is that of a rate."""
     sign, delay_s, offset, noise, _ = case
     noise *= part

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from canshaper.commissioning.identification.series import Array, Series
-from canshaper.commissioning.sensor.finding import DRIVE_IT, examine
 from canshaper.commissioning.sensor.fit import FIRST_S, hand_driven
+from canshaper.commissioning.sensor.verdict import DRIVE_IT, examine
 from canshaper_sim.operator import random_script
 from canshaper_sim.strokes import Script, Stroke
 from tests.commissioning.sensor.drives import Drive, machine

@@ -85,7 +85,7 @@ def test_what_a_log_shows_is_written_and_then_trusted(tmp_path: Path, file: Path
 
 
 @pytest.mark.slow
-def test_what_is_too_poor_is_not_written(tmp_path: Path, file: Path) -> None:
+def test_without_enough_data_nothing_is_written(tmp_path: Path, file: Path) -> None:
     log, before = tmp_path / "drive.log", file.read_bytes()
     log_simulated(log, load_deployment(file), REAL, Script("rest", (), 20.0))
     text = sensor(file, log, "--write", "--out", tmp_path, code=1)

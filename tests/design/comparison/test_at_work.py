@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from canshaper.campaign import work_results
-from canshaper.cli.app import app
 from canshaper.cli.verbs import compare
 from canshaper.config.filters import filter_of
 from canshaper.design.comparison.manoeuvres import AXES, Candidate
 from canshaper.machine.deployment import Deployment
+from tests.cli.invocation import invoke
 from tests.design.comparison.candidates import FILE, ROBUST
 from tests.design.comparison.test_tables import made
 
@@ -29,14 +29,14 @@ def run(monkeypatch: pytest.MonkeyPatch, deployment: Deployment, tmp_path: Path)
     comparison = "canshaper.design.comparison"
     monkeypatch.setattr(f"{comparison}.manoeuvres.candidates", lambda _: filters)
     monkeypatch.setattr(f"{comparison}.measure.measure_all", lambda *_, **_options: outcomes)
-    monkeypatch.setattr(f"{comparison}.limits.least", lambda _: [])
+    monkeypatch.setattr(f"{comparison}.summary.least", lambda _: [])
     monkeypatch.setattr("canshaper.cli.results.Results.picture", lambda *_: None)
     monkeypatch.setattr(work_results, "_SPEEDS", (1.0,))
     monkeypatch.setattr(work_results, "_CATCHES", (0.0,))
 
     def run(*options: str) -> tuple[Result, dict[str, Any]]:
         words = ["compare", str(FILE), "--out", str(tmp_path), "--work", *options]
-        done = CliRunner().invoke(app, words, env={"COLUMNS": "120"})
+        done = invoke(*words, columns=120)
         return done, json.loads((tmp_path / "compare.json").read_text(encoding="utf-8"))["work"]
 
     return run

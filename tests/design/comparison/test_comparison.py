@@ -9,9 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.design.comparison.manoeuvres import (
     RANDOM_SEEDS,
     Candidate,
@@ -23,6 +21,7 @@ from canshaper.design.comparison.measure import measure, measure_all
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
 from canshaper_sim.operator import SCRIPTS
+from tests.cli.invocation import invoke
 from tests.design.comparison.candidates import FILE, ROBUST, task
 from tests.rigs.files import CONFIG
 
@@ -169,13 +168,13 @@ def test_an_out_that_is_a_file_is_reported_before_anything_is_driven(
 
     monkeypatch.setattr("canshaper.design.comparison.measure.measure_all", drives)
     (tmp_path / "out").touch()
-    done = CliRunner().invoke(app, ["compare", "--out", str(tmp_path / "out")])
+    done = invoke("compare", "--out", tmp_path / "out")
     assert (done.exit_code, done.output) == (2, f"{tmp_path / 'out'}: File exists\n")
 
 
 def test_a_machine_without_slew_and_near_far_is_not_compared(tmp_path: Path) -> None:
     file = str(CONFIG / "forwarder-joints.yaml")
-    done = CliRunner().invoke(app, ["compare", file, "--out", str(tmp_path)])
+    done = invoke("compare", file, "--out", tmp_path)
     assert done.exit_code == 2
     says = "expected axes slew and near_far, or a crane with a rope, got slew, lift_cylinder"
     assert says in done.output

@@ -5,9 +5,9 @@ import re
 import pytest
 
 from canshaper.cli.verbs.compare import _WORKS
-from canshaper.design.comparison.limits import least
 from canshaper.design.comparison.manoeuvres import candidates, manoeuvres
 from canshaper.design.comparison.measure import Outcome, measure
+from canshaper.design.comparison.summary import least
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.rigs.files import ROOT

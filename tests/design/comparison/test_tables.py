@@ -8,10 +8,17 @@ import pytest
 from matplotlib.text import Annotation, Text
 
 from canshaper.cli.verbs.compare import _felt, _limits, _residuals, _worst
-from canshaper.design.comparison.limits import Least, least, limits_for
 from canshaper.design.comparison.manoeuvres import Candidate, candidates
 from canshaper.design.comparison.measure import Outcome, measure
-from canshaper.design.comparison.summary import Row, beaten_by, recommendations, rows
+from canshaper.design.comparison.summary import (
+    Least,
+    Row,
+    beaten_by,
+    least,
+    limits_for,
+    recommendations,
+    rows,
+)
 from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import SafeConsole

@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.config.adjust import Key, adjusted
 from canshaper.config.filters import SecondMode
 from canshaper.design.tuning.evaluate import Machine
@@ -26,6 +24,7 @@ from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.cli.invocation import invoke
 from tests.rigs.files import machine_file
 
 TICK_S, G, LAG_S = 0.02, 9.81, 0.1
@@ -119,7 +118,7 @@ def option(range_pct: float = 20.0) -> str:
 
 
 def robust(file: Path, *words: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, ["robust", str(file), "--axis", "near_far", *words])
+    done = invoke("robust", file, "--axis", "near_far", *words)
     return done.exit_code, " ".join(done.output.split())
 
 
@@ -143,7 +142,7 @@ def pulse(bound: BoundAxis, hold_s: float) -> list[float]:
     sent = []
     for tick in range(round((hold_s + 2.0) / TICK_S)):
         axis.tick(CommandInput(1.0 if tick * TICK_S < hold_s else 0.0))
-        sent.append(axis.sent)
+        sent.append(axis.output.setpoint)
     return sent
 
 
@@ -239,11 +238,11 @@ def test_the_file_records_it(file: Path) -> None:
         damping_ratio=round(second.damping_ratio, 4),
         length_range_pct=25.0,
     )
-    checked = CliRunner().invoke(app, ["check", str(file)]).output
+    checked = invoke("check", file).output
     assert checked.count("hydraulics: missing") == checked.count("reversal_s: 2") == 1
     assert checked.count("WARNING") == 2
     file.write_text(file.read_text().replace("length_range_pct: 25.0", "length_range_pct: 61.0"))
-    checked = CliRunner().invoke(app, ["check", str(file)])
+    checked = invoke("check", file)
     assert checked.exit_code == 2
     where = "axes.near_far.filter.designed_for.second.length_range_pct"
     assert f"{where}: expected 0 to 60 %, got 61.0" in " ".join(checked.output.split())

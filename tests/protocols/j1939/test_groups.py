@@ -52,8 +52,8 @@ def test_an_address_that_takes_over_invalidates_the_input_and_its_axes_once(
     joystick: Counted,
 ) -> None:
     stops = [StopCauses(), StopCauses()]
-    runners: Any = [SimpleNamespace(stops=one) for one in stops]
-    source = AnySource("crane", "BJM1", joystick, TIMEOUT_NS, runners)
+    controls: Any = [SimpleNamespace(stops=one) for one in stops]
+    source = AnySource("crane", "BJM1", joystick, TIMEOUT_NS, controls)
     source.receive(frame(FIRST), 0)
     assert source.receive(frame(SECOND), TIMEOUT_NS) is FrameFault.SECOND_SENDER
     assert [joystick.invalidated, *(one.invalid for one in stops)] == [0, False, False]

@@ -9,8 +9,8 @@ from canshaper.commissioning.identification.canlog import bind
 from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
-from canshaper.commissioning.procedure.steps.dry import figure as joysticks_figure
 from canshaper.commissioning.procedure.steps.motion import LEAST_MOVED
+from canshaper.commissioning.procedure.steps.motion import figure as joysticks_figure
 from canshaper.commissioning.procedure.steps.swing import swinging
 from canshaper.commissioning.procedure.traffic import (
     AxisTraffic,
@@ -26,7 +26,7 @@ from canshaper.report.strokes import RESIDUAL_DWELL_S, RESIDUAL_WINDOW_MIN_S
 from canshaper_sim.operator import script_for
 from canshaper_sim.recording import Recording
 
-# A tenth of the swing: with more, the filter is for another swing than this one.
+# Where more than a tenth of the swing is left, the filter is for another swing than this one.
 LEAST_REDUCTION_PCT = 90.0
 LEAST_SWING_DEG = 1.0  # of which a tenth is still above the noise of a sensor
 LEAST_DRIVEN_S = 0.5  # of full deflection, all strokes together
@@ -37,7 +37,7 @@ LESS, SAME, UNSEEN = "less", "same", "-"
 
 
 def run(context: Context) -> Outcome:
-    """Let the same be driven twice, and compare what was measured, or what the person has seen."""
+    """Let the same work be driven twice; compare what was measured, or what the person saw."""
     deployment = context.deployment
     axes = swinging(deployment) or [*deployment.axes]
     outcome = Outcome(files=_driven(context, axes))
@@ -67,7 +67,7 @@ def run(context: Context) -> Outcome:
 
 
 def _driven(context: Context, axes: list[str]) -> list[Path]:
-    """Logs of both drives."""
+    """Let both drives be driven; return their logs."""
     demo = script_for(context.deployment, "demo")
     # As the words say it: without the corrections, which pull against the run-on.
     script = replace(demo, strokes=tuple(s for s in demo.strokes if s.duration_s >= 1.0))
@@ -84,7 +84,7 @@ def _driven(context: Context, axes: list[str]) -> list[Path]:
 
 
 def _signals(context: Context) -> dict[str, str]:
-    """MESSAGE.SIGNAL of the angle or rate of each swing: of the step swing, else of its sensor.
+    """Return MESSAGE.SIGNAL of the swing of each axis: that of the step swing, else of its sensor.
 
     Raises:
         IdentificationError: it is not in the DBC files.
@@ -100,7 +100,7 @@ def _signals(context: Context) -> dict[str, str]:
 
 
 def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Traffic) -> None:
-    """Check that the axes were driven, and in both drives about as much."""
+    """Check that the axes were driven, and about as much in both drives."""
     table = new_table("axis", "driven before, s of full deflection", "after")
     for name in axes:
         both = [_driven_s(one.axes[name]) for one in (before, after)]
@@ -122,7 +122,7 @@ def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Tra
 
 
 def _driven_s(axis: AxisTraffic) -> float:
-    """Area under the deflection of its joystick."""
+    """Return the area under the deflection of the joystick, s of full deflection."""
     times, values = axis.joystick.arrays()
     return float((abs(values[:-1]) * (times[1:] - times[:-1])).sum())
 
@@ -142,7 +142,7 @@ def _measured(context: Context, outcome: Outcome, raw: Recording, shaped: Record
 
 
 def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
-    """Keep the residual, and say where too much of it is left, or what is missing."""
+    """Note the swing that is left; a problem where it is too much, or data is missing."""
     before, after = (measures[one]["residual_deg"] for one in ("raw", "shaped"))
     if before is None or after is None:
         rest_s = RESIDUAL_DWELL_S + RESIDUAL_WINDOW_MIN_S
@@ -170,7 +170,7 @@ def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
 
 
 def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
-    """Ask for what the person has seen of axes whose swing nothing measures."""
+    """Ask what the person has seen of axes whose swing no signal measures."""
     names = ", ".join(axes)
     outcome.sheet.print(f"NOTHING MEASURED the swing of {names}: judge it by eye")
     question = (

@@ -29,7 +29,7 @@ Design = RobustDesign | TunedDesign
 
 @dataclass(frozen=True)
 class Offer:
-    """A design with its figures on this machine: behind its limits, with the tail that is written.
+    """A design with its figures behind the limits of the machine, with the tail that is written.
 
     Attributes:
         design: it.
@@ -46,7 +46,7 @@ class Offer:
 
 
 def run(context: Context) -> Outcome:
-    """Design both filters for each axis, and ask which one."""
+    """Design both filters for each axis, and ask which one to write."""
     deployment, outcome = context.deployment, Outcome()
     offers = {name: _offers(deployment, name, outcome) for name in swinging(deployment)}
     kinds = [kind for kind in _NAMES if all(kind in one for one in offers.values())]
@@ -81,7 +81,7 @@ def run(context: Context) -> Outcome:
 
 
 def _offers(deployment: Deployment, axis: str, outcome: Outcome) -> dict[str, Offer]:
-    """Designs of an axis by kind; one that cannot be made is said to be none."""
+    """Return the designs of an axis by kind; show why a kind has none."""
     result = {}
     for kind in _NAMES:
         try:
@@ -130,7 +130,7 @@ def _cells(offer: Offer) -> tuple[str, ...]:
 
 
 def _line(axis: str, offer: Offer) -> str:
-    """Figures within a question."""
+    """Return the figures of a design as a line of the question."""
     left, around, peak, run_on, dip, word = _cells(offer)
     return (
         f"  {axis}, {offer.chosen.kind}: leaves {left} %, {around} % within ±10 %; peak {peak}"
@@ -139,7 +139,7 @@ def _line(axis: str, offer: Offer) -> str:
 
 
 def _table(axis: str, by_kind: dict[str, Offer]) -> Table:
-    """Both side by side."""
+    """Return a table of the designs side by side."""
     heads = ("left, %", "±10 %", "peak, deg", "run-on, m", "dip, %", "verdict")
     table = new_table("filter", *heads, title=axis_title(axis))
     for kind, offer in by_kind.items():

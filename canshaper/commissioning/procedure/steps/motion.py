@@ -1,27 +1,149 @@
-"""The first motion, at reduced speed: right axis, right direction, and neutral at once."""
+"""Steps: the dry drive, without a valve frame; the first motion, at reduced speed."""
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from canshaper.commissioning.identification.series import Command
-from canshaper.commissioning.procedure.bench import Mode, Task
-from canshaper.commissioning.procedure.state import Context, Outcome, Step
-from canshaper.commissioning.procedure.steps.check import MOTION
-from canshaper.commissioning.procedure.steps.dry import PAUSE_S, ends, figure, show_states
-from canshaper.commissioning.procedure.traffic import AxisTraffic, read_traffic
+from canshaper.commissioning.procedure.bench import STILL_MOVES, Mode, Task
+from canshaper.commissioning.procedure.state import FILE, Context, Outcome, Step
+from canshaper.commissioning.procedure.steps.joysticks import LEAST
+from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
 from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.source import Source
 from canshaper.edit.edit import change
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
+from canshaper.report import style
+from canshaper.report.console import axis_title, new_table
+from canshaper.shaping.states import Reason, State
 from canshaper_sim.strokes import Script, Stroke
 
+FIRST_S, HOLD_S, PAUSE_S = 1.0, 1.5, 3.5
+# States in which an axis is driven by its joystick.
+DRIVEN = {State.ACTIVE.name, State.BYPASS_ON.name}
+
+
+def ends(axes: Sequence[str], level: float) -> tuple[Stroke, ...]:
+    """Return strokes of every joystick forth and back, one after the other."""
+    strokes, begin_s = [], FIRST_S
+    for name in axes:
+        for sign in (1.0, -1.0):
+            strokes.append(Stroke(name, begin_s, HOLD_S, sign * level))
+            begin_s += HOLD_S + PAUSE_S
+    return tuple(strokes)
+
+
+def drive_dry(context: Context) -> Outcome:
+    """Let every joystick be moved while the daemon listens."""
+    deployment = context.deployment
+    log = context.folder / "dry.log"
+    strokes = ends([*deployment.axes], 1.0)
+    script = Script("dry", strokes, strokes[-1].end_s + PAUSE_S)
+    words = (
+        "Enable held, move each joystick to both ends, one after the other:"
+        f" {', '.join(deployment.axes)}. {script.duration_s:.0f} s. {STILL_MOVES}"
+    )
+    context.bench.drive(deployment, log, Task(words, script, Mode.DRY))
+    traffic = read_traffic(log, deployment)
+    outcome = Outcome(files=[log])
+    show_states(outcome, traffic)
+    for name, axis in traffic.axes.items():
+        least, most = axis.reach
+        if min(-least, most) < LEAST:
+            text = f"its joystick went from {100 * least:.0f} to {100 * most:.0f} %"
+            outcome.problems.append(f"{name}: {text}: move it to both ends, enable held")
+        elif axis.states and not {state for _, state, _ in axis.states} & DRIVEN:
+            reasons = dict.fromkeys(f"{state} ({reason})" for _, state, reason in axis.states)
+            text = f"{name}: it was never {State.ACTIVE.name}, but {', '.join(reasons)}"
+            if context.bench.simulated and axis.states[-1][2] == Reason.NODE_FAULT.name:
+                text = f"NOTE: {text}: at the desk no other controller starts the nodes"
+                outcome.sheet.print(text)
+            else:
+                outcome.problems.append(f"{text}: see docs/states.md for that reason")
+    if context.bench.simulated:
+        sent = sum(len(axis.valve.value) for axis in traffic.axes.values())
+        outcome.numbers["valve_frames"] = sent
+        outcome.sheet.print(f"valve frames: {sent}")
+        if sent:
+            outcome.problems.append(f"expected no valve frame, got {sent}; do not go on")
+    outcome.figures[""] = lambda: figure(
+        traffic, "Dry drive: the joysticks as the daemon sees them"
+    )
+    return outcome
+
+
+def show_states(outcome: Outcome, traffic: Traffic) -> None:
+    """Show the states that each axis went through, where the log has its status message."""
+    table = new_table("axis", "least, %", "most, %", "states")
+    for name, axis in traffic.axes.items():
+        states = list(dict.fromkeys(state for _, state, _ in axis.states))
+        ends = (f"{100 * end:.0f}" for end in axis.reach)
+        table.add_row(name, *ends, ", ".join(states) or "no status message")
+        outcome.numbers[name] = {"states": states}
+    outcome.sheet.print(table)
+    if traffic.missed_deadlines is not None:
+        outcome.numbers["missed_deadlines"] = traffic.missed_deadlines
+        outcome.sheet.print(f"missed deadlines: {traffic.missed_deadlines}")
+
+
+def figure(traffic: Traffic, title: str) -> Figure:
+    """Draw joystick and valve of each axis over time, and when the enable was held."""
+    height = 190 + 300 * len(traffic.axes)
+    fig = style.print_figure(height)
+    for number, (name, axis) in enumerate(traffic.axes.items()):
+        bottom = (height - 110 - 300 * (number + 1) + 95) / height
+        panel = fig.add_axes((0.11, bottom, 0.86, 185 / height))
+        style.plain(panel, size=style.TEXT_PT)
+        style.titled(panel, axis_title(name), style.TITLE_PT)
+        style.zero_line(panel)
+        enabled = [110.0 * value for value in axis.enabled.value]
+        panel.fill_between(
+            axis.enabled.time_s, 0.0, enabled, color=style.JOYSTICK_COLOUR, alpha=0.4,
+            label="enable", linewidth=0, step="post",
+        )  # fmt: skip
+        panel.plot(
+            axis.joystick.time_s, _percent(axis.joystick.value), color=style.RAW_COLOUR,
+            linewidth=1.2, linestyle=style.DASHED, label="joystick",
+        )  # fmt: skip
+        panel.plot(
+            axis.valve.time_s, _percent(axis.valve.value), color=style.SHAPED_COLOUR, linewidth=1.6,
+            label="valve",
+        )  # fmt: skip
+        for time_s, state, _ in axis.states:
+            if state == State.TRIPPED.name:
+                panel.axvline(time_s, color=style.TEXT_COLOUR, linewidth=0.8)
+        panel.set_xlim(0.0, traffic.duration_s)
+        panel.set_ylim(-110.0, 110.0)
+        style.label(panel, y="%")
+        if not number:
+            panel.legend(loc="upper right", fontsize=style.TEXT_PT, frameon=False, ncols=3)
+    style.label(panel, "time, s")
+    style.headline(fig, title)
+    return fig
+
+
+def _percent(values: Sequence[float]) -> list[float]:
+    return [100.0 * value for value in values]
+
+
+DRY = Step(
+    "dry",
+    "Dry drive",
+    "the daemon computes and sends no valve frame: does every axis become ACTIVE?",
+    drive_dry,
+    needs=(FILE,),
+)
+
+
+MOTION = "motion"  # name of the step
 LEVEL = 0.4  # of full deflection
 LEAST_MOVED = 0.02  # of full command
-# How long after the enable was let go a valve may still be away from neutral: its joystick's and
-# its own frame, each of which may have just been missed.
+# Valves may be away from neutral for two periods of the joystick's and the valve's frame after the
+# enable was let go: each of both frames may just have been sent.
 FRAMES = 2
 GUIDE = (
     "no one near, the crane free of everything, engine at low speed, a hand on the emergency stop."
@@ -29,7 +151,7 @@ GUIDE = (
 )
 
 
-def run(context: Context) -> Outcome:
+def move_first(context: Context) -> Outcome:
     """Let every axis be moved a little, and the enable be let go in motion."""
     deployment = context.deployment
     fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > REDUCED_PCT]
@@ -87,9 +209,9 @@ def _begin(deployment: Deployment, names: list[str]) -> None:
 
 
 def _follows(axis: AxisTraffic) -> bool:
-    """Whether the valve goes to the side of the joystick while that is held, to both sides.
+    """Return whether the valve follows a held joystick to both sides.
 
-    Slew moves near-far a little too, so what it does besides says nothing.
+    Slew moves near-far a little too, so motion without the joystick says nothing.
     """
     time_s, joystick = axis.joystick.arrays()
     valve = Command(*axis.valve.arrays()).at(time_s)
@@ -99,7 +221,7 @@ def _follows(axis: AxisTraffic) -> bool:
 
 
 def _releases(axis: AxisTraffic) -> list[float]:
-    """How long the valve took to neutral each time the enable was let go while it moved."""
+    """Return how long the valve took to neutral each time the enable was let go in motion."""
     (time_s, valve), (at_s, enabled) = axis.valve.arrays(), axis.enabled.arrays()
     times_s = []
     for released_s in at_s[1:][(enabled[:-1] > 0.0) & (enabled[1:] == 0.0)]:
@@ -110,13 +232,13 @@ def _releases(axis: AxisTraffic) -> list[float]:
     return times_s
 
 
-# Not the file: it gets faster afterwards.
+# It does not need FILE: its own change of the file makes the crane faster.
 FIRST_MOTION = Step(
     MOTION,
     "First motion, at reduced speed",
     "first motion at reduced speed: each valve follows its joystick, and is neutral when the"
     " enable is let go",
-    run,
+    move_first,
     writes="`motion` without `waits`",
     needs=("valve", "filter"),
 )

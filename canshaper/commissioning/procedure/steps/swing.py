@@ -20,15 +20,15 @@ from canshaper.commissioning.identification.report import (
     lines,
     write_sway,
 )
-from canshaper.commissioning.identification.table import is_table
-from canshaper.commissioning.identification.verdict import Finding
+from canshaper.commissioning.identification.verdict import SwingFinding
 from canshaper.commissioning.procedure.bench import Bench, Mode, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.tables import is_table
 from canshaper_sim.strokes import Script, Stroke
 
-# A push as in the scripts pulse-AXIS, and rest of ten swings of most grapples.
+# A push as of the scripts pulse-AXIS, and a rest of ten swings of most grapples, s.
 PUSH_S, RAMP_S, QUIET_S = 3.0, 0.1, 30.0
 NONE = "-"
 
@@ -49,7 +49,7 @@ class _Sources:
 
 
 def swinging(deployment: Deployment) -> list[str]:
-    """Axes that make the grapple swing."""
+    """Return the axes that make the grapple swing."""
     return [name for name, axis in deployment.axes.items() if axis.config.sway]
 
 
@@ -67,7 +67,7 @@ def run(context: Context) -> Outcome:
     if missing:
         text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
         outcome.problems.append(f"{text} table, or a stopwatch")
-    findings: list[Finding] = []
+    findings: list[SwingFinding] = []
     logs: list[Path] = []
     if sources.signals:
         log = context.folder / "swing.log"
@@ -100,7 +100,7 @@ _TIMED = ("swings", "seconds", "first", "last")
 
 
 def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
-    """Ask what shows the swing of each axis; of the simulated crane it is its own message."""
+    """Ask what shows the swing of each axis; the simulated crane has a message of its own."""
     sources, own = _Sources(), simulated_signals(deployment, deployment.messages)
     for name in axes:
         sensor = deployment.axes[name].sway_sensor
@@ -140,13 +140,13 @@ def _task(axes: Sequence[str], mode: Mode) -> Task:
 
 def _identified(
     log: Path, signals: dict[str, str], context: Context, axis: str | None = None
-) -> list[Finding]:
+) -> list[SwingFinding]:
     machine = context.deployment
     with context.bench.person.progress("identifying") as shown:
         return logged([str(log)], signals, machine, machine.messages, axis=axis, on_progress=shown)
 
 
-def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
+def _show(outcome: Outcome, findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> None:
     for finding in findings:
         outcome.sheet.print("\n".join(lines(finding)))
         outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
@@ -165,7 +165,7 @@ def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice
 
 def _write(
     deployment: Deployment,
-    findings: Sequence[Finding],
+    findings: Sequence[SwingFinding],
     advice: Sequence[Advice],
     origin: dict[str, Any],
 ) -> list[str]:

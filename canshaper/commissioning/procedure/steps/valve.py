@@ -1,27 +1,25 @@
-"""Valve curve of each axis, measured."""
+"""Steps: valve curve and sway sensor of each axis, found by driving it."""
 
 from functools import partial
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.fit import Calibration
-from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, usual_top
-from canshaper.commissioning.calibration.write import (
-    SIMULATED,
-    curve_lines,
-    speed_signal,
-    write_curve,
-)
-from canshaper.commissioning.plots import of_valve
-from canshaper.commissioning.procedure.bench import Bench
+from canshaper.commissioning.calibration.fit import Calibration, curve_lines, write_curve
+from canshaper.commissioning.calibration.ramp import RATE_PER_S, Ramp, speed_signal, usual_top
+from canshaper.commissioning.origins import origin_of
+from canshaper.commissioning.plots import of_sensors, of_valve
+from canshaper.commissioning.procedure.bench import Bench, Task
 from canshaper.commissioning.procedure.state import Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.swing import swinging
+from canshaper.commissioning.sensor.fit import hand_driven, read_sensors
+from canshaper.commissioning.sensor.verdict import DRIVE_IT, examine, heading, table, write_sensors
 from canshaper.errors import CalibrationError
 from canshaper.machine.deployment import Deployment
+from canshaper_sim.axes import SPEED_SIGNALS
 
 NONE = "-"
 
 
-def run(context: Context) -> Outcome:
+def calibrate_valves(context: Context) -> Outcome:
     """Measure the valve of every axis that swings and whose speed is on a bus."""
     deployment, bench = context.deployment, context.bench
     outcome = Outcome()
@@ -71,8 +69,8 @@ def run(context: Context) -> Outcome:
 
 
 def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
-    """MESSAGE.SIGNAL of the speed of an axis; a dash where there is none."""
-    default = SIMULATED.get(deployment.coordinates.get(name, name), NONE)
+    """Return MESSAGE.SIGNAL of the speed of an axis; ``NONE`` where there is none."""
+    default = SPEED_SIGNALS.get(deployment.coordinates.get(name, name), NONE)
     if isinstance(deployment.messages.find(default.partition(".")[0]), str):
         default = NONE
     if feedback := deployment.axes[name].config.feedback:
@@ -86,15 +84,59 @@ def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
 def _write(deployment: Deployment, results: dict[str, Calibration], simulated: bool) -> None:
     for name, result in results.items():
         bus = deployment.config.buses[deployment.axes[name].config.valve.bus]
-        write_curve(deployment, name, result, simulated=simulated or bus.is_virtual)
+        origin = origin_of("calibrate", live=[] if simulated else [bus])
+        write_curve(deployment, name, result, origin)
 
 
 VALVE = Step(
     "valve",
     "Valves, calibrated",
     "a slow ramp of each of these axes measures its valve",
-    run,
+    calibrate_valves,
     writes="`limits.curve_*`",
     needs=("joysticks",),
     applies=swinging,
+)
+
+
+def examine_sensors(context: Context) -> Outcome:
+    """Let each axis with a sensor be driven, and compare with its model."""
+    deployment, bench = context.deployment, context.bench
+    axes = [name for name, axis in deployment.axes.items() if axis.sway_sensor]
+    log = context.folder / "sensor.log"
+    script = hand_driven(axes)
+    words = f"{', '.join(axes)}, one after the other: {DRIVE_IT}. {script.duration_s:.0f} s."
+    bench.drive(deployment, log, Task(words, script, bench.raw_mode("sensor")))
+    series = read_sensors(log, deployment, axes)
+    findings = [examine(deployment.axes[name], series[name]) for name in axes]
+    outcome = Outcome(files=[log])
+    for finding in findings:
+        outcome.sheet.print(heading(finding))
+        if finding.fit:
+            outcome.sheet.print(table(deployment.axes[finding.axis], finding))
+            outcome.numbers[finding.axis] = {
+                "invert": finding.invert,
+                "delay_s": round(finding.delay_s.value, 4),
+            }
+        outcome.sheet.print(*(f"  note: {note}" for note in finding.notes))
+        outcome.problems += [f"{finding.axis}: {fault}" for fault in finding.problems]
+    if any(finding.fit for finding in findings):
+        outcome.figures[""] = partial(of_sensors, findings)
+    given = None if bench.simulated else log
+
+    def edit(copy: Deployment) -> None:
+        write_sensors(copy, findings, given, live=False)
+
+    outcome.edit = edit
+    return outcome
+
+
+SENSOR = Step(
+    "sensor",
+    "Sway sensor, found",
+    "only with a sway sensor: its sign, delay, offset and noise",
+    examine_sensors,
+    writes="`sway_sensor`",
+    needs=("swing", "valve"),
+    applies=lambda deployment: any(axis.sway_sensor for axis in deployment.axes.values()),
 )

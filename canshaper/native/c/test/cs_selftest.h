@@ -4,7 +4,7 @@
 
 #include "canshaper.h"
 
-/* The inner state as a row of numbers, in the order of canshaper/native/states.py. Returns how many there are. */
+/* The inner state as a row of numbers, in the order of canshaper/native/drive.py. Returns how many there are. */
 int32_t cs_inspect_size(void); /* bytes of cs_controller */
 int32_t cs_inspect_axis(const cs_controller *s, int32_t axis, cs_real *out);
 int32_t cs_inspect_motion(const cs_controller *s, int32_t motion, cs_real *out);

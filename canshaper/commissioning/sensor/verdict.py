@@ -1,19 +1,20 @@
-"""Finding on a sway sensor: what a log shows, whether it may be used; shown, and written."""
+"""Finding on a sway sensor: computed from a log, judged, shown, written into the file."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
-from canshaper.commissioning.identification.canlog import is_simulated
 from canshaper.commissioning.identification.driven import Driven, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
 from canshaper.commissioning.identification.swing import clipped
+from canshaper.commissioning.identification.verdict import AxisFinding
+from canshaper.commissioning.origins import origin_of
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
-from canshaper.edit.edit import Change, FileValue, change, note, written_by
+from canshaper.edit.edit import Change, FileValue, change, note
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, MOST_DELAY
 from canshaper.machine.valves import BoundAxis
@@ -25,15 +26,16 @@ LEAST_DRIVEN_S = 2.0
 LEAST_EXPLAINED = 0.8
 # Widest interval of a delay that may be used, s.
 WIDEST_DELAY_S = 0.015
-# Beyond so many times what the full speed of the file makes, or so little, the unit is another one.
+# Where the swing is larger or smaller than the full speed of the file makes by more than this
+# factor, the unit in the DBC is wrong.
 MOST_GAIN = 3.0
-# What the model leaves wrong of the delay, s: large swings, and spools that need their time.
+# Error of the model in the delay, s: large swings, and the lag of spools.
 MODEL_DELAY_S = 0.01
-# What two measurements differ by within so much time is noise, s: a swing hardly moves meanwhile.
+# Measurements so close to each other differ by noise, s: the swing hardly moves meanwhile.
 NOISE_S = 0.1
-# Lengths that are off by more are reported, as a part.
+# A pendulum whose length differs by more than this part is reported.
 SAME_LENGTH = 0.15
-# Part of the largest offset from which that one is raised, and what it is raised to.
+# An offset above this part of offset_max_deg raises that to so many times the offset.
 NEAR_OFFSET, MORE_OFFSET = 0.8, 1.5
 SIGMAS = 2.0  # of 95 %
 DRIVE_IT = (
@@ -43,26 +45,20 @@ DRIVE_IT = (
 
 
 @dataclass
-class Finding:
-    """The sway sensor of one axis.
+class SensorFinding(AxisFinding):
+    """Sway sensor of one axis.
 
     Attributes:
-        axis: its name.
         series: what it measured, rad or rad/s, with the sign of its signal.
         data: the stretches in which the axis was driven.
         fit: the model that explains it best; None where there was nothing to explain.
         noise: standard deviation of its noise, degrees or degrees per second.
-        problems: why nothing may be used, each with what to do.
-        notes: what else a person should know.
     """
 
-    axis: str
     series: Series
     data: Sequence[Driven] = ()
     fit: SensorFit | None = None
     noise: float = 0.0
-    problems: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
 
     @property
     def unit(self) -> str:
@@ -98,16 +94,16 @@ class Finding:
 
     @property
     def size_m_s(self) -> Value:
-        """Full speed of the tip that makes so much swing."""
+        """Full speed of the tip that makes as much swing as was measured."""
         assert self.fit
         size = abs(self.fit.gain)
         return Value(size, SIGMAS * size * self.fit.deviations[3])
 
 
-def examine(axis: BoundAxis, series: Series) -> Finding:
+def examine(axis: BoundAxis, series: Series) -> SensorFinding:
     """Examine the log of an axis that has a sensor."""
     assert axis.config.sway and axis.sway_sensor
-    finding = Finding(axis.name, series, notes=list(series.notes))
+    finding = SensorFinding(axis.name, series, notes=list(series.notes))
     mode = axis.config.sway.mode()
     if fault := _useless(axis.name, series, mode.period_s):
         finding.problems.append(fault)
@@ -128,7 +124,7 @@ def examine(axis: BoundAxis, series: Series) -> Finding:
 
 
 def _useless(axis: str, series: Series, period_s: float) -> str | None:
-    """Why nothing can be made of a signal."""
+    """Return why a signal cannot be used; None where it can."""
     time, value, source = series.time_s, series.value, series.source
     if series.command is None:
         return f"expected commands of {axis} in the log, got none: log its valve or its joystick"
@@ -148,7 +144,7 @@ def _useless(axis: str, series: Series, period_s: float) -> str | None:
 
 
 def _alone(series: Series, period_s: float) -> list[Series]:
-    """Parts of a signal in which no other axis moves, nor did for a swing: it swings along."""
+    """Return the parts of a signal in which no other axis moves, nor did one swing before."""
     command = series.command
     assert command
     parts, begin = [], -math.inf
@@ -164,7 +160,7 @@ def _alone(series: Series, period_s: float) -> list[Series]:
 
 
 def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
-    """Standard deviation by what neighbours differ by beyond the model, in their unit."""
+    """Return the standard deviation of neighbours' differences from the model, in their unit."""
     squares, count = 0.0, 0
     for one, model in zip(data, fitted, strict=True):
         apart = max(1, round(NOISE_S / float(np.median(np.diff(one.time_s)))))
@@ -175,8 +171,8 @@ def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
     return math.sqrt(squares / count)
 
 
-def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
-    """Why what was found cannot be used."""
+def _faults(axis: BoundAxis, finding: SensorFinding) -> list[str]:
+    """Return why the fit cannot be used."""
     fit, source = finding.fit, finding.series.source
     assert fit and axis.config.sway
     explained = fit.explained(math.radians(finding.noise))
@@ -211,7 +207,7 @@ def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
     return faults
 
 
-def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
+def _notes(axis: BoundAxis, finding: SensorFinding) -> list[str]:
     """Return further notes for the person."""
     assert finding.fit and axis.config.sway
     notes, period_s = [], axis.config.sway.mode().period_s
@@ -225,7 +221,7 @@ def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
     return notes
 
 
-def changes(axis: BoundAxis, finding: Finding) -> dict[str, FileValue]:
+def changes(axis: BoundAxis, finding: SensorFinding) -> dict[str, FileValue]:
     """Return the values for the section of the sensor, by key."""
     assert axis.sway_sensor
     config = axis.sway_sensor.config
@@ -242,7 +238,7 @@ def changes(axis: BoundAxis, finding: Finding) -> dict[str, FileValue]:
     return values
 
 
-def heading(finding: Finding) -> str:
+def heading(finding: SensorFinding) -> str:
     """Return a heading: what was examined, and whether the data is enough."""
     text = f"{axis_title(finding.axis)}, {finding.series.source}"
     if finding.fit is None:
@@ -250,10 +246,10 @@ def heading(finding: Finding) -> str:
     driven = len(finding.data)
     explained = 100.0 * max(0.0, finding.fit.explained(math.radians(finding.noise)))
     text += f": {driven} driven stretch{'es' * (driven != 1)}, {explained:.0f} % explained"
-    return f"{text} (not enough data)" if finding.problems else text
+    return finding.marked(text)
 
 
-def table(axis: BoundAxis, finding: Finding) -> Table:
+def table(axis: BoundAxis, finding: SensorFinding) -> Table:
     """Return a table of the finding next to the values of the file."""
     assert axis.sway_sensor and axis.config.sway
     config, sway = axis.sway_sensor.config, axis.config.sway
@@ -274,23 +270,21 @@ def _shown(value: Value, factor: float = 1.0, digits: int = 2) -> str:
 
 
 def write_sensors(
-    deployment: Deployment, findings: Sequence[Finding], log: Path | None, *, live: bool
+    deployment: Deployment, findings: Sequence[SensorFinding], log: Path | None, *, live: bool
 ) -> list[str]:
-    """Write the results for each sensor, and where from; the lines that have changed.
+    """Write the results of each sensor with their origin; return the lines that have changed.
 
     Args:
         deployment: the machine.
         findings: of its sensors; those with problems are left out.
-        log: the log that they are from, where a person recorded it.
+        log: the log of a person, None for a drive of this program.
         live: whether the buses were listened to.
 
     Raises:
         ConfigError: the file cannot be changed.
     """
-    simulated = not live or any(bus.is_virtual for bus in deployment.config.buses.values())
-    if log:
-        simulated = is_simulated(log, deployment.messages)
-    origin = written_by("sensor", simulated=simulated, log=log.name if log else None)
+    buses = deployment.config.buses.values() if live else ()
+    origin = origin_of("sensor", [log] if log else [], deployment.messages, live=buses)
     written: list[Change] = []
     for finding in findings:
         if not finding.problems:

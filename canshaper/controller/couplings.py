@@ -1,50 +1,50 @@
-"""What acts on axes before any of them moves: two-axis motions, load, ends, ropes, shared oil."""
+"""Couplings that act on the axes ahead of each tick: load, ends, ropes, motions, shared oil."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.config.crane import Motion
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.events import MotionEvent
-from canshaper.controller.received import MachineInputs
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.machine_inputs import MachineInputs
 from canshaper.inputs.value import Value
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.named_codes import values_of_schedules
 from canshaper.protocols.interface import Event
-from canshaper.shaping.motion import TwoAxisMotion, farthest_m
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.states import State
+from canshaper.shaping.two_axis_motion import TwoAxisMotion, farthest_m
 
 if TYPE_CHECKING:
-    from canshaper.controller.demands import AxisEnds, RopeControl, SharedFlow
+    from canshaper.controller.measured_limits import AxisEnds, RopeControl, SharedFlow
     from canshaper.controller.parameter_sets import Load
 
-# An axis at rest in READY may be moved by the other one.
+# States in which the motion may move an axis; one at rest in READY too.
 ABLE = (State.READY, State.ACTIVE)
 RADIUS = "radius"
 
 
 class _Member:
-    """One axis of the motion."""
+    """One axis of a motion: its control, and its state in the computation."""
 
-    __slots__ = ("moving", "runner")
+    __slots__ = ("control", "moving")
 
-    def __init__(self, runner: AxisControl, full_speed: float) -> None:
-        assert runner.axis.sway is not None  # checked with the deployment
-        self.runner = runner
-        self.moving = MovingAxis(full_speed, runner.period_s, runner.axis.sway)
+    def __init__(self, control: AxisControl, full_speed: float) -> None:
+        assert control.axis.sway is not None  # checked with the deployment
+        self.control = control
+        self.moving = MovingAxis(full_speed, control.period_s, control.axis.sway)
 
     def bound(self, config: Motion) -> None:
         """Limit how far and how fast the motion may move this axis."""
-        moving, axis = self.moving, self.runner.bound.config
+        moving, axis = self.moving, self.control.bound.config
         moving.farthest = farthest_m(config.max_path_m, damps=axis.damps)
         moving.largest = config.max_pct / 100.0
         moving.fall_per_s = axis.limits.fall_per_s
 
     def update(self, tick_s: float, last: int, now: int) -> None:
-        """Read the state of the axis; see ``MotionRunner.step``."""
-        moving, runner = self.moving, self.runner
-        axis, period = runner.axis, runner.period_ticks
+        """Copy the state of the axis; for the deadlines see ``MotionControl.step``."""
+        moving, control = self.moving, self.control
+        axis, period = control.axis, control.period_ticks
         if period == 1 == now - last:
             moving.ahead_s = 0.0
         else:
@@ -55,19 +55,19 @@ class _Member:
         if axis.sway is not moving.sway:  # changed while it runs
             assert axis.sway is not None
             moving.follow(axis.sway)
-        full, (back, ahead) = moving.full_speed, runner.room
+        full, (back, ahead) = moving.full_speed, control.room
         moving.room_m = full * back, full * ahead
         moving.applied, moving.sent = axis.output.applied, axis.output.setpoint
         moving.commanded, moving.able = axis.output.commanded, axis.state in ABLE
         moving.unattended = axis.added_time.unattended
 
 
-class MotionRunner:
-    """Slew and near-far of one crane.
+class MotionControl:
+    """Two-axis motion of one crane: finds the velocities that slew and near-far add.
 
     Args:
-        name: of the motion, in the file.
-        config: the motion.
+        name: name of the motion in the file.
+        config: section of the motion.
         slew: the axis that turns.
         near_far: the axis that moves the tip in and out, or None.
         radius: measured radius of the tip, or None.
@@ -96,15 +96,15 @@ class MotionRunner:
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]
         for member in self._members:
-            member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
+            member.control.axis.allow_added(config.max_pct / 100.0, config.max_s)
         bending: _Member | None = None
         if luffing and config.luffing_rad_s:
             bending = _Member(luffing, config.luffing_rad_s)
             luffing.axis.bends = True
             self._members.append(bending)
-        self._roped = [one for one in self._members if one.runner.bound.rope]
+        self._roped = [one for one in self._members if one.control.bound.rope]
         self._name = name
-        self._apart = slew.bound.name  # what keeps the axes apart: at the start that they wait
+        self._apart = slew.bound.name  # what keeps the axes apart; at the start slew waits
         if self._near_far:
             self._near_far.bound(config)
         self._motion = TwoAxisMotion(
@@ -112,66 +112,66 @@ class MotionRunner:
         )
         if bending:
             self._motion.luffing = bending.moving
-            self._motion.height_m = _full_speed_m_s(bending.runner) / bending.moving.full_speed
+            self._motion.height_m = _full_speed_m_s(bending.control) / bending.moving.full_speed
 
     def adjust(self) -> None:
-        """Take full speed and fall of near-far as they are now."""
+        """Take over a changed full speed or fall of near-far."""
         if self._near_far:
-            moving, runner = self._near_far.moving, self._near_far.runner
-            moving.full_speed = _full_speed_m_s(runner)
-            moving.fall_per_s = runner.bound.config.limits.fall_per_s
+            moving, control = self._near_far.moving, self._near_far.control
+            moving.full_speed = _full_speed_m_s(control)
+            moving.fall_per_s = control.bound.config.limits.fall_per_s
 
     def step(self, now_ns: int, last: int, now: int) -> MotionEvent | None:
-        """Give both axes what they add in this tick.
+        """Set the velocity that each axis adds in this tick.
 
         Args:
             now_ns: monotonic time.
-            last: number of the deadline before; axes have held their output since then.
+            last: number of the deadline before; the axes have held their output since.
             now: number of this deadline.
 
         Returns:
-            Whether they move as one, where that has changed.
+            The event, if the axes now move as one or no longer do; else None.
         """
         apart = ""
         tick_s, members = self._tick_s, self._members
         for member in members:
-            if member.runner.alone:
+            if member.control.alone:
                 self._end()
                 return None
             member.update(tick_s, last, now)
             if not (apart or member.moving.able):
-                apart = member.runner.bound.name
-        for member in self._roped:  # of which the model swings otherwise now
+                apart = member.control.bound.name
+        for member in self._roped:  # its rope may have another length now
             member.moving.follow(member.moving.sway)
         tip_m = self._radius.fresh(now_ns) if self._radius else None
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
-            moving, runner = member.moving, member.runner
-            runner.added, runner.damps = moving.added, moving.damps
-            runner.displaced = moving.reached / moving.full_speed
+            moving, control = member.moving, member.control
+            control.added, control.damps = moving.added, moving.damps
+            control.displaced = moving.reached / moving.full_speed
             if self._motion.unattended:
-                runner.axis.added_time.renew()
+                control.axis.added_time.renew()
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
         return None if apart == self._apart else self._changed(apart)
 
     def _changed(self, apart: str) -> MotionEvent:
-        """Take what keeps the axes apart now, or "" where nothing does; return the event."""
+        """Store what keeps the axes apart, "" where nothing does; return the event."""
         self._apart = apart
-        states = {one.runner.bound.name: one.runner.axis.state.name for one in self._members}
+        states = {one.control.bound.name: one.control.axis.state.name for one in self._members}
         why = f"{apart}={states.get(apart, 'lost')}" if apart else ""
         return MotionEvent(self._name, why)
 
     def on_trip(self, tripped: AxisControl) -> None:
-        """End what is added at once, if the tripped axis is one of these."""
-        if any(member.runner is tripped for member in self._members):
+        """End the added velocities at once, if the tripped axis belongs to this motion."""
+        if any(member.control is tripped for member in self._members):
             self._end()
 
     def _end(self) -> None:
         self._motion.stop()
         for member in self._members:
-            if not member.runner.alone:
-                member.runner.drop_added()
+            if not member.control.alone:
+                member.control.drop_added()
 
 
 def _full_speed_m_s(near_far: AxisControl) -> float:
@@ -181,17 +181,17 @@ def _full_speed_m_s(near_far: AxisControl) -> float:
 
 
 class Couplings:
-    """All that acts on the axes of a machine before any of them moves in a tick.
+    """Everything that acts on the axes of a machine before any of them runs in a tick.
 
     Args:
         deployment: the machine.
         axes: its axes by name.
-        inputs: what it receives.
+        inputs: its inputs.
         tick_s: time between two ticks of the controller.
 
     Attributes:
         motions: the two-axis motions.
-        any: whether there is anything to do.
+        any: whether the machine has any coupling.
     """
 
     def __init__(
@@ -207,21 +207,23 @@ class Couplings:
             from canshaper.controller import parameter_sets
 
             self._load = parameter_sets.Load(inputs.load_state, [*values])
-        for runner in axes.values():
-            if runner.bound.config.gain_schedule or runner.bound.config.profiles:
-                runner.add_chooser(self._load, inputs.profile)
+        for control in axes.values():
+            if control.bound.config.gain_schedule or control.bound.config.profiles:
+                control.add_chooser(self._load, inputs.profile)
         self._ends: list[AxisEnds | RopeControl] = []
         self._flow: SharedFlow | None = None
         if (oil := config.hydraulics) or inputs.positions or inputs.ropes:
-            from canshaper.controller import demands
+            from canshaper.controller import measured_limits
 
-            self._ends = [demands.AxisEnds(axes[n], p) for n, p in inputs.positions.items()]
-            self._ends += [demands.RopeControl(n, axes[n], v) for n, v in inputs.ropes.items()]
+            self._ends = [measured_limits.AxisEnds(axes[n], p) for n, p in inputs.positions.items()]
+            self._ends += [
+                measured_limits.RopeControl(n, axes[n], v) for n, v in inputs.ropes.items()
+            ]
             if oil:
                 others = inputs.other_flow
-                self._flow = demands.SharedFlow(oil, axes, inputs.joysticks, others, tick_s)
+                self._flow = measured_limits.SharedFlow(oil, axes, inputs.joysticks, others, tick_s)
         self.motions = [
-            MotionRunner(
+            MotionControl(
                 name,
                 one.config,
                 axes[one.config.slew],
@@ -232,21 +234,21 @@ class Couplings:
             )
             for name, one in deployment.motions.items()
         ]
-        self._followed = [(runner, runner.run_on) for runner in axes.values() if runner.run_on]
+        self._followed = [(control, control.run_on) for control in axes.values() if control.run_on]
         self.any = bool(self._load or self._ends or self._flow or self.motions)
 
     def step(self, now_ns: int, last: int, now: int, events: list[Event]) -> None:
-        """Look at load, ends and ropes, add motions, share the oil.
+        """Apply load, ends and ropes, then motions, then shared oil.
 
         Args:
             now_ns: monotonic time.
             last: number of the deadline of the tick before.
             now: number of this one.
-            events: gets what is reported.
+            events: list that gets the events for the log.
         """
-        for runner, run_on in self._followed:  # it held its last demand until now
-            if ticks := now // runner.period_ticks - last // runner.period_ticks:
-                run_on.add(runner.axis.command, ticks)
+        for control, run_on in self._followed:  # the axis held its last demand until now
+            if ticks := now // control.period_ticks - last // control.period_ticks:
+                run_on.add(control.axis.demand, ticks)
         if self._load and (load := self._load.step(now_ns)):
             events.append(load)
         for end in self._ends:

@@ -2,7 +2,7 @@
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import Guarded
+from canshaper.controller.gated import GatedController
 from canshaper.machine.deployment import Deployment
 from tests.faults.judge import Violation
 
@@ -14,6 +14,6 @@ class Unrefused(Controller):
         raise Violation(f"{self.events[-1].text}, of a sound controller")
 
 
-def guarded(deployment: Deployment) -> Guarded:
+def gated(deployment: Deployment) -> GatedController:
     """As the daemon drives it."""
-    return Guarded(Unrefused(deployment))
+    return GatedController(Unrefused(deployment))

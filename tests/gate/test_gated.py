@@ -13,7 +13,7 @@ import pytest
 from canshaper import gate
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
-from canshaper.controller.guarded import QUIET_NS, Guarded
+from canshaper.controller.gated import QUIET_NS, GatedController
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
 from canshaper_sim.hand import Hand, Held
@@ -38,20 +38,20 @@ class Wrong:
     def __init__(self, kind: type[Controller] = Controller) -> None:
         deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
         self.controller = kind(deployment)
-        self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
+        self.gated, self.hand = GatedController(self.controller), Hand(deployment)
         self.valve = deployment.axes["slew"].valve
-        self.runner = self.controller.axes["slew"]
-        self.sound, self.runner._put = self.runner._put, lambda raw, _: self.sound(raw, 99)
+        self.control = self.controller.axes["slew"]
+        self.sound, self.control._put = self.control._put, lambda raw, _: self.sound(raw, 99)
         self.number = 0
 
     def tick(self) -> list[Frame]:
         """The slew frames of a tick."""
         now_ns = self.number * TICK_NS
         for frame in self.hand.frames(self.number * 20, Held(enable=True)):
-            self.guarded.receive(frame, now_ns)
+            self.gated.receive(frame, now_ns)
         self.number += 1
         key = self.valve.message.key
-        return [frame for frame in self.guarded.tick(now_ns) if frame[:3] == key]
+        return [frame for frame in self.gated.tick(now_ns) if frame[:3] == key]
 
 
 def test_one_that_goes_on_is_logged_once_a_second() -> None:
@@ -66,17 +66,17 @@ def test_one_that_goes_on_is_logged_once_a_second() -> None:
 
 def test_what_the_loop_says_reaches_the_controller() -> None:
     wrong = Wrong()
-    wrong.runner._put = wrong.sound
+    wrong.control._put = wrong.sound
     (frame,) = wrong.tick()
-    assert not wrong.guarded.moves
-    assert not wrong.guarded.withhold(frame)
+    assert not wrong.gated.moves
+    assert not wrong.gated.withhold(frame)
     with patch.object(Controller, "withhold", lambda *_: True):  # as if it moved
-        assert wrong.guarded.withhold(frame)
-    wrong.guarded.send_failed(frame)
+        assert wrong.gated.withhold(frame)
+    wrong.gated.send_failed(frame)
     assert wrong.controller.counters.last_fault is FrameFault.SEND_FAILED
     wrong.tick()
-    wrong.guarded.stalled()
-    assert wrong.guarded._gate.stood
+    wrong.gated.stalled()
+    assert wrong.gated._gate.stood
     wrong.tick()
     assert wrong.controller.axes["slew"].axis.reason is Reason.JOYSTICK_TIMEOUT
 
@@ -85,7 +85,7 @@ def disagreeing(change: str) -> tuple[Controller, list[Frame]]:
     """The forwarder moves slew; from a moment on the controller's decoder reads something else."""
     deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
     controller = Controller(deployment)
-    guarded, hand = Guarded(controller), Hand(deployment)
+    gated, hand = GatedController(controller), Hand(deployment)
     left: list[Frame] = []
     joystick = controller.joysticks["left"]
     sound = joystick._decode
@@ -101,8 +101,8 @@ def disagreeing(change: str) -> tuple[Controller, list[Frame]]:
             joystick._decode = decode  # type: ignore[method-assign]
         held = Held({"slew": 0.5 if number > 5 else 0.0}, enable=True)
         for frame in hand.frames(number * 20, held):
-            guarded.receive(frame, number * TICK_NS)
-        frames = [f for f in guarded.tick(number * TICK_NS) if f.can_id == 512]
+            gated.receive(frame, number * TICK_NS)
+        frames = [f for f in gated.tick(number * TICK_NS) if f.can_id == 512]
         left += frames if number >= 20 else []
     return controller, left
 
@@ -127,24 +127,24 @@ def test_a_broken_wire_moves_nothing(name: str, machine: Machine) -> None:
     machine.in_yaml("signal: Slew, neutral_pct: 2", f'signal: Slew, codes: {{ "{name}": fault }}')
     deployment = machine.load()
     controller = Controller(deployment)
-    guarded, hand = Guarded(controller), Hand(deployment)
+    gated, hand = GatedController(controller), Hand(deployment)
     moved = set()
     for number in range(60):
         for frame in hand.frames(number * 20, Held(enable=True)):
             if frame.can_id == 272 and number > 5:
                 frame = frame._replace(data=struct.pack("<h", -1000) + frame.data[2:])  # noqa: PLW2901
-            guarded.receive(frame, number * TICK_NS)
-        moved |= {f.data[0] for f in guarded.tick(number * TICK_NS) if f.can_id == 512}
+            gated.receive(frame, number * TICK_NS)
+        moved |= {f.data[0] for f in gated.tick(number * TICK_NS) if f.can_id == 512}
     assert moved == {0}
 
 
 def test_what_is_no_frame_of_a_tick_is_looked_at_too() -> None:
     wrong = Wrong()
-    assert wrong.guarded.passes(Frame("crane", 0x300, False, bytes(8)), 0)
-    assert not wrong.guarded.passes(Frame("crane", 0x601, False, bytes(8)), 0)
+    assert wrong.gated.passes(Frame("crane", 0x300, False, bytes(8)), 0)
+    assert not wrong.gated.passes(Frame("crane", 0x601, False, bytes(8)), 0)
     assert "limit=identifier" in wrong.controller.events[-1].text
     wrong.controller.events.clear()
-    assert not wrong.guarded.passes(Frame("crane", 0x601, False, bytes(8)), 1)
+    assert not wrong.gated.passes(Frame("crane", 0x601, False, bytes(8)), 1)
     assert not wrong.controller.events
 
 
@@ -159,21 +159,21 @@ class Extra(Controller):
 def test_a_frame_that_is_none_of_ours_is_left_out() -> None:
     deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
     controller = Extra(deployment)
-    guarded = Guarded(controller)
-    assert 0x601 not in {frame.can_id for frame in guarded.tick(TICK_NS)}
+    gated = GatedController(controller)
+    assert 0x601 not in {frame.can_id for frame in gated.tick(TICK_NS)}
     assert "limit=identifier" in controller.events[-1].text
     assert not any(
-        runner.axis.reason is Reason.OUTPUT_REFUSED for runner in controller.axes.values()
+        control.axis.reason is Reason.OUTPUT_REFUSED for control in controller.axes.values()
     )
 
 
 def test_numbers_and_demands_reach_the_gate() -> None:
     wrong = Wrong()
-    wrong.guarded._gate.axes["slew"].of.ranges = {"limits.max_pct": (20.0, 80.0)}
-    wrong.guarded.set({"axes.slew.limits.max_pct": 50.0})
-    assert wrong.guarded._gate.axes["slew"].of.maximum == 0.5
-    wrong.guarded.demand("slew", 0.5)
-    assert wrong.guarded._gate.axes["slew"].ramp
+    wrong.gated._gate.axes["slew"].of.ranges = {"limits.max_pct": (20.0, 80.0)}
+    wrong.gated.set({"axes.slew.limits.max_pct": 50.0})
+    assert wrong.gated._gate.axes["slew"].of.maximum == 0.5
+    wrong.gated.demand("slew", 0.5)
+    assert wrong.gated._gate.axes["slew"].ramp
 
 
 def test_the_closure_of_the_gate_is_the_standard_library_and_itself() -> None:
@@ -190,7 +190,7 @@ def test_the_closure_of_the_gate_is_the_standard_library_and_itself() -> None:
 def test_a_reload_goes_on_where_the_gate_was() -> None:
     wrong = Wrong()
     wrong.tick()
-    before, after = wrong.guarded, Guarded(Controller(wrong.controller.deployment))
+    before, after = wrong.gated, GatedController(Controller(wrong.controller.deployment))
     after.carry_over(before)
     assert after._gate.axes["slew"].latched
     counts = [[valve.count for valve in one._gate.valves.values()] for one in (before, after)]
@@ -206,7 +206,7 @@ def test_two_frames_of_a_joystick_in_a_tick(stick: float, first: float, second: 
     world.go(25)
     world.go(20, slew=0.5)
     world.go(1, slew=stick)
-    axis, (frame, *_) = world.guarded._gate.axes["slew"], world.left
+    axis, (frame, *_) = world.gated._gate.axes["slew"], world.left
     speed = (world.decode("slew", frame.data) or 0) / world.axes["slew"].steps
     for change, latched in ((first, False), (second, True)):
         world.evil.plant = world.commands(slew=speed + change)
@@ -226,7 +226,7 @@ def test_a_joystick_of_every_second_tick(
     world = World("gateway-forwarder")
     world.go(25)
     world.go(150, slew=(speed - 0.05) / 0.95 + 0.01)
-    axis = world.guarded._gate.axes["slew"]
+    axis = world.gated._gate.axes["slew"]
     world.go(2, world.commands(slew=speed), slew=abs(stick))
     world.go(1, world.commands(slew=speed), slew=stick)
     world.change = lambda frame: []

@@ -1,4 +1,4 @@
-"""The inputs of a deployment by their messages, and what a reload carries over."""
+"""Inputs of a machine by their messages, and the parts that a reload carries over."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from canshaper.codec.message import Sender
 from canshaper.config.crane import Radius
 from canshaper.config.limits import Ends, OtherFlow, RopeSection
-from canshaper.controller.runner import AxisControl
+from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.input import Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.stops import EmergencyStopInput
@@ -30,20 +30,20 @@ BoundHandler = tuple[BoundInput, MessageInput]
 
 
 class MachineInputs:
-    """Inputs that are not part of an axis.
+    """Inputs of a machine, except those that an axis has of its own.
 
     Attributes:
         joysticks: the joysticks by name.
-        stop: the emergency stop, where there is one.
-        load_state: says what hangs on the crane, where there is a signal for it.
-        profile: the operator's choice, where there is one.
-        sway_sensors: measurements of sway, by the name of each axis that reads them.
+        stop: the emergency stop, or None.
+        load_state: signal of the load state, or None.
+        profile: the operator's choice of a profile, or None.
+        sway_sensors: message with measurements of sway, by the name of each axis that reads it.
         radii: measured radius of the tip, by the name of its two-axis motion.
         ropes: measured length of the rope, by the name of the axis that follows it.
         positions: measured position, by the name of the axis that has ends.
-        other_flow: measured flow of functions that are not ours, where there is one.
-        gates: switches that enable a joystick, but for the one that is pressed, by its name.
-        bound: all of them that receive frames, with their messages.
+        other_flow: measured flow of functions that we do not drive, or None.
+        gates: switches that enable a joystick, except the one to press, by the joystick's name.
+        bound: every input that receives frames, with its message.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -68,7 +68,7 @@ class MachineInputs:
         self.sway_sensors = self._sway_sensors(deployment)
 
     def _sway_sensors(self, deployment: Deployment) -> dict[str, "SwaySensorInput"]:
-        """Return the measurements of sway, by the name of each axis that reads them."""
+        """Return the message with measurements of sway, by the name of each axis that reads it."""
         sensors = {n: axis.sway_sensor for n, axis in deployment.axes.items() if axis.sway_sensor}
         if not sensors:
             return {}
@@ -80,7 +80,7 @@ class MachineInputs:
         return {name: inputs[sensor.message.key] for name, sensor in sensors.items()}
 
     def _enable(self, deployment: Deployment) -> dict[str, list[Switch]]:
-        """Return the switches by the joystick that they enable; set the one to press there."""
+        """Return ``gates``; give each joystick the switch to press, where another has it."""
         named: dict[str, Switch] = {}
         for bound in deployment.switches:
             message = SwitchInput(bound, bound.switches)
@@ -141,13 +141,13 @@ def parts(
 ) -> dict[Key, Part]:
     """Return every part that a reload carries over, by its key.
 
-    A bus is known by interface and channel, a message by its id, whatever the file calls them. An
-    axis that is renamed is still that of its valve.
+    The key of a bus is its interface and channel, that of a message its identifier: a bus or a
+    message that is renamed keeps its state. A renamed axis keeps the state of its valve.
 
     Args:
         deployment: the machine.
-        senders: what sends each message.
-        inputs: what receives a message, by bus and id.
+        senders: senders of its messages.
+        inputs: receivers of its messages, by bus and identifier.
         axes: the axes by name.
         protocols: those of the machine.
     """
@@ -159,11 +159,11 @@ def parts(
         for sender in senders:
             bus, *message = sender.key
             yield ("sender", *places[bus], *message), sender
-        for name, runner in axes.items():
-            bus, *message = runner.valve.key
-            signal = runner.bound.config.valve.signal
-            yield ("valve", *places[bus], *message, signal), runner
-            yield ("axis", name), runner
+        for name, control in axes.items():
+            bus, *message = control.valve.key
+            signal = control.bound.config.valve.signal
+            yield ("valve", *places[bus], *message, signal), control
+            yield ("axis", name), control
         for protocol in protocols:
             yield from protocol.parts(places)
 

@@ -1,4 +1,4 @@
-"""One axis of a deployment at work."""
+"""Control of one axis: from its joystick to the setpoint in the message of its valve."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,7 @@ from canshaper.inputs.value import Feedback, ProfileChoice, Value
 from canshaper.machine.stop_distance import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
-from canshaper.shaping.demands import RunOn
+from canshaper.shaping.demand_bounds import RunOn
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
@@ -29,29 +29,31 @@ if TYPE_CHECKING:
     from canshaper.controller.parameter_sets import Load, SetChooser
     from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 
-# Least radius for the speed of a tip: at the pillar it has none, and shows no swing.
+# Least radius that counts for the speed of the tip. At the pillar the speed would be 0, and with it
+# the scale of every swing.
 LEAST_RADIUS_M = 0.5
 
 
 class AxisControl:
-    """Control of one axis, with its codecs: when it is due, what it sends.
+    """Control of one axis: its joystick, its causes to stop, its shaped axis, its valve's message.
 
     Attributes:
-        bound: the axis with its codecs, and with the configuration that is in force.
-        valve: sends the message of its valve.
-        period_ticks, period_s: time between two commands to its valve.
-        room: how far it may still move in both directions ahead of its end stops, full speed times
+        bound: the axis of the file with its codecs; ``bound.config`` is what is in force.
+        valve: sender of its valve's message.
+        axis: the shaped axis: state machine, filter and output stage.
+        period_ticks, period_s: time between two setpoints to its valve, ticks and seconds.
+        room: how far it may still move each way ahead of its end stops, full speed times seconds.
+        displaced: how far a motion has moved it from where its own demands lead, full speed times
             seconds.
-        displaced: how far the motion has moved it from where its own commands lead, in the same
-            unit.
-        stops: why it stops or may not begin, besides what its joystick says.
-        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.act``.
-        radius: measured radius of the tip of an axis that slews, where that is known.
-        other: the axis that makes this one swing, where both have sway sensors of one kind.
-        alone: a measurement is made with it: it is part of no motion.
-        feedback: what the valve says of itself, where it does.
-        run_on: what its filter lets run on, where that is followed.
-        chooser: which sway data and filter are in force, where there is a choice.
+        stops: causes to stop it or to keep it from starting, besides its joystick.
+        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.command``.
+        radius: measured radius of the tip of an axis that slews, or None.
+        other: the axis whose motion makes the load of this one swing, or None; both have sway
+            sensors of one kind.
+        alone: whether a measurement drives it; it is then part of no motion.
+        feedback: feedback of its valve, or None.
+        run_on: run-on of its filter, or None where nothing needs it.
+        chooser: choice of its sway data and filter, or None without a choice.
     """
 
     def __init__(
@@ -95,7 +97,7 @@ class AxisControl:
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
     def limits(self, config: AxisSection) -> OutputLimits:
-        """Limits of this axis with such a configuration."""
+        """Return the output limits of this axis with a configuration."""
         return output_limits(config, timeout_ms=self.bound.timeout_ms, period_s=self.period_s)
 
     def trip_in_motion(self, reason: Reason) -> None:
@@ -104,18 +106,18 @@ class AxisControl:
             self.stops.trip = reason
 
     def drop_added(self) -> None:
-        """Add nothing from now on; the next output is not faster for what was added."""
+        """Add nothing from now on; what was added makes the next output no faster."""
         self.added, self.damps = 0.0, False
         self.axis.drop_added()
 
     def new_filter(self) -> tuple[Shaper, SwayModel | None]:
-        """Return another filter like that of the file, with a sway model of its own."""
+        """Return a new filter as the file describes it, with a new sway model."""
         config, period_s = self.bound.config, self.period_s
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         return _shaper(config, period_s, sway), sway
 
     def follow_run_on(self) -> RunOn:
-        """Return what its filter lets run on; it is followed from now on."""
+        """Return the run-on of its filter, which is computed from now on."""
         if self.run_on is None:
             tail_s = self.bound.config.limits.tail_s
             self.run_on = RunOn(*self.new_filter(), self.period_s, tail_s)
@@ -128,7 +130,7 @@ class AxisControl:
         self.chooser = SetChooser(self.bound, self.axis, load, profile)
 
     def add_sway_sensor(self, message: "SwaySensorInput") -> None:
-        """Add a sway sensor."""
+        """Add the sway sensor whose measurements are in this message."""
         from canshaper.inputs.sway_sensor import SwaySignal
         from canshaper.shaping.sensed import SensedSway
 
@@ -145,11 +147,11 @@ class AxisControl:
         self._sway_signal.node = node
 
     def isolate(self, joystick: CommandSource, axis: ShapedAxis | None = None) -> None:
-        """Isolate the axis for a measurement: another joystick, nothing of other axes.
+        """Isolate the axis for a measurement: it gets another joystick, and no motion adds to it.
 
         Args:
-            joystick: where the joystick comes from now.
-            axis: what drives the valve now; by default the same as before.
+            joystick: source of its demand from now on.
+            axis: shaped axis from now on; by default it stays.
         """
         self._joystick = joystick
         self.alone = True
@@ -158,17 +160,18 @@ class AxisControl:
             self.axis, self.chooser = axis, None
 
     def copy_state(self, before: Self) -> None:
-        """Stay latched, and trip for what the same axis has not acted on: a reload is no reset."""
+        """Stay tripped, and trip for causes that are pending: a reload is no reset."""
         latched = before.axis
         if latched.state is State.TRIPPED:
             self.axis.restore(latched.state, latched.reason)
         self.stops.copy_state(before.stops)
 
     def adjust(self, config: AxisSection) -> None:
-        """Go on with another configuration of sway, filter and limits, all else as before.
+        """Continue with other sway data, filter and limits; all else stays.
 
         Args:
-            config: one whose filter runs at this period; with other limits only in neutral.
+            config: the new configuration. Its filter suits the period of this axis; its limits
+                differ in neutral only.
         """
         limits = self.limits(config)
         if limits != self.limits(self.bound.config):
@@ -180,10 +183,10 @@ class AxisControl:
         self.bound = replace(self.bound, config=config)
 
     def hold(self, last: int, now: int) -> Transition | None:
-        """Count missed deadlines, in which the last output was held.
+        """Count missed deadlines, in which the valve kept its last output.
 
         Returns:
-            The change of state, where the filter failed in them; else None.
+            The change of state, if the filter failed in them; else None.
         """
         passed = now // self.period_ticks - last // self.period_ticks
         return self.axis.hold(passed - 1) if passed > 1 else None
@@ -191,14 +194,15 @@ class AxisControl:
     def tick(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
     ) -> Transition | None:
-        """One step of the axis; a trip cause noted since the last one acts now.
+        """Find the setpoint of this tick, and put it into the message of the valve.
 
-        ``axis.advance`` has to follow.
+        A trip cause that was noted since the last tick acts now. The caller sends the frame, and
+        calls ``axis.propagate`` after it.
 
         Args:
             now_ns: monotonic time.
             emergency: the emergency stop, where there is one.
-            overrun: too many deadlines were missed lately.
+            overrun: whether too many deadlines were missed lately.
         """
         fault = None
         axis, joystick, stops = self.axis, self._joystick, self.stops
@@ -208,16 +212,16 @@ class AxisControl:
         command, self._releases = joystick.command(
             self._signal, now_ns, self._releases, trip, self._neutral_band
         )
-        # A release is more than a fault.
+        # Enable that is released in motion trips; a fault would only stop through the filter.
         if fault is not None and (command.enabled or axis.neutral):
             # Another switch that does not agree must not hide a release of the one to press. Where
             # that one is lost, its return is no press.
             let_go = not command.enabled and command.fault is None
             enabled = not (let_go and fault is Reason.ENABLE_OFF)
-            # The joystick stays known, where it is valid: it may be held against the run-on.
+            # The position of a valid joystick still counts: it may be held against the run-on.
             held, reset = command.command, command.reset
             command = CommandInput(held, fault=fault, enabled=enabled, reset=reset, trip=trip)
-        # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
+        # Late ticks spoil a filter. In bypass there is none, and the operator keeps control.
         late = Reason.LOOP_OVERRUN if overrun and axis.state is not State.BYPASS_ON else None
         if late and command.enabled and command.fault is None:
             command = command._replace(fault=late, bypass=False)
@@ -228,21 +232,21 @@ class AxisControl:
             commanded, damps, other = axis.output.commanded, self.damps, self.other
             shown = other.own_swing(now_ns) if other and damps else None
             axis.sensed.measure(value, scale, commanded=commanded, damps=damps, other=shown)
-        transition = axis.act(command, self.added, damps=self.damps)
+        transition = axis.command(command, self.added, damps=self.damps)
         try:
             self._put(self.valve.raw, axis.output.steps)
-        except Exception as error:  # nothing of it is left in the message
+        except Exception as error:  # neutral takes its place in the message
             old = axis.state if transition is None else transition.old
             transition = axis.invalidate(old, error)
             self.put(0)
         return transition
 
     def put(self, steps: int) -> None:
-        """Put a setpoint into the message of the valve."""
+        """Put a setpoint, in steps, into the message of the valve."""
         self.bound.valve.put(self.valve.raw, steps)
 
     def _scale(self, now_ns: int) -> float:
-        """Swing in rad of a model angle of 1, see ``SwayModel``, at the tip's full speed now."""
+        """Return the swing, rad, of model angle 1 (see ``SwayModel``) at the present full speed."""
         if self.radius is not None and (radius_m := self.radius.fresh(now_ns)):
             slewing = self.bound.config.slewing
             assert slewing is not None  # checked with the deployment
@@ -251,7 +255,7 @@ class AxisControl:
         return self.axis.sway.mode.angle_per_speed_rad * self._full_speed_m_s
 
     def own_swing(self, now_ns: int) -> float | None:
-        """Return the swing by its own motion as its sensor would show it, rad or rad/s."""
+        """Return the swing of its own motion as its sensor shows it, rad or rad/s, or None."""
         sensed = self.axis.sensed
         return sensed.own(self._scale(now_ns)) if sensed else None
 
@@ -263,12 +267,12 @@ class AxisControl:
 
     @property
     def reason(self) -> Reason:
-        """Why the axis is in its state; in ACTIVE also what holds it back from its demand."""
+        """Reason of its state; in ACTIVE also an end stop, or missing oil, that slows it."""
         axis = self.axis
         if axis.state is State.ACTIVE:
-            if abs(axis.command) < 1.0 and axis.command in axis.bounds:
+            if abs(axis.demand) < 1.0 and axis.demand in axis.bounds:
                 return Reason.END_STOP
-            if axis.command and axis.scale < 1.0:
+            if axis.demand and axis.scale < 1.0:
                 return Reason.FLOW_LIMITED
         return axis.reason
 
@@ -279,18 +283,18 @@ class AxisControl:
 
     @property
     def swing_length_m(self) -> float:
-        """Length of the pendulum as the sway sensor has shown it last; 0 before it has."""
+        """Pendulum length that the sway sensor has shown last, m; 0 before the first."""
         seen = self.axis.sensed.length.result if self.axis.sensed else None
         return seen.length_m if seen else 0.0
 
     @property
     def active_set(self) -> int:
-        """Number of the parameter set that is chosen; 0 where there is no choice."""
+        """Number of the parameter set in force; 0 where there is no choice."""
         return self.chooser.number if self.chooser else 0
 
 
 def _shaper(config: AxisSection, period_s: float, sway: SwayModel | None) -> Shaper:
-    """The filter of an axis, for the rate that its valve has."""
+    """Return the filter of an axis, for the rate of its valve."""
     rate = config.limits.slowest_per_s
     parameters = config.filter.parameters()
     return build_shaper(config.filter.kind, period_s, sway, valve_rate_per_s=rate, **parameters)

@@ -1,4 +1,4 @@
-"""Controller behind the gate, as every loop drives it, with sockets or without."""
+"""Controller behind its gate, as every loop drives it, with sockets or without."""
 
 from collections.abc import Iterator, Mapping
 
@@ -15,11 +15,11 @@ from canshaper.protocols.interface import MessageKey
 QUIET_NS = 1_000_000_000
 
 
-class Guarded:
-    """Passes frames to controller and gate, and returns the frames that both allow.
+class GatedController:
+    """Controller behind its gate: hands out only frames that the gate lets leave.
 
     Args:
-        controller: what computes the frames.
+        controller: controller that computes the frames.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -27,7 +27,7 @@ class Guarded:
         self._gate = Gate(record_of(controller.deployment))
         self._quiet_until_ns: dict[MessageKey, int] = {}
 
-    def carry_over(self, before: "Guarded") -> None:
+    def carry_over(self, before: "GatedController") -> None:
         """Continue from the state before a reload; see ``Gate.carry_over``."""
         buses = self._controller.deployment.config.buses
         open_before = before._controller.deployment.config.buses.values()
@@ -35,7 +35,7 @@ class Guarded:
         self._gate.carry_over(before._gate, reopened)
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Take a frame from a bus, see ``Controller``; it counts for the next frame out."""
+        """Give a frame from a bus to gate and controller; see ``Controller.receive``."""
         message = self._gate.receive(frame[:3], frame[3], now_ns)
         passed = self._controller.receive(frame, now_ns)
         if message is not None and message.of.protection.known:
@@ -60,7 +60,7 @@ class Guarded:
         self._controller.stalled()
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """Run one tick, and yield the frames to send now; see ``Controller``."""
+        """Run one tick, and yield the frames to send now; see ``Controller.tick``."""
         self._gate.tick(now_ns, missed)
         leaving = self._gate.leaving
         for frame in self._controller.tick(now_ns, missed):
@@ -71,14 +71,14 @@ class Guarded:
                 yield neutral
 
     def passes(self, frame: Frame, now_ns: int) -> bool:
-        """Whether a frame that is not one of a tick may leave."""
+        """Return whether a frame that no tick has made may leave; log a refusal."""
         why = self._gate.leaving(frame[:3], frame[3])
         if why and self._loud(frame, now_ns):
             self._controller.events.append(RefusalEvent(frame, why))
         return not why
 
     def set(self, values: Mapping[str, object]) -> None:
-        """Take numbers that were changed by hand; each stays in the range of the file."""
+        """Give the gate the numbers that ``Adjuster`` has changed, by their keys."""
         for key, value in values.items():
             self._gate.set(key, float(value))  # type: ignore[arg-type]
 
@@ -88,14 +88,14 @@ class Guarded:
         self._controller.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a valve frame that comes too late moves a valve, and so must not leave."""
+        """Return whether a late valve frame moves a valve, and so must not leave."""
         withheld = self._controller.withhold(frame)
         if withheld:
             self._gate.withheld(frame[:3])
         return withheld
 
     def neutral_frames(self) -> list[Frame]:
-        """Return a neutral frame for every valve, the last frames sent; log a refused one."""
+        """Return the neutral frames to send last; log those that the gate refuses."""
         passed = []
         for frame in self._controller.neutral_frames():
             if why := self._gate.last(frame[:3], frame[3]):
@@ -105,7 +105,7 @@ class Guarded:
         return passed
 
     def _compare(self, message: Received, frame: Frame, now_ns: int) -> None:
-        """Compare what two decoders read in a joystick's frame; its axes stop if they disagree."""
+        """Stop each axis whose demand gate and codec decode differently from this frame."""
         joystick, axes = self._controller.joysticks[message.of.name], message.axes
         wrong = axes if message.good_ns != joystick.received_ns else []
         if not wrong and message.good_ns == now_ns:
@@ -121,7 +121,7 @@ class Guarded:
                 self._controller.events.append(event)
 
     def _loud(self, frame: Frame, now_ns: int) -> bool:
-        """Whether a message may be logged now; it is then quiet for ``QUIET_NS``."""
+        """Return whether an event of this message is logged: one in ``QUIET_NS``."""
         key = frame[:3]
         loud = now_ns >= self._quiet_until_ns.get(key, 0)
         if loud:
@@ -129,7 +129,14 @@ class Guarded:
         return loud
 
     def _instead(self, frame: Frame, why: str, now_ns: int, of: bytes | None) -> Frame | None:
-        """Neutral in the place of a frame that is refused; silence where even that is."""
+        """Return a neutral frame in place of a refused one, or None if that is refused too.
+
+        Args:
+            frame: the refused frame.
+            why: why the gate refuses it.
+            now_ns: monotonic time.
+            of: data of the joystick's frame that a gateway was to pass on; None for a tick's frame.
+        """
         if self._loud(frame, now_ns):
             self._controller.events.append(RefusalEvent(frame, why))
         key = frame[:3]
@@ -143,7 +150,7 @@ class Guarded:
 
 
 def _same(demand: float | None, command: object) -> bool:
-    """Whether two decoders agree, also when both say that there is no demand."""
+    """Return whether both decoders found the same demand, or both found none."""
     if not isinstance(command, float) or demand is None:
         return not isinstance(command, float) and demand is None
     return abs(demand - command) <= EPSILON

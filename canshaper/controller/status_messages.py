@@ -1,4 +1,4 @@
-"""Status messages: of every axis, of the service, and where the tip of a crane still goes."""
+"""Status messages of axes, aim points and service; events of the sway sensors."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping
@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.message import Sender
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
-from canshaper.controller.runner import AxisControl
 from canshaper.controller.valve_messages import Counters
 from canshaper.machine.deployment import BoundMotion, Deployment
 from canshaper.protocols.interface import MessageKey
-from canshaper.shaping.demands import RunOn
+from canshaper.shaping.demand_bounds import RunOn
 from canshaper.shaping.states import State, Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
@@ -26,21 +26,21 @@ SHAPED = (State.ACTIVE, State.STOPPING)
 
 
 class AimPoint:
-    """Way that the tip of a crane still goes if its joysticks are let go now.
+    """Travel of a crane's tip that is still to come if its joysticks are released now.
 
-    That is what the filters still ask for, what the valves lag behind, and the way back from where
-    the motion of both axes has moved the tip. It is not known while a filter still holds demands of
-    both directions, after a reversal for as long as its response, nor while another set is in force
-    than the axis' own.
+    It is the sum of the run-on of the filters, the lag of the valves, and the way back of what the
+    two-axis motion has added. It is not known while a filter still holds demands of both
+    directions, for as long as its response after a reversal, nor while an axis has another
+    parameter set than its own.
 
     Args:
-        bound: the motion of both axes; it has a message for this.
+        bound: the two-axis motion; it has a message for the aim point.
         axes: axes of the machine by name.
 
     Attributes:
-        codec: of its message, which is sent every so many ``ticks``.
-        slew_deg: angle that the crane still turns; 0 where it is not known.
-        radius_m: way of the tip out or in; 0 where it is not known.
+        codec, ticks: codec of the message, and the ticks from one to the next.
+        slew_deg: angle that the crane still turns, degrees; 0 while it is not known.
+        radius_m: way of the tip out (positive) or in; 0 while it is not known.
         known: whether both are known.
     """
 
@@ -53,7 +53,7 @@ class AimPoint:
         self.known = True
 
     def update(self) -> None:
-        """Find it by the state of both axes now."""
+        """Compute the aim point from the present state of both axes."""
         slew, near_far = map(_travel, (self._slew, self._near_far), self._run_on)
         slewing, sway = self._slew.bound.config.slewing, self._near_far.bound.config.sway
         assert slewing and sway  # checked with the deployment
@@ -62,14 +62,14 @@ class AimPoint:
         self.known = slew is not None and near_far is not None
 
 
-def _travel(runner: AxisControl, run_on: RunOn) -> float | None:
-    """Travel of an axis after a release, full speed times seconds; None where it is not known."""
+def _travel(control: AxisControl, run_on: RunOn) -> float | None:
+    """Return the travel after a release, full speed times seconds; None if it is not known."""
     back, ahead = 0.0, 0.0
-    if runner.axis.state in SHAPED:
+    if control.axis.state in SHAPED:
         back, ahead = run_on.travel()
-    if (back and ahead) or runner.active_set:
+    if (back and ahead) or control.active_set:
         return None
-    return back + ahead + VALVE_LAG_S * runner.axis.sent - runner.displaced
+    return back + ahead + VALVE_LAG_S * control.axis.output.setpoint - control.displaced
 
 
 class StatusMessages:
@@ -78,10 +78,10 @@ class StatusMessages:
     Args:
         deployment: the machine.
         axes: its axes by name.
-        senders: what sends each of its messages.
+        senders: senders of its messages.
 
     Attributes:
-        aims: aim points of its cranes that are sent.
+        aims: the aim points that are sent.
     """
 
     def __init__(
@@ -102,17 +102,17 @@ class StatusMessages:
     def frames(
         self, changed: Collection[AxisControl], counters: Counters, last: int, now: int
     ) -> Iterator[Frame]:
-        """Yield the status of the axes that have changed or are due, of cranes and service.
+        """Yield the status of axes that have changed or are due, of aim points, of the service.
 
         Args:
             changed: axes whose state has just changed.
-            counters: those of the service.
+            counters: counts for the status of the service.
             last: number of the deadline of the tick before.
             now: number of this one.
         """
-        for runner, ticks, status, sender in self._axes:
-            if runner in changed or now // ticks > last // ticks:
-                yield sender.frame(status.values(runner))
+        for control, ticks, status, sender in self._axes:
+            if control in changed or now // ticks > last // ticks:
+                yield sender.frame(status.values(control))
         for aim in self.aims:
             if now // aim.ticks > last // aim.ticks:
                 aim.update()
@@ -139,36 +139,37 @@ class SensorReport:
 
     Args:
         name: name of the axis.
-        runner: the axis.
+        control: the axis.
     """
 
-    def __init__(self, name: str, runner: AxisControl) -> None:
-        self._name, self._runner = name, runner
+    def __init__(self, name: str, control: AxisControl) -> None:
+        self._name, self._control = name, control
         self._trust = Trust.NO_DATA
         self._length: SwingLength | None = None
         self._reported_m = 0.0
 
     def events(self) -> Iterator[SwaySensorEvent | SwingLengthEvent]:
         """Yield changes since the last call: trust state of the sensor, pendulum length."""
-        trust = self._runner.trust
+        trust = self._control.trust
         if trust is not self._trust:
             self._trust = trust
             yield SwaySensorEvent(self._name, trust)
-        sensed = self._runner.axis.sensed
+        sensed = self._control.axis.sensed
         if sensed is not None and (length := sensed.length.result) is not self._length:
             assert length is not None  # one that was measured stays
             self._length = length
-            sway = self._runner.bound.config.sway
+            sway = self._control.bound.config.sway
             assert sway is not None  # checked with the deployment
             if self._is_news(length, sway.mode()):
                 yield SwingLengthEvent(self._name, length, sway)
 
     def _is_news(self, length: "SwingLength", mode: SwayMode) -> bool:
-        """Whether the grapple swings by another length than was reported last, or is in the file.
+        """Return whether the length differs from the last reported one, or else from the file.
 
-        At the load of a breakpoint nothing is news: the key to report is not the one in force.
+        With the parameter set of a load nothing is news: the report would name a key of the file
+        that is not in force.
         """
-        model = self._runner.axis.sway
+        model = self._control.axis.sway
         assert model is not None  # of an axis with a sensor
         if model.mode != mode:
             return False

@@ -1,83 +1,83 @@
-"""Demands of axes before they act: end stops and oil bound them, filters follow their rope."""
+"""Measured values that act on the axes ahead of each tick: end stops, rope length, shared oil."""
 
 from collections.abc import Iterator, Mapping
 
 from canshaper.config.limits import Hydraulics
+from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.events import ValueEvent
-from canshaper.controller.runner import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import Value
-from canshaper.shaping.demands import UNBOUNDED, EndStops, FlowBudget, bounds
+from canshaper.shaping.demand_bounds import UNBOUNDED, EndStops, FlowBudget, bounds
 from canshaper.shaping.limits import within
 from canshaper.shaping.states import Lost, Reason, State
 from canshaper.shaping.sway import SwayMode
 
 
 class AxisEnds:
-    """Bounds the demands of an axis before it acts.
+    """Bounds the demand of an axis ahead of its end stops.
 
     Args:
-        runner: the axis; it has ends.
+        control: the axis, whose limits name its ends.
         position: its measured position.
     """
 
-    __slots__ = ("_known", "_position", "_run_on", "_runner", "_stops")
+    __slots__ = ("_control", "_known", "_position", "_run_on", "_stops")
 
-    def __init__(self, runner: AxisControl, position: Value) -> None:
-        config = runner.bound.config.limits.ends
+    def __init__(self, control: AxisControl, position: Value) -> None:
+        config = control.bound.config.limits.ends
         assert config is not None
         margin, lag_s = config.margin, config.lag_ms / 1000.0
-        self._runner, self._position = runner, position
+        self._control, self._position = control, position
         self._stops = EndStops(
             config.lowest + margin, config.highest - margin, config.full_speed, lag_s
         )
-        self._run_on = runner.follow_run_on()
+        self._run_on = control.follow_run_on()
         self._known = True
 
     def step(self, now_ns: int) -> ValueEvent | None:
         """Bound the demand of this tick.
 
-        Without a position nothing is bounded: the axis is as if it had no ends.
+        While the position is not known, the axis moves as if it had no end stops.
 
         Args:
             now_ns: monotonic time.
 
         Returns:
-            Whether the position is known, where that has changed.
+            The event, if the position has become known or was lost; else None.
         """
-        runner, position = self._runner, self._position.fresh(now_ns)
-        axis = runner.axis
+        control, position = self._control, self._position.fresh(now_ns)
+        axis = control.axis
         if position is None:
-            runner.room = axis.bounds = UNBOUNDED
+            control.room = axis.bounds = UNBOUNDED
         else:
-            runner.room = self._stops.room(position, axis.sent, self._run_on.travel())
-            axis.bounds = bounds(runner.room, runner.displaced)
+            control.room = self._stops.room(position, axis.output.setpoint, self._run_on.travel())
+            axis.bounds = bounds(control.room, control.displaced)
         known = position is not None
         if known is self._known:
             return None
         self._known = known
-        return ValueEvent(f"axis={runner.bound.name} ends", "known" if known else "lost")
+        return ValueEvent(f"axis={control.bound.name} ends", "known" if known else "lost")
 
 
-# No hoist is faster. A message may come once in half a second, and round what it says.
+# No hoist is faster. A message may come only every half second, and round its value.
 MOST_M_S = 3.0
 MOST_SILENT_S = 0.5
 ROUNDING_M = 0.3
-# A length that has jumped counts again when it has not for so long.
+# A length counts again when it has not jumped for this time.
 SETTLES_S = 1.0
-# Fastest change of the length that filters follow in motion, of itself in a second.
+# Fastest change of the length that filters follow in motion, as a part of the length a second.
 MOST_PER_S = 1.0
 
 
 class RopeLength:
     """Length of a rope that the filters of an axis follow.
 
-    A signal that is lost or jumps makes no jump of the length.
+    The length does not jump where its signal is lost or jumps.
 
     Args:
-        lowest_m: shortest rope that they know; a shorter one counts as this.
-        highest_m: longest one. Until a length is known this is it.
-        lost: what holds while the length is not known.
+        lowest_m: shortest rope that the filters know; a shorter one counts as this.
+        highest_m: longest one. It counts until a length is known.
+        lost: reaction while the length is not known.
 
     Attributes:
         length_m: the length now.
@@ -88,22 +88,22 @@ class RopeLength:
         self._lowest, self._highest, self._lost = lowest_m, highest_m, lost
         self.length_m = highest_m
         self.state = "known"
-        self._measured: float | None = None  # what was measured last
-        self._since_s = 0.0  # since that has changed
+        self._measured: float | None = None  # last measured length
+        self._since_s = 0.0  # time since it changed
         self._settles_s = 0.0
 
     @property
     def stops(self) -> bool:
-        """Whether the axis may not move with this length."""
+        """Whether the axis must not move, because the length is not known."""
         return self._lost == "neutral" and self.state != "known"
 
     def step(self, measured_m: float | None, elapsed_s: float, *, rests: bool) -> bool:
-        """Take what is measured now; return whether the state has changed.
+        """Take the measured length; return whether the state has changed.
 
         Args:
-            measured_m: the length; None where none is known. None is 0 or less.
-            elapsed_s: since the last step.
-            rests: the axis is at rest, so a change of its filter moves nothing.
+            measured_m: the length, m; None where it is not known. 0 or less is not known either.
+            elapsed_s: time since the last step, seconds.
+            rests: whether the axis is at rest, so that its filter may change at once.
         """
         state, before = self._state(measured_m, elapsed_s), self.state
         self.state = state
@@ -134,30 +134,31 @@ class RopeLength:
 
 
 class RopeControl:
-    """Lets an axis follow its rope.
+    """Lets sway model and filter of an axis follow the measured length of its rope.
 
     Args:
-        name: of the axis.
-        runner: the axis, before it has run; what drives its valve for a measurement follows none.
+        name: name of the axis.
+        control: the axis, before its first tick. Where a measurement replaces ``control.axis``, the
+            replacement follows no rope.
         value: the measured length.
     """
 
-    def __init__(self, name: str, runner: AxisControl, value: Value) -> None:
-        sway = runner.bound.config.sway
+    def __init__(self, name: str, control: AxisControl, value: Value) -> None:
+        sway = control.bound.config.sway
         assert sway is not None and sway.length is not None  # checked with the deployment
         config, mode, ends = sway.length, sway.mode(), sway.ends()
-        self._name, self._axis, self._value = name, runner.axis, value
+        self._name, self._axis, self._value = name, control.axis, value
         self._last_ns: int | None = None
         self._offset_m, self._damping_ratio = config.offset_m, mode.damping_ratio
         self._period_s = mode.period_s
         self._rope = RopeLength(config.lowest_m, config.highest_m, config.lost)
         self._followed_m = 0.0
         self._axis.prepare(*(end.period_s / self._period_s for end in ends))
-        runner.stops.interlocks.append(self._objection)
+        control.stops.interlocks.append(self._objection)
         self._follow()
 
     def step(self, now_ns: int) -> ValueEvent | None:
-        """Follow the rope; return whether its length is known, where that has changed."""
+        """Follow the rope; return the event if its length has become known or was lost."""
         rope, measured = self._rope, self._value.fresh(now_ns)
         elapsed_s = 1e-9 * (now_ns - self._last_ns) if self._last_ns is not None else 0.0
         self._last_ns = now_ns
@@ -177,20 +178,20 @@ class RopeControl:
         return Reason.LENGTH_LOST if self._rope.stops else None
 
 
-# States in which a deflected joystick moves the axis, in this tick or already.
+# States in which a deflected joystick moves the axis, at the latest in this tick.
 DRIVEN = (State.READY, State.ACTIVE, State.BYPASS_ON)
-# So long there was enough oil before that is reported.
+# Time for which the oil has to be enough before that is reported.
 ENOUGH_S = 5.0
 
 
 class SharedFlow:
-    """Scales the demands of all axes before any of them acts.
+    """Scales the demands of all axes by one factor, to the oil that the pump delivers.
 
     Args:
-        config: the oil, and what each axis takes of it.
+        config: flow of the pump, and the share of it that each axis takes.
         axes: the axes by name.
         joysticks: the joysticks by name.
-        others: measured flow of functions that are not ours, where there is one.
+        others: measured flow of functions that we do not drive, or None.
         tick_s: time between two ticks of the controller.
     """
 
@@ -210,14 +211,14 @@ class SharedFlow:
         self._known = True
         self._budget = FlowBudget(shares, tick_s)
         self._enough = round(ENOUGH_S / tick_s)
-        self._ticks = self._enough  # since it was scaled last
+        self._ticks = self._enough  # since the demands were last scaled
 
     def step(self, now_ns: int, ticks: int) -> Iterator[ValueEvent]:
-        """Scale the demands of this tick, and yield what is to be reported.
+        """Scale the demands of this tick, and yield the events for the log.
 
         Args:
             now_ns: monotonic time.
-            ticks: that have passed; more than 1 where deadlines were missed.
+            ticks: ticks that have passed; more than 1 where deadlines were missed.
         """
         config = self._config
         flow = config.flow - config.others
@@ -229,18 +230,18 @@ class SharedFlow:
             if value is not None:
                 flow = config.flow - max(value / measured.full, 0.0)
         demands, outputs = [], []
-        for runner, commands in self._axes:
-            command = runner.bound.config.command
+        for control, commands in self._axes:
+            command = control.bound.config.command
             demand = commands.get(command.signal, 0.0)
-            if isinstance(demand, Reason) or runner.axis.state not in DRIVEN:
+            if isinstance(demand, Reason) or control.axis.state not in DRIVEN:
                 demand = 0.0
-            if runner.axis.state is not State.BYPASS_ON:
-                demand = within(demand, *runner.axis.bounds, 0.0)
+            if control.axis.state is not State.BYPASS_ON:
+                demand = within(demand, *control.axis.bounds, 0.0)
             demands.append(demand if abs(demand) > command.neutral_pct / 100.0 else 0.0)
-            outputs.append(runner.axis.sent)
+            outputs.append(control.axis.output.setpoint)
         scale = self._budget.step(flow, demands, outputs, ticks)
-        for runner, _ in self._axes:
-            runner.axis.scale = scale
+        for control, _ in self._axes:
+            control.axis.scale = scale
         before = self._ticks
         self._ticks = 0 if scale < 1.0 else before + ticks
         if before >= self._enough > self._ticks or before < self._enough <= self._ticks:
