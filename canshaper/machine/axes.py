@@ -42,10 +42,10 @@ def _bind_axis(
     place: Place = ("axes", name)
     add, problems = lookup.diagnostics.add, lookup.diagnostics.problems
     before, joystick = len(problems), axis.command.joystick
-    if joystick not in lookup.config.joysticks:
-        names = ", ".join(lookup.config.joysticks)
-        text = f"expected a joystick, got {joystick!r}; there are {names}"
-        add((*place, "command", "joystick"), text)
+    joysticks = lookup.config.joysticks
+    lookup.diagnostics.check_name(
+        (*place, "command", "joystick"), "a joystick", joystick, joysticks
+    )
     valve = bind_valve(lookup, shared_valves, (*place, "valve"), axis.valve, axis.command)
     status, status_ticks = bind_status(lookup, (*place, "status"), axis.status, AXIS_STATUS)
     if valve is None or len(problems) > before:
