@@ -65,11 +65,6 @@ def test_outside_of_j1939_every_bit_of_an_id_counts(machine: Machine) -> None:
         ),
         (
             CANOPEN,
-            "joysticks.right.node: expected a node of bus crane, got 'wright'; there are left,"
-            " right, slew, near_far, lift",
-        ),
-        (
-            CANOPEN,
             [(" 1696 ", " 1586 ")],
             "axes.slew.status.message: SlewStatus: expected the id of a PDO, got 0x632, which is"
             " one of SDO in CANopen",
