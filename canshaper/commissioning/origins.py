@@ -18,7 +18,7 @@ from canshaper.edit.edit import Change, FileValue, change, note, of_limits, sect
 from canshaper.errors import CutOffError, UsageError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 from canshaper.machine.used_message import key_path
 from canshaper.recording.log import LogFile
 from canshaper.recording.tables import is_table

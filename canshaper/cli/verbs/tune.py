@@ -78,8 +78,8 @@ def tune(
     It prints the new filter next to that of the file, the swing left when the pendulum is up to
     30 % longer or shorter, the constraints that bound the optimum, and a verdict. It draws
     OUT/AXIS.png. An option that is not given has the value with which the file's filter was tuned.
-    Exit code 1 when more than half of the swing is left; 2 when the options exclude each other: the
-    error names them.
+    Exit code 1 when more than half of the swing is left; 2 when no filter meets all constraints:
+    the error names those that conflict.
 
     With --fleet it tunes all swinging axes together, as canshaper robust --fleet designs them,
     within the run-on of --max-run-on (2.25 s), and compares them with robust shapers of that
