@@ -1,9 +1,8 @@
 """Budgets of words, files and lines, so that one person can hold pages and code in the head.
 
 Each page can be read once, from top to bottom. A fact that is added takes the place of another one,
-or moves to the page that it belongs to: a reader of a page that only grows finds nothing on it, and
-two pages with one fact soon contradict each other. What a command writes into a page (tables
-between marks, output of ``canshaper``) is not counted: it grows with the program.
+or moves to the page that it belongs to: two pages with one fact soon contradict each other. What a
+command writes into a page (tables between marks, output of ``canshaper``) is not counted.
 
 Code that is added takes the place of other code, or says here why it may not. A room that only
 grows is no longer reviewed as a whole, and a test that repeats another one is read by no one.
@@ -46,7 +45,7 @@ BUDGET = {
     "docs/monitor.md": 375,
     "docs/realtime.md": 400,
     "docs/replay.md": 840,
-    "docs/safety.md": 2450,
+    "docs/safety.md": 2390,
     "docs/sensor.md": 930,
     "docs/service.md": 750,
     "docs/states.md": 290,
@@ -63,10 +62,7 @@ BUDGET = {
 # Lines of Python, and why so many.
 LINES = {
     "canshaper/gate": (2_100, "read in a day by someone who has never seen it"),
-    "canshaper/shaping": (
-        4_940,
-        "the method: filters, axis, motion, ends, observer of the sway",
-    ),
+    "canshaper/shaping": (4_940, "the method: filters, axis, motion, ends, observer of the sway"),
     "canshaper": (66_365, "a new ability takes the room of an old one"),
     "tests": (100_817, "one level for each behaviour"),
 }
