@@ -55,7 +55,7 @@ def faults(text: str) -> list[str]:
             wrong.append(f"no id: {entry}")
             continue
         ids.update(claim[1].split(", "))
-        tests = TEST.findall(entry + table.pop(claim[1], ""))
+        tests = TEST.findall(entry := entry + table.pop(claim[1], ""))
         if not tests and NONE not in entry:
             wrong.append(f"{claim[1]}: no test")
         wrong += [f"{claim[1]}: {f}::{part} is gone" for f, part in tests if not is_there(f, part)]
