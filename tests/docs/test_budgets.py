@@ -33,7 +33,7 @@ BUDGET = {
     "docs/comparison.md": 610,
     "docs/decisions.md": 860,
     "docs/deployment.md": 2245,
-    "docs/devices.md": 510,
+    "docs/devices.md": 430,
     "docs/doctor.md": 350,
     "docs/export.md": 560,
     "docs/glossary.md": 340,
