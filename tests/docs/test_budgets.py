@@ -45,7 +45,7 @@ BUDGET = {
     "docs/machines.md": 920,
     "docs/monitor.md": 350,
     "docs/realtime.md": 400,
-    "docs/replay.md": 810,
+    "docs/replay.md": 790,
     "docs/safety.md": 2481,
     "docs/sensor.md": 1180,
     "docs/service.md": 790,
