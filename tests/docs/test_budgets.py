@@ -50,7 +50,7 @@ BUDGET = {
     "docs/sensor.md": 1180,
     "docs/service.md": 790,
     "docs/states.md": 300,
-    "docs/studio.md": 660,
+    "docs/studio.md": 670,
     "docs/study.md": 333,
     "docs/testing.md": 560,
     "docs/topologies.md": 790,
