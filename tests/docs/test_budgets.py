@@ -33,7 +33,7 @@ BUDGET = {
     "docs/commission.md": 710,
     "docs/comparison.md": 590,
     "docs/decisions.md": 953,
-    "docs/deployment.md": 1830,
+    "docs/deployment.md": 1820,
     "docs/devices.md": 560,
     "docs/doctor.md": 420,
     "docs/export.md": 556,
