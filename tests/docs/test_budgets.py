@@ -39,7 +39,7 @@ BUDGET = {
     "docs/export.md": 556,
     "docs/glossary.md": 400,
     "docs/guide.md": 970,
-    "docs/identification.md": 560,
+    "docs/identification.md": 550,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
     "docs/machines.md": 920,
