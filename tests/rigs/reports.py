@@ -16,5 +16,6 @@ def report(
     active_set: int = 0,
 ) -> Any:
     """An axis with these values."""
-    axis = SimpleNamespace(state=state, command=command, sent=sent)
+    output = SimpleNamespace(setpoint=sent)
+    axis = SimpleNamespace(state=state, demand=command, output=output)
     return SimpleNamespace(axis=axis, reason=reason, sway_deg=sway_deg, active_set=active_set)
