@@ -53,7 +53,11 @@ class Objective(Section):
 
 
 def matrix(q: Sequence[float]) -> tuple[float, float, float]:
-    """Return (q11, q12, q22) of a Q given as one number, as its diagonal, or by rows."""
+    """Return (q11, q12, q22) of the weight Q of Eq. 15.
+
+    Args:
+        q: 1 number, of Q = q I; 2, the diagonal; or 4, the rows.
+    """
     return q[0], q[1] if len(q) == 4 else 0.0, q[-1]
 
 

@@ -130,7 +130,7 @@ class FilterSection(Section):
         return self
 
     @property
-    def runs_ahead(self) -> bool | None:
+    def runs_ahead(self) -> bool:
         """Whether the filter runs far ahead of the demand, see ``ShaperKind``."""
         return KINDS[self.kind].runs_ahead
 

@@ -16,13 +16,7 @@ from canshaper.shaping.demand_bounds import RunOn
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.states import (
-    CommandInput,
-    Reason,
-    State,
-    Transition,
-    Trust,
-)
+from canshaper.shaping.states import CommandInput, Reason, State, Transition, Trust
 from canshaper.shaping.sway import SwayModel
 
 if TYPE_CHECKING:
@@ -57,11 +51,7 @@ class AxisControl:
     """
 
     def __init__(
-        self,
-        bound: BoundAxis,
-        tick_s: float,
-        joystick: CommandSource,
-        valve: Sender,
+        self, bound: BoundAxis, tick_s: float, joystick: CommandSource, valve: Sender
     ) -> None:
         config = bound.config
         self.bound = bound
@@ -191,7 +181,7 @@ class AxisControl:
         passed = now // self.period_ticks - last // self.period_ticks
         return self.axis.hold(passed - 1) if passed > 1 else None
 
-    def tick(
+    def command(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
     ) -> Transition | None:
         """Find the setpoint of this tick, and put it into the message of the valve.

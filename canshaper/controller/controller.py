@@ -9,9 +9,9 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.couplings import Couplings
 from canshaper.controller.events import FeedbackEvent, StateEvent
-from canshaper.controller.machine_inputs import MachineInputs, parts, received_by
+from canshaper.controller.machine_inputs import MachineInputs, parts
 from canshaper.controller.status_messages import SensorReport, StatusMessages
-from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveOutputs
+from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveMessages
 from canshaper.inputs.input import Key, Part, carry_over
 from canshaper.inputs.stops import EnableGate
 from canshaper.machine.deployment import Deployment
@@ -67,14 +67,14 @@ class Controller:
             self._sensors[name] = SensorReport(name, self.axes[name])
         self._couplings = Couplings(deployment, self.axes, inputs, tick_s)
         self.motions = self._couplings.motions
-        self.inputs = received_by(inputs.bound)
+        self.inputs = inputs.by_key()
         self._sent, self._others = deployment.routing.sent, deployment.routing.others
         self._protocols = protocols(deployment, self.axes, inputs.joysticks, inputs.bound)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}
         for protocol in self._protocols:
             self.inputs |= protocol.inputs
             self._forwarding |= protocol.forwarding
-        self._outputs = ValveOutputs(self.axes, deployment.routing.valves, self._forwarding)
+        self._valves = ValveMessages(self.axes, deployment.routing.valves, self._forwarding)
         self._last = -1  # number of the last deadline
         self._overrun = OverrunDetector()
         self._stood_still = False
@@ -128,7 +128,7 @@ class Controller:
             fault = entry.receive(frame.data, arrived_ns)
         elif key in self._sent:  # a bus never hands back our own frames
             fault = FrameFault.SECOND_SENDER
-            self._outputs.foreign_sender(key, arrived_ns)
+            self._valves.foreign_sender(key, arrived_ns)
         elif (handler := self._handler(frame)) is not None:
             fault = handler.receive(frame, arrived_ns)
         elif key[1:] in self._others or any(one.usual(frame) for one in self._protocols):
@@ -186,10 +186,10 @@ class Controller:
         if self._couplings.any:
             self._couplings.step(now_ns, last, now, self.events)
         silent = self.silent_buses if self._protocols else NOWHERE
-        for name, control, message, rule in self._outputs.turns:
+        for name, control, message, rule in self._valves.turns:
             period = control.period_ticks
             if now // period - last // period:
-                transition = control.tick(now_ns, self._stop, overrun)
+                transition = control.command(now_ns, self._stop, overrun)
                 self.moves |= control.axis.output.steps != 0
                 if rule is not None:
                     if (own := rule.own(now_ns)) is not None:
@@ -276,16 +276,16 @@ class Controller:
         self.counters.add(FrameFault.SEND_FAILED)
         for protocol in self._protocols:
             protocol.send_failed(frame)
-        self._outputs.send_failed(frame[:3])
+        self._valves.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
         """Return whether a late valve frame moves a valve, and so must not leave."""
-        return self._outputs.withhold(frame)
+        return self._valves.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
         """Trip the axes of a valve frame that the gate has refused; see ``ValveMessages``."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
-        return self._outputs.refused(frame)
+        return self._valves.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve, to be sent last; see ``not_neutral``."""
@@ -295,6 +295,6 @@ class Controller:
                 protocol.leave()
             except Exception as error:
                 errors.append(error)
-        frames = self._outputs.neutral_frames(self.silent_buses, errors)
+        frames = self._valves.neutral_frames(self.silent_buses, errors)
         self.not_neutral = errors[0] if errors else None
         return frames

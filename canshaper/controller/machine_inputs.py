@@ -4,8 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from canshaper.codec.message import Sender
-from canshaper.config.crane import Radius
-from canshaper.config.limits import Ends, OtherFlow, RopeSection
+from canshaper.config.limits import Position
 from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.input import Key, MessageInput, Part, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
@@ -107,13 +106,7 @@ class MachineInputs:
         having = [self.joysticks[n] for n, one in config.joysticks.items() if one.next_profile]
         return ProfileButtons(having, profile_names(config)) if having else None
 
-    def _position(
-        self,
-        bound: BoundValue[Radius]
-        | BoundValue[Ends]
-        | BoundValue[OtherFlow]
-        | BoundValue[RopeSection],
-    ) -> Value:
+    def _position(self, bound: BoundValue[Position]) -> Value:
         if (message := self._positions.get(bound.key)) is None:
             message = self._positions[bound.key] = PositionInput(bound)
             self.bound.append((bound, message))
@@ -126,10 +119,10 @@ class MachineInputs:
         self.bound.append((bound, one))
         return one
 
-
-def received_by(bound: Iterable[BoundHandler]) -> dict[MessageKey, MessageInput]:
-    """Map each message that is known by its identifier to its input."""
-    return {key: one for message, one in bound if not message.any_source for key in message.keys}
+    def by_key(self) -> dict[MessageKey, MessageInput]:
+        """Return the receiver of each message that has an exact identifier."""
+        exact = ((message, one) for message, one in self.bound if not message.any_source)
+        return {key: one for message, one in exact for key in message.keys}
 
 
 def parts(

@@ -13,7 +13,7 @@ Turn = tuple[str, AxisControl, Sender | None, ForwardingRule | None]
 """Name and control of an axis; for the last axis of a message its sender and forwarding rule."""
 
 
-class ValveOutputs:
+class ValveMessages:
     """All valve messages of a machine, each with the axes in it.
 
     Args:

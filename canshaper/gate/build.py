@@ -20,14 +20,10 @@ from canshaper.gate.signals import (
     stick_of,
 )
 
-SPREADING = ("off", "first_order", "s_curve", "zv", "zvd", "ei", "two_mode")
-"""Filters that only spread the demand over time."""
-DAMPING = ("gff", "robust")
-"""Filters that run farther ahead of the demand. A kind of another package says whether it does."""
 SLACK, SWING_SLACK = 0.4, 1.5
-"""Slack of ``SPREADING`` and ``DAMPING`` filters, s of full speed: taps at the swing's period add
-up, which a G_FF needs 1.04 s to damp, a robust shaper .9 s after a bypass (gate/test_distance.py).
-For a swing of more than 3 s the slack is half a period."""
+"""Slack of a filter that only spreads the demand, and of one that runs ahead of it, s of full
+speed: taps at the swing's period add up, which a G_FF needs 1.04 s to damp, a robust shaper .9 s
+after a bypass (gate/test_distance.py). For a swing of more than 3 s it is half a period."""
 # J1939-21, -81 and -73: requests, address claims, acknowledgements, active faults, transport.
 REQUEST, CLAIMED, FREE = 0x18EAFF00, 0x18EEFF00, 0xFE
 SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
@@ -166,11 +162,6 @@ def _axis(bound: Any, deployment: Any) -> Axis:
     control, start = deployment.config.control, f"axes.{bound.name}."
     curve, tip = (limits.curve_command_pct, limits.curve_speed_pct), config.slewing
     ranges = (control.adjustable if control else {}).items()
-    try:
-        slack = slack_of(config)
-    except ValueError as error:
-        place = ("axes", bound.name, "filter", "kind")
-        raise ValueError(str(deployment.source.problem(place, str(error)))) from None
     return Axis(
         name=bound.name,
         joystick=config.command.joystick,
@@ -190,7 +181,7 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         faster=limits.allow_faster,
         reverse=limits.allow_reverse,
         reversal=0 if limits.reversal == "stop" else round(limits.reversal_s / period_s),
-        slack=slack,
+        slack=slack_of(config),
         forwarded=forwarded,
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
         stop_m=limits.stop_distance_m or math.inf,
@@ -200,21 +191,13 @@ def _axis(bound: Any, deployment: Any) -> Axis:
 
 
 def slack_of(config: Any) -> float:
-    """Return how far a filter may run ahead of the demand, full speed times seconds.
-
-    Raises:
-        ValueError: neither the gate nor the filter's package says whether it runs ahead.
-    """
-    kind = config.filter.kind
-    ahead = kind in DAMPING if kind in SPREADING + DAMPING else config.filter.runs_ahead
-    if ahead is None:
-        raise ValueError(f"expected {', '.join(SPREADING + DAMPING)} or runs_ahead, got {kind}")
+    """Return how far a filter may run ahead of the demand, full speed times seconds."""
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
     one = not (config.gain_schedule or config.profiles or config.sway_sensor)
     swings = [config.sway.mode(), *config.sway.ends()] if config.sway else []
     slow = max([SWING_SLACK, *(0.5 * swing.period_s for swing in swings)])
-    return SLACK if one and not ahead else float(slow)
+    return SLACK if one and not config.filter.runs_ahead else float(slow)
 
 
 def _forwarded(axis: Any, deployment: Any) -> bool:

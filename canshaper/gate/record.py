@@ -148,20 +148,32 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Valve:
-    """A valve message: its bits apart from the commands. In masks of bits byte 0 is the lowest."""
+    """A valve message: all of its bits but the commands. In masks byte 0 is the lowest.
+
+    Attributes:
+        length: number of bytes.
+        axes: names of the axes whose commands it carries.
+        fixed: mask of the bits that never change.
+        fixed_value: value of these bits.
+        ours: mask of the bits that may differ from the joystick's frame, in a gateway.
+        protection: counter and checksum.
+        words: control words of CiA 408, with the values that they may have.
+        own: signals of a frame of our own in place of a joystick's, with the values that they may
+            have.
+        enable: the enabling switch in such a frame, which may be 1 only while it is held.
+        group: mask of its J1939 group, which no other address may send; 0 for none.
+    """
 
     length: int
     axes: tuple[str, ...]
-    fixed: int  # mask of the bits that never change
-    fixed_value: int  # value of these bits
-    ours: int  # mask of the bits that may differ from the joystick's frame (in a gateway)
+    fixed: int
+    fixed_value: int
+    ours: int
     protection: Protection
-    words: tuple[tuple[Field, frozenset[int]], ...] = ()  # control words of CiA 408, their values
-    # For a frame of our own in place of a joystick's: signals with the values that they may have,
-    # and the enabling switch, which may be 1 only while it is held.
+    words: tuple[tuple[Field, frozenset[int]], ...] = ()
     own: tuple[tuple[Field, frozenset[float]], ...] = ()
     enable: Field | None = None
-    group: int = 0  # mask of its J1939 group, which no other address may send; 0 for none
+    group: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,7 +93,15 @@ def stick_of(message: Any, command: Any, in_dbc: Any) -> Stick:
 
 
 def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
-    """Return the reader of a command; ``joystick``: section command if its frame carries it."""
+    """Return the reader of the command in the valve frames of an axis.
+
+    Args:
+        message: the valve message, of cantools.
+        valve: section ``valve`` of the axis.
+        joystick: section ``command`` of the axis, if a gateway writes the command into the frames
+            of its joystick; else None.
+        in_dbc: the valve message as its DBC file has it, which gives the scale.
+    """
     names: tuple[str, ...] = ()
     signs: dict[tuple[float, ...], int] = {}
     if one := valve.direction:

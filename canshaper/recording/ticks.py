@@ -209,7 +209,7 @@ class Stepper:
         self._rows = rows_of(controller)
 
     def step(self, tick: Tick) -> Result:
-        """Run one tick, as the daemon does."""
+        """Give the frames of a tick to the controller, run it, and return what it sends."""
         controller, port = self._controller, self._port
         first = self._gated.neutral_frames() if tick.number == 0 else []
         port.begin(tick, self._standstill.last_ns)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from canshaper.errors import raised
-from canshaper.shaping.limits import OutputLimits, within
+from canshaper.shaping.limits import FILTER_OUTPUT, OutputLimits, within
 from canshaper.shaping.moving_axis import AddedTime
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.shapers.kind import Shaper, spreads
@@ -154,7 +154,8 @@ class ShapedAxis:
             reference = self._transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
             if adds and damps_now and not held:
                 largest, (low, high) = stage.largest_added, self.bounds
-                damping = within(reference, max(low, -largest), min(high, largest), 0.0)
+                low, high = max(low, -largest), min(high, largest)
+                damping = within(reference, low, high, 0.0, FILTER_OUTPUT)
 
             if state in MOVING:
                 stage.drive(held, demand, reference, path, damping, sensor_damps=sensor_damps)

@@ -82,6 +82,9 @@ def _between(value: float, xs: Sequence[float], ys: Sequence[float], high: int) 
     return y0 + (value - x0) * (y1 - y0) / (x1 - x0)
 
 
+FILTER_OUTPUT = "filter output"
+
+
 @dataclass(frozen=True, slots=True)
 class OutputLimits:
     """Limits of one axis.
@@ -204,18 +207,20 @@ def allowed_range(
     return (-maximum if low < -maximum else low), (maximum if high > maximum else high)
 
 
-def within(velocity: float, low: float, high: float, minimum: float) -> float:
+def within(
+    velocity: float, low: float, high: float, minimum: float, name: str = "velocity"
+) -> float:
     """Clamp to [low, high]; below ``minimum`` in magnitude the result is zero.
 
     Raises:
-        ValueError: the velocity is not a number; a filter gone wrong must not reach a valve.
+        ValueError: the velocity, called by this name, is not finite: it must not reach a valve.
     """
     if low <= velocity <= high:
         clipped = velocity
     elif math.isfinite(velocity):
         clipped = low if velocity < low else high
     else:
-        raise ValueError(f"filter output is {velocity}")
+        raise ValueError(f"{name} is {velocity}")
     return clipped if abs(clipped) >= minimum else 0.0
 
 

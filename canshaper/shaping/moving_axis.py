@@ -161,12 +161,7 @@ class AddedTime:
         self._left = self._ticks
 
     def allows(
-        self,
-        asked: bool,
-        commanded: bool,
-        moved: bool,
-        deflected: bool = False,
-        ticks: int = 1,
+        self, asked: bool, commanded: bool, moved: bool, deflected: bool = False, ticks: int = 1
     ) -> bool:
         """Count time, and return whether the motion may move the axis now.
 

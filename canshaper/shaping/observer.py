@@ -110,7 +110,7 @@ class LateModel:
 
     @property
     def rate(self) -> float:
-        """Normalised rate of the angle."""
+        """Rate of ``angle``, in the unit of ``SwayModel.rate``."""
         return self.sway.rate + self.speed
 
     def restart(self) -> None:

@@ -28,6 +28,7 @@ import math
 from dataclasses import dataclass
 
 from canshaper.shaping.limits import (
+    FILTER_OUTPUT,
     OutputLimits,
     RecentDemand,
     allowed_range,
@@ -150,7 +151,7 @@ class OutputStage:
         recent.add(demand)
         output.commanded = recent.low != 0.0 or recent.high != 0.0
         low, high = allowed_range(recent.low, recent.high, limits)
-        own = within(reference, low, high, limits.minimum)
+        own = within(reference, low, high, limits.minimum, FILTER_OUTPUT)
 
         # 2. Small strokes
         if self._spreads:

@@ -41,8 +41,6 @@ def with_entry_points(
                 )
             if kind.name in known:
                 raise ValueError(f"the kind {kind.name!r} is there already")
-            if kind.runs_ahead is None:
-                raise ValueError("expected runs_ahead=True or False for the gate, got neither")
         except Exception as error:  # a module of another package may raise anything
             text = " ".join(f"{type(error).__name__}: {error}".split())
             faults.append((f"package {package}", f"entry point {point.name} of {GROUP}: {text}"))
@@ -80,7 +78,7 @@ def build_shaper(
         The filter, in neutral.
 
     Examples:
-        A joystick that is moved at once, through the mean of the last 0.1 s:
+        A joystick that is moved at once, through a lag with a time constant of 0.1 s:
 
         >>> from canshaper import SwayMode, SwayModel, build_shaper
         >>> sway = SwayModel(SwayMode.from_period(2.4, 0.02), tick_s=0.02)

@@ -37,14 +37,7 @@ the edge of a press counts; and how long STOPPING has lasted.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from canshaper.shaping.states import (
-    MOVING,
-    REACTION_OF,
-    CommandInput,
-    Reaction,
-    Reason,
-    State,
-)
+from canshaper.shaping.states import MOVING, REACTION_OF, CommandInput, Reaction, Reason, State
 
 # Python finds a name of the module ten times as fast as a member of an enumeration.
 NEUTRAL_WAIT, READY, ACTIVE, BYPASS_ON, STOPPING, TRIPPED = State

@@ -26,6 +26,7 @@ OFF = ShaperKind(
     "No shaping: output limits only.",
     lambda _tick_s: Off(),
     lambda _mode, _tick_s: {"off": {}},
+    runs_ahead=False,
 )
 
 

@@ -81,7 +81,7 @@ class NumbersChannel:
                 refuse(str(error))
 
     def news(self) -> dict[str, Any]:
-        """Return the entries that the page has not shown yet."""
+        """Return, and forget, the entries that the page has not been sent yet."""
         news: dict[str, Any] = {}
         if self._version != self._numbers.version:
             self._version = self._numbers.version

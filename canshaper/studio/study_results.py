@@ -58,7 +58,7 @@ def log_s(rows: Rows) -> float:
 
 
 def person_table(rows: Rows) -> Table:
-    """Return a table with a row for each setting of a person, by letter."""
+    """Return a table of what a person did, a row for each filter setting (hidden by a letter)."""
     heads = ("placed", "hit\n%", "seconds\ngeom. mean", "s a bit", "off\ncm", "swing\ndeg")
     drawn = new_table("setting", *heads, "practice", "broken off")
     for letter in LETTERS:

@@ -27,13 +27,21 @@ class Jacobian(NamedTuple):
 
 
 class Boom(NamedTuple):
-    """Lengths of the boom in metres; in brackets the symbol of Eq. 3."""
+    """Lengths of the boom in metres.
 
-    pillar_m: float  # ground to the lift joint (d1)
-    pillar_offset_m: float  # slew axis to the lift joint, outwards (a2)
-    main_boom_m: float  # lift joint to the knuckle joint (a3)
-    knuckle_offset_m: float  # knuckle joint to the axis of the telescope (a4)
-    outer_boom_m: float  # along the telescope to the tip, telescope in (d4 less the extension)
+    Attributes:
+        pillar_m: ground to the lift joint, d1 of Eq. 3.
+        pillar_offset_m: slew axis to the lift joint, outwards, a2.
+        main_boom_m: lift joint to the knuckle joint, a3.
+        knuckle_offset_m: knuckle joint to the axis of the telescope, a4.
+        outer_boom_m: along the telescope to the tip, telescope in: d4 less the extension.
+    """
+
+    pillar_m: float
+    pillar_offset_m: float
+    main_boom_m: float
+    knuckle_offset_m: float
+    outer_boom_m: float
 
     def tip(self, lift_rad: float, knuckle_rad: float, extension_m: float) -> tuple[float, float]:
         """Return (radius, height) of the tip in m (Eq. 3)."""

@@ -176,10 +176,8 @@ def test_check_of_a_broken_file_reports_every_problem(broken: Path) -> None:
     )
     first, second, count = result.stderr.splitlines()
     assert first == f"{broken}:{line + 1}: tick_ms: expected a whole number, 1 to 50 ms, got 0"
-    assert (
-        "axes.lift.filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv',"
-        " 'zvd', 'ei', 'two_mode', 'robust', got 'x'" in second
-    )
+    assert "axes.lift.filter.kind: expected one of 'off', 'gff', " in second
+    assert second.endswith(", got 'x'")
     assert count == "2 problems"
 
 

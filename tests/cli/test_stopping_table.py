@@ -1,6 +1,5 @@
 """Stopping distances that `check` shows: of the real axes of a deployment, at their worst."""
 
-from collections.abc import Callable
 from io import StringIO
 
 import pytest
@@ -10,9 +9,7 @@ from canshaper.commissioning.stopping import print_stopping, stopping
 from canshaper.machine.binding import load_deployment
 from tests.controller.set_files import DBC, YAML
 from tests.rigs.files import ROOT
-from tests.rigs.forwarder import Rig
-
-Make = Callable[..., Rig]
+from tests.rigs.forwarder import Make
 
 
 def test_the_distance_is_what_the_axis_travels(changed_rig: Make) -> None:

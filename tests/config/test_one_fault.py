@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from canshaper.shaping.registry import KINDS
 from tests.config.sections import TOP, Problems, changed
 
 SWAY = (
@@ -12,7 +13,7 @@ SWAY = (
 )
 
 
-KINDS = "'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei', 'two_mode', 'robust'"
+NAMES = ", ".join(map(repr, KINDS))
 
 
 @pytest.mark.parametrize(
@@ -73,12 +74,12 @@ KINDS = "'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei', 'two_mode', 
         (
             "{ kind: off }",
             "off",
-            f"expected a section of the kind {KINDS}, got 'off'",
+            f"expected a section of the kind {NAMES}, got 'off'",
         ),
         # filters; more of them in test_filters
-        ("kind: off", "kind: on", f"axes.lift.filter.kind: expected one of {KINDS}, got 'on'"),
-        ("kind: off", "", f"axes.lift.filter.kind: expected one of {KINDS}, got nothing"),
-        ("kind: off", "kind: true", f"axes.lift.filter.kind: expected one of {KINDS}, got True"),
+        ("kind: off", "kind: on", f"axes.lift.filter.kind: expected one of {NAMES}, got 'on'"),
+        ("kind: off", "", f"axes.lift.filter.kind: expected one of {NAMES}, got nothing"),
+        ("kind: off", "kind: true", f"axes.lift.filter.kind: expected one of {NAMES}, got True"),
         ("a1: 0.708", "a1: null", "axes.slew.filter: expected a1 and a2, or poles_rad_s, got a2"),
         (
             "a1: 0.708",

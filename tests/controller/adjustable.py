@@ -1,9 +1,5 @@
 """A machine whose numbers may be changed while it runs."""
 
-from typing import Protocol
-
-from tests.rigs.forwarder import Rig
-
 CONTROL = """
 control:
   adjustable:
@@ -17,7 +13,3 @@ control:
     axes.lift.limits.max_pct: [20, 100]
 """
 STATUS = "status: { bus: crane, message: ShaperStatus }\n"
-
-
-class Make(Protocol):
-    def __call__(self, yaml: dict[str, str] | None = None) -> Rig: ...

@@ -1,15 +1,14 @@
 """Machines that several tests of the controller drive."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.controller.adjustable import CONTROL, STATUS, Make
+from tests.controller.adjustable import CONTROL, STATUS
 from tests.controller.cab import LEFT, SEAT_DBC, SWITCHES
 from tests.rigs.canopen import CanopenRig, write_variant
 from tests.rigs.files import Machine, machine_file
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 from tests.rigs.j1939 import Rig as J1939Rig
 
 
@@ -39,7 +38,7 @@ def j1939(tmp_path: Path) -> J1939Rig:
 
 
 @pytest.fixture
-def make(changed_rig: Callable[..., Rig]) -> Make:
+def make(changed_rig: Make) -> Make:
     def made(yaml: dict[str, str] | None = None) -> Rig:
         return changed_rig({STATUS: STATUS + CONTROL} | (yaml or {}))
 

@@ -1,15 +1,12 @@
 """A machine whose slew and near-far move as one."""
 
-from collections.abc import Callable
-
 from canshaper.codec.frame import Frame
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
 FIXED = "slew: slew, near_far: near_far, radius_m: 3.0, max_pct: 25"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
 MEASURED = f"slew: slew, near_far: near_far, radius: {{ {TIP} }}"
 NEAR_JOYSTICK = "command: { joystick: left, signal: NearFar, neutral_pct: 2 }"
-Make = Callable[..., Rig]
 
 
 def moving_as_one(make: Make, text: str = FIXED, **changes: dict[str, str]) -> Rig:

@@ -1,14 +1,10 @@
 """A controller that continues after a reload, and what it sends."""
 
-from collections.abc import Callable
 from typing import Any
 
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from tests.rigs.files import text_of
-from tests.rigs.forwarder import Rig
-
-Make = Callable[..., Rig]
 
 
 def reload(rig: Any, *changes: tuple[str, str]) -> None:

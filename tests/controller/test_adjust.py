@@ -8,8 +8,7 @@ from canshaper.controller.adjust import Adjuster
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.sway import SwayModel
-from tests.controller.adjustable import Make
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
 SLEW = "sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }"
 FILTER = "filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"

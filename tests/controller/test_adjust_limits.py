@@ -7,9 +7,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.adjust import Adjuster
-from tests.controller.adjustable import Make
 from tests.rigs.files import text_of
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 from tests.rigs.sent import status_frame
 
 

@@ -1,6 +1,5 @@
 """Aim point: where the tip will rest if the joysticks are let go now."""
 
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,7 @@ from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import State
 from tests.rigs.files import ROOT, machine_file
-from tests.rigs.forwarder import Rig
-
-Make = Callable[..., Rig]
+from tests.rigs.forwarder import Make, Rig
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """Values of a deployment reach the axis: tick, neutral band, grid, filter, limits."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -11,14 +10,11 @@ from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder
 from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import SwayModel
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, stop_s: 2.0"
 SLEW = "BO_ 512 SlewCommand: 2 SHAPER\n SG_ Velocity : 0|8@1- (0.8,0)"
-
-
-Make = Callable[..., Rig]
 
 
 @pytest.mark.parametrize("cycle_ms", [20, 60])

@@ -7,9 +7,9 @@ from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.input import Key
 from canshaper.inputs.value import Following
 from canshaper.shaping.states import State
-from tests.controller.reloaded import Make, reload
+from tests.controller.reloaded import reload
 from tests.rigs.canopen import OPERATIONAL, PRE_OPERATIONAL, CanopenRig
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import avef, bjm
 

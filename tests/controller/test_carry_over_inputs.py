@@ -4,9 +4,9 @@ import pytest
 
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import State
-from tests.controller.reloaded import Make, reload
+from tests.controller.reloaded import reload
 from tests.rigs.emergency import PRESSED, Machine
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
 
 @pytest.mark.parametrize("pressed", [1, 0])

@@ -1,19 +1,14 @@
 """The controller when the machine PC fails it: frames not sent, ticks missed, two buses, status."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from canshaper.protocols.interface import BusProtocol
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
 VALVES = ("SlewCommand", "NearFarCommand", "LiftCommand")
-
-
-Make = Callable[..., Rig]
-
 TWO_BUSES = {
     "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }": (
         "crane: { interface: socketcan, channel: vcan0 }\n"

@@ -10,7 +10,7 @@ from canshaper.shaping.states import Reason, State
 from canshaper_sim.hand import Held
 from tests.controller.cab import TICK_MS, Cab, right_enable, seat, without
 from tests.rigs.files import Machine
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 
 
 def mode(code: int) -> Callable[[Frame], Frame]:
@@ -177,7 +177,7 @@ OTHERS, HELD = 0x5F, 0x20
 
 
 @pytest.mark.parametrize("layout", ["40|8@1+", "40|8@1-", "47|8@0+"])
-def test_one_bit_of_a_byte_enables(changed_rig: Callable[..., Rig], layout: str) -> None:
+def test_one_bit_of_a_byte_enables(changed_rig: Make, layout: str) -> None:
     keys, after = f' SG_ Keys : {layout} (1,0) [0|0] "" SHAPER\n', " SG_ NearFar : 16|16@1-"
     rig = changed_rig({f"{FIRST}Enable": f"{FIRST}Keys/5"}, {after: keys + after})
     rig.run(5, Keys=OTHERS)

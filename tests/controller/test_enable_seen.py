@@ -180,6 +180,7 @@ def test_an_emergency_stop_counts_every_press(remote: Inputs) -> None:
         for pressed in (1, 0):
             stop.on_frame({"Stop": pressed}, 0, accepted=True)
         assert stop.stop(0, presses) is Reason.EMERGENCY_STOP
+        assert stop.presses == presses + 1
 
 
 def test_a_reload_continues_the_sequence_of_switches_and_emergency_stop(

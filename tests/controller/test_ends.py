@@ -1,16 +1,13 @@
 """An axis is stopped ahead of its end stops; a lost position means that it is as without them."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
 from tests.rigs.files import ROOT
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
-Make = Callable[..., Rig]
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200"
 ENDS = f"ends: {{ {TIP}, lowest: 2, highest: 8, margin: 0, full_speed: 1 }}"
 # Behind the limits of an axis.
@@ -90,17 +87,6 @@ def test_without_a_position_it_is_as_without_ends_and_that_is_logged(pump: Rig) 
     run(pump, 7.95, 5, NearFar=1000)
     assert demand(pump) == 0.0
     assert news(pump)[1:] == ["axis=near_far ends=known"]
-
-
-def test_a_position_out_of_the_range_of_the_dbc_is_none(changed_rig: Make) -> None:
-    dbc = {"(0.001,0) [0|60]": "(0.001,0) [0|20]"}
-    rig = changed_rig({NEAR_FAR: f", {ENDS} {NEAR_FAR}"}, dbc)
-    message = rig.message("TipPosition")
-    data = message.encode({"SlewAngle": 0, "Radius": 30, "Height": 0}, strict=False)
-    rig.receive(Frame("crane", message.frame_id, False, data))
-    rig.run(1)
-    assert rig.count("InvalidSignals") == 1
-    assert news(rig) == ["axis=near_far ends=lost"]
 
 
 def test_two_axes_and_a_motion_read_one_message(changed_rig: Make) -> None:

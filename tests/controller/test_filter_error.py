@@ -1,15 +1,11 @@
 """A filter raises in a controller: the event says what and where, and the other axis is let go."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.controller.events import StateEvent
 from canshaper.shaping.states import Reason, State
 from tests.controller.motion_rig import moving_as_one
-from tests.rigs.forwarder import Rig
-
-Make = Callable[..., Rig]
+from tests.rigs.forwarder import Make
 
 
 class Faulty:

@@ -1,7 +1,5 @@
 """Together the axes ask for no more oil than the pump delivers."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.frame import Frame
@@ -10,10 +8,9 @@ from canshaper.controller.gated import GatedController
 from canshaper.errors import ConfigError
 from canshaper.shaping.states import Reason, State
 from tests.rigs.files import ROOT
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 from tests.rigs.sent import status_frame
 
-Make = Callable[..., Rig]
 FULL = {"Slew": 1000, "NearFar": 1000}
 
 

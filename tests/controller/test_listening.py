@@ -1,6 +1,5 @@
 """A deployment that only listens: what may still be sent, and what no longer counts."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from canshaper.protocols.canopen.network import ValveControl
 from canshaper.shaping.states import State
 from tests.rigs import canopen, j1939
 from tests.rigs.files import ROOT, text_of
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 
 
 def sent(name: str) -> set[int]:
@@ -62,7 +61,7 @@ def listening_rig(rig: Rig) -> Rig:
     return rig
 
 
-def test_it_computes_the_same_as_one_that_drives(changed_rig: Callable[..., Rig]) -> None:
+def test_it_computes_the_same_as_one_that_drives(changed_rig: Make) -> None:
     rig, driving = listening_rig(changed_rig()), changed_rig()
     for number in range(300):
         joystick = (0, 1000, -500)[number // 50 % 3]

@@ -127,9 +127,3 @@ def test_noise_of_a_weight_is_no_jump(rig: Rig) -> None:
     for kg in (600, 310, 590, 320, 600, 310):
         run(rig, 0.2, kg)
     assert news(rig) == ["load_state=lost", "load_state=known"]
-
-
-def test_an_error_code_is_no_weight(rig: Rig) -> None:
-    run(rig, 0.2, 600)
-    run(rig, 1.0, 0xFFFE)
-    assert sets(rig) == [UNKNOWN] * 2

@@ -1,12 +1,10 @@
 """A bus is shared, and a machine need not show everything: what passes by, and what is left out."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import Rig, last_fault
+from tests.rigs.forwarder import Make, Rig, last_fault
 
 TIP_ID = 0x401  # TipPosition of the shipped DBC: the shipped machine has no use for it
 MOTION = (
@@ -14,11 +12,6 @@ MOTION = (
     " { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 } } }\n"
 )
 STATUS = "    status: { bus: crane, message: SlewStatus }\n"
-
-
-Make = Callable[..., Rig]
-
-
 # -- frames of others ------------------------------------------------------------------------------
 
 
@@ -33,12 +26,6 @@ def test_traffic_that_the_dbc_knows_is_no_fault(rig: Rig, data: bytes) -> None:
     assert rig.controller.counters.values == before
     assert last_fault(rig) is FrameFault.NONE
     assert rig.state() is State.ACTIVE
-
-
-def test_a_radius_of_the_wrong_length_is_counted_as_such(changed_rig: Make) -> None:
-    rig = changed_rig({"axes:\n": f"{MOTION}axes:\n"})
-    rig.receive(Frame("crane", TIP_ID, False, bytes(5)), Frame("crane", TIP_ID, False, bytes(7)))
-    assert (rig.count("WrongLength"), last_fault(rig)) == (2, FrameFault.WRONG_LENGTH)
 
 
 def test_without_a_measured_radius_its_message_is_other_traffic(changed_rig: Make) -> None:

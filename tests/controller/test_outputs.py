@@ -1,7 +1,5 @@
 """A neutral frame takes the place of a valve frame that the gate has refused."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.e2e import E2e
@@ -10,7 +8,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 
 
 def driven(name: str) -> Controller:
@@ -53,7 +51,7 @@ def test_it_has_the_count_of_the_refused_one() -> None:
     assert check.count(neutral.data) == check.count(frame.data)
 
 
-def test_its_axes_trip_with_the_next_tick(changed_rig: Callable[..., Rig]) -> None:
+def test_its_axes_trip_with_the_next_tick(changed_rig: Make) -> None:
     rig = changed_rig().moving()
     rig.controller.refused(rig.run(1, Slew=1000)["SlewCommand"][""])
     assert rig.controller.axes["slew"].stops.trip

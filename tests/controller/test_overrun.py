@@ -1,19 +1,15 @@
 """Missed deadlines: a few are tolerated, many stop what moves through the filter."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from canshaper.shaping.states import Reason, State
-from tests.rigs.forwarder import SLOW_VALVE, Rig
+from tests.rigs.forwarder import SLOW_VALVE, Make, Rig
 
 STOP_TICKS = 100  # stop_s of the shipped slew axis
 # Late ticks in a row that are an overrun, and punctual ones that end it.
 MANY, RECOVERY = 10, 50
-
-
-Make = Callable[..., Rig]
 
 
 def late(rig: Rig, missed: int = 1, **raw: int) -> dict[str, dict[str, Any]]:

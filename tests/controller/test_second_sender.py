@@ -1,19 +1,13 @@
 """Frames of another sender with the id of a valve: two controllers must not drive one crane."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import SLOW_VALVE, Rig
+from tests.rigs.forwarder import SLOW_VALVE, Make, Rig
 
 # How long the other one must be silent before a reset counts: 1 s, in ticks.
 SILENT_TICKS = 50
-
-
-Make = Callable[..., Rig]
-
 FOREIGN = Frame("crane", 0x200, False, b"\x00\x00")
 TRIPPED = (State.TRIPPED, "SECOND_SENDER")
 

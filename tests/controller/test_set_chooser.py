@@ -12,9 +12,8 @@ from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.sway import SwayMode, SwayModel
 from tests.controller.set_files import DBC, FAST, FAST_SETS, SETS, SLEW, YAML
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 
-Make = Callable[..., Rig]
 MS = 1_000_000
 TICK_S = 0.02
 MODE = SwayMode.from_period(2.356, 0.038)
@@ -50,9 +49,9 @@ class Watched(ShapedAxis):
 
         super().retune(mode, kept, past)
 
-    def move(self, command: float, applied: float) -> None:
-        """In motion, with this command and output."""
-        self.at_rest, self.command, self.output.applied = False, command, applied
+    def move(self, demand: float, applied: float) -> None:
+        """In motion, with this demand and output."""
+        self.at_rest, self.demand, self.output.applied = False, demand, applied
 
 
 class Choice:

@@ -1,16 +1,12 @@
 """Grapple and operator choose sway data and filter, by frames; what does not fit is reported."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.shapers.gff import Gff
 from tests.controller.set_files import DBC, FAST, FAST_SETS, SETS, SLEW, YAML
-from tests.rigs.forwarder import Rig
-
-Make = Callable[..., Rig]
+from tests.rigs.forwarder import Make, Rig
 
 
 def load(kg: int) -> Frame:

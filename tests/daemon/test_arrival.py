@@ -4,8 +4,6 @@ Frames wait while the loop does something else. What is fresh or lost is decided
 arrived; a release, a press, a foreign sender in them counts in the next tick, however old it is.
 """
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
@@ -15,7 +13,7 @@ from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import State
 from tests.rigs.canopen import OPERATIONAL
 from tests.rigs.emergency import PRESSED, Machine
-from tests.rigs.forwarder import SLOW_VALVE, TICK_NS, Rig
+from tests.rigs.forwarder import SLOW_VALVE, TICK_NS, Make, Rig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
 from tests.rigs.tripped import tripped
@@ -24,9 +22,6 @@ from tests.rigs.waiting import Waiting, both, tick
 MS = 1_000_000
 LIMIT_NS = 100 * MS  # of both joysticks
 FOREIGN = Frame("crane", 0x200, False, b"\x00\xee")
-Make = Callable[..., Rig]
-
-
 # -- ages ------------------------------------------------------------------------------------------
 
 

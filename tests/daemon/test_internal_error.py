@@ -157,14 +157,14 @@ def test_a_setpoint_beyond_full_trips_its_axis_only(rig: Rig) -> None:
     rig.run(3)
     rig.run(50, Slew=1000, Lift=1000)
     axis = rig.controller.axes["slew"].axis
-    act = axis.act
+    command = axis.command
 
     def beyond(*arguments: Any, **keys: Any) -> Any:
-        transition = act(*arguments, **keys)
+        transition = command(*arguments, **keys)
         axis.output.steps = 126
         return transition
 
-    axis.act = beyond  # type: ignore[method-assign]
+    axis.command = beyond  # type: ignore[method-assign]
     sent = rig.run(1, Slew=1000, Lift=1000)
     assert sent["SlewCommand"]["Velocity"] == 0
     assert sent["LiftCommand"]["Velocity"] > 50

@@ -1,6 +1,5 @@
 """Frames that wait in the sockets while the loop stands still: only bad news of them counts."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,12 +11,11 @@ from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import Reason, State
 from tests.rigs.canopen import BOOT_UP, HOLD, OPERATIONAL, STOPPED, CanopenRig
 from tests.rigs.emergency import PRESSED, STOP, Machine
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make, Rig
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.j1939 import AVC, OTHER, bjm
 from tests.rigs.j1939 import Rig as J1939Rig
 
-Make = Callable[..., Rig]
 FOREIGN = Frame("crane", 0x200, False, b"\0\0")
 FLOW_COMMAND_LATE = 0x8003
 NODE_FAULT = ("NEUTRAL_WAIT", "NODE_FAULT")

@@ -10,13 +10,11 @@ from canshaper.gate.cycle import Standstill, io_cycle
 from canshaper.shaping.states import State
 from tests.rigs.emergency import PRESSED, READY, Machine
 from tests.rigs.files import machine_file
-from tests.rigs.forwarder import PATIENT, SLOW_VALVE, TICK_NS, Rig
+from tests.rigs.forwarder import PATIENT, SLOW_VALVE, TICK_NS, Make, Rig
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
 from tests.rigs.waiting import Waiting, both, tick
-
-Make = Callable[..., Rig]
 
 
 def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: Make) -> None:

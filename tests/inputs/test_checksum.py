@@ -1,6 +1,5 @@
 """A joystick whose frames carry a checksum: a right one, a wrong one."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -9,15 +8,12 @@ from canshaper.checksums.kinds import CHECKSUMS
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.codec.checksum_reference import PLACES, with_checksum
-from tests.rigs.forwarder import Rig, command, last_fault, velocity
+from tests.rigs.forwarder import Make, command, last_fault, velocity
 
 # timeout_ms of the shipped joysticks, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
 ALL = "    alive_counter: AliveCounter\n"
 RESET = ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n'
-
-
-Make = Callable[..., Rig]
 
 
 class Protected:

@@ -1,13 +1,9 @@
 """A joystick with direction flags at the controller: what moves, and what a contradiction stops."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import Rig, velocity
-
-Make = Callable[..., Rig]
+from tests.rigs.forwarder import Make, Rig, velocity
 
 YAML = {
     "signal: Slew, neutral_pct: 2": (

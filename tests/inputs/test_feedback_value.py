@@ -1,6 +1,5 @@
 """Feedback of one valve by itself: which value follows which commands, to the last bit."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -8,7 +7,7 @@ import pytest
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.value import Feedback, Following
 from canshaper.shaping.states import Reason
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 
 DBC = {
     "BO_ 1024 GrappleSway": "BO_ 800 SlewFlow: 2 PLANT\n"
@@ -23,8 +22,6 @@ FLOW = (
     "bus: crane, message: SlewFlow, signal: Flow, timeout_ms: 100, full: 64,"
     " alive_counter: Count, cycle_ms: 20"
 )
-
-Make = Callable[..., Rig]
 
 
 def feedback(make: Make, period_s: float = 0.02, more: str = "") -> tuple[Feedback, Any]:

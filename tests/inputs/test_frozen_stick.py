@@ -1,17 +1,12 @@
 """A joystick that stands still: in neutral for ever, deflected for ``stuck_s`` at most."""
 
-from collections.abc import Callable
-
 import pytest
 
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.shaping.states import Reason, State
-from tests.rigs.forwarder import Rig, velocity
+from tests.rigs.forwarder import Make, Rig, velocity
 
 LEFT = "    alive_counter: AliveCounter\n  right:"
-
-
-Make = Callable[..., Rig]
 
 
 def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make) -> None:

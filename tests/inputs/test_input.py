@@ -1,20 +1,16 @@
 """Trust in a joystick's frames: sequence, silence, and an enable seen released."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import SLOW_VALVE, Rig, command, last_fault, velocity
+from tests.rigs.forwarder import SLOW_VALVE, Make, Rig, command, last_fault, velocity
 
 # timeout_ms of the shipped joysticks, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
 LEFT = "    alive_counter: AliveCounter\n  right:"
-
-
-Make = Callable[..., Rig]
 
 
 def feed(rig: Rig, *frames: Frame) -> dict[str, dict[str, Any]]:
@@ -214,19 +210,6 @@ def test_a_short_release_is_a_release(
         else:
             feed(rig, rig.joystick(Slew=1000))
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
-
-
-def test_a_released_enable_stays_released_until_a_frame_counts(rig: Rig) -> None:
-    rig.run(3)
-    assert rig.state() is State.READY
-    number = rig.counts["JoystickLeft"]
-    feed(rig, rig.joystick(AliveCounter=number, Enable=0))
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
-    feed(rig, rig.joystick(AliveCounter=number))
-    assert rig.reason() == "ENABLE_OFF"
-    rig.counts["JoystickLeft"] = number
-    feed(rig, rig.joystick())
-    assert rig.state() is State.READY
 
 
 def test_only_off_is_released(rig: Rig) -> None:

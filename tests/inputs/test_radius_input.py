@@ -1,12 +1,11 @@
 """The radius of the tip, measured: which frames are a radius, for how long, and of what."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 from tests.rigs.radius import RadiusInput
 
 STATUS = "status: { bus: crane, message: ShaperStatus }\n"
@@ -19,9 +18,6 @@ DBC = {
 }
 NOW_NS = 7_000_000_000
 TIMEOUT_NS = 100_000_000
-
-
-Make = Callable[..., Rig]
 
 
 def bound(make: Make) -> tuple[RadiusInput, Any]:

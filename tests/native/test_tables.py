@@ -25,13 +25,20 @@ REFUSED = sorted(
 # Keys that the tables have, by the pattern of their section; or that no valve frame hangs on.
 _READ = {"bus", "message", "timeout_ms", "alive_counter", "alive_max_step", "qualify", "cycle_ms"}
 _ABOUT = {"codes", "signal", "full", "zero", "invert"}  # what the bound signal has
+_BUS = {"interface", "channel", "bitrate", "fd", "data_bitrate", "options", "match"}
+_BUS |= {"unconfirmed", "network"}
+_SWAY = {"full_speed_m_s", "length_m", "damping_nms", "mass_kg", "period_s", "damping_ratio"}
+_SWAY |= {"decay_per_swing", "origin"}
+_LIMITS = {"max_pct", "min_pct", "rise_per_s", "fall_per_s", "deadband_pct", "curve_command_pct"}
+_LIMITS |= {"curve_speed_pct", "curve_origin", "tail_s", "stop_s", "stop_distance_m"}
+_LIMITS |= {"allow_faster", "allow_reverse", "reversal", "reversal_s"}
 HANDLED: dict[Any, tuple[type[BaseModel], set[str]]] = {
     (): (
         DeploymentConfig,
         {"version", "tick_ms", "tick", "buses", "dbc", "joysticks", "axes", "motion", "status"}
         | {"identity", "control", "assumed", "crane", "still_deg", "uncertainty", "accept"},
     ),
-    ("buses", "*"): (Bus, set(Bus.model_fields) - {"canopen", "j1939"}),
+    ("buses", "*"): (Bus, _BUS),
     ("joysticks", "*"): (Joystick, {*_READ, "enable", "reset", "anti_sway_off", "stuck_s"}),
     ("axes", "*"): (
         AxisSection,
@@ -39,8 +46,8 @@ HANDLED: dict[Any, tuple[type[BaseModel], set[str]]] = {
     ),
     ("axes", "*", "command"): (Command, {*_ABOUT, "joystick", "neutral_pct"}),
     ("axes", "*", "valve"): (Valve, {*_READ, *_ABOUT} - {"codes", "alive_max_step", "qualify"}),
-    ("axes", "*", "sway"): (Sway, set(Sway.model_fields) - {"length"}),
-    ("axes", "*", "limits"): (Limits, set(Limits.model_fields) - {"ends"}),
+    ("axes", "*", "sway"): (Sway, _SWAY),
+    ("axes", "*", "limits"): (Limits, _LIMITS),
     ("motion", "*", "radius"): (Radius, {*_READ, "signal", "codes"}),
 }
 
@@ -101,7 +108,9 @@ class Other(Fir):
 def test_a_filter_of_another_class_is_refused(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, build: Callable[[Any], Shaper]
 ) -> None:
-    kind = ShaperKind("zv", "Another.", build, lambda *_: {"other": {}}, needs_sway=True)
+    kind = ShaperKind(
+        "zv", "Another.", build, lambda *_: {"other": {}}, needs_sway=True, runs_ahead=False
+    )
     monkeypatch.setitem(KINDS, "zv", kind)
     machine.in_yaml("filter: { kind: gff, a1: 0.708, a2: 0.12 }", "filter: { kind: zv }")
     (text,) = problems(machine)

@@ -1,11 +1,10 @@
 """A machine with an emergency stop on its bus."""
 
-from collections.abc import Callable
 from typing import Any
 
 from canshaper.codec.frame import Frame
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 
 VALVES = ("SlewCommand", "NearFarCommand", "LiftCommand")
 AXES = ("slew", "near_far", "lift")
@@ -29,9 +28,6 @@ DBC = {
     ),
     CYCLE: CYCLE + CYCLE.replace("272", "64"),
 }
-
-
-Make = Callable[..., Rig]
 
 
 class Machine:

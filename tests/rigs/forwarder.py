@@ -99,6 +99,10 @@ class Rig:
         return self.controller.counters.values[name]
 
 
+Make = Callable[..., Rig]
+"""Type of ``changed_rig``."""
+
+
 def command(rig: Rig) -> float:
     """Command of the operator for slew."""
     return rig.controller.axes["slew"].axis.demand
@@ -119,7 +123,7 @@ def rig() -> Rig:
 
 
 @pytest.fixture
-def changed_rig(tmp_path: Path) -> Callable[..., Rig]:
+def changed_rig(tmp_path: Path) -> Make:
     """A rig of the shipped machine with pieces of its two files replaced."""
 
     def make(yaml: dict[str, str] | None = None, dbc: dict[str, str] | None = None) -> Rig:

@@ -1,13 +1,10 @@
 """The shipped machine at any tick, ticked as the daemon does, on a clock that may jump."""
 
-from collections.abc import Callable
-
 from canshaper.codec.frame import Frame
 from canshaper.gate.cycle import Standstill, io_cycle
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Make
 from tests.rigs.waiting import Waiting, both
 
-Make = Callable[..., Rig]
 MS = 1_000_000
 
 

@@ -24,3 +24,11 @@ def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[Shap
     one.tick(CommandInput())
     plain.tick(CommandInput())
     return one, plain
+
+
+def run(
+    axis: ShapedAxis, ticks: int, joystick: float | CommandInput = 0.0, added: float = 0.0
+) -> None:
+    """So many ticks with one input."""
+    for _ in range(ticks):
+        axis.tick(CommandInput(joystick) if isinstance(joystick, float) else joystick, added)

@@ -7,7 +7,7 @@ from canshaper.shaping.moving_axis import UNATTENDED_TICKS, AddedTime
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.two_axis_motion import range_with_added
-from tests.shaping.added_pair import SLACK, TICK_S, pair
+from tests.shaping.added_pair import SLACK, TICK_S, pair, run
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -91,8 +91,7 @@ def test_at_the_start_it_is_attended_for_as_long() -> None:
 
 def test_time_is_used_up_in_the_bypass_too() -> None:
     axis, _ = pair(OutputLimits(fall_per_s=1.0))
-    for _ in range(27):
-        axis.tick(CommandInput(), 0.2)
+    run(axis, 27, 0.0, 0.2)
     for _ in range(3):
         axis.tick(CommandInput(bypass=True), 0.2)
         assert axis.output.setpoint
@@ -128,16 +127,14 @@ def test_a_joystick_that_is_pushed_the_other_way_ends_it_by_the_rate(
     fall_per_s: float, sign: float
 ) -> None:
     axis, _ = pair(OutputLimits(fall_per_s=fall_per_s))
-    for _ in range(10):
-        axis.tick(CommandInput(), -sign * 0.2)
+    run(axis, 10, 0.0, -sign * 0.2)
     assert sign * axis.output.setpoint < -0.19
     left = 0.2
     for _ in range(20):
         axis.tick(CommandInput(sign * 0.1), -sign * 0.2)
         left = max(0.0, left - fall_per_s * TICK_S)
         assert sign * axis.output.setpoint == pytest.approx(-left, abs=SLACK)
-    for _ in range(5):
-        axis.tick(CommandInput(sign * 0.5), -sign * 0.2)
+    run(axis, 5, sign * 0.5, -sign * 0.2)
     assert sign * axis.output.setpoint == pytest.approx(0.3, abs=0.02)
     assert sign * axis.output.applied == pytest.approx(0.5, abs=0.02)
 
@@ -145,8 +142,7 @@ def test_a_joystick_that_is_pushed_the_other_way_ends_it_by_the_rate(
 def test_what_is_cut_of_the_sum_is_cut_from_the_own_part() -> None:
     """The added part counts as sent whole: the filter makes up for the rest, see the model."""
     axis, _ = pair(OutputLimits())
-    for _ in range(10):
-        axis.tick(CommandInput(0.1), -0.2)
+    run(axis, 10, 0.1, -0.2)
     assert axis.output.setpoint == 0.0
     assert axis.output.applied == pytest.approx(0.2)
 
@@ -163,8 +159,7 @@ def test_it_makes_no_axis_faster_than_its_operator_asks(sign: float) -> None:
 
 def test_the_time_that_is_given_back_moves_it_again() -> None:
     axis, _ = pair(OutputLimits(fall_per_s=10.0))
-    for _ in range(40):
-        axis.tick(CommandInput(), 0.2)
+    run(axis, 40, 0.0, 0.2)
     assert axis.output.steps == 0
     axis.added_time.renew()
     axis.tick(CommandInput(), 0.2)

@@ -7,6 +7,7 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import Off
+from tests.shaping.added_pair import run
 
 TICK_S, TAIL = 0.02, 50
 DEMAND, LARGEST = 0.09, 0.25
@@ -52,8 +53,7 @@ def test_in_the_direction_of_the_demand_no_faster_until_the_tail_is_over(
 @pytest.mark.parametrize("stop", [TRIP, LOST])
 def test_in_the_other_direction_up_to_the_largest_at_once(sign: float, stop: CommandInput) -> None:
     axis = stopped(sign, stop)
-    for _ in range(5):
-        axis.tick(CommandInput(), sign * -0.5)
+    run(axis, 5, 0.0, sign * -0.5)
     assert sign * axis.output.setpoint == pytest.approx(-LARGEST, abs=SLACK)
 
 
@@ -72,12 +72,10 @@ def test_after_a_bypass_in_neutral_the_slower_of_both_counts(sign: float, demand
     axis.allow_added(LARGEST, 6.0)
     for joystick in (CommandInput(), *[CommandInput(sign * demand, bypass=True)] * 10):
         axis.tick(joystick)
-    for _ in range(20):
-        axis.tick(CommandInput(), sign * 0.8)
+    run(axis, 20, 0.0, sign * 0.8)
     assert sign * axis.output.setpoint == pytest.approx(min(demand, LARGEST), abs=2 * SLACK)
     axis.tick(CommandInput(sign * 0.05), sign * 0.8)
-    for _ in range(5):
-        axis.tick(CommandInput(sign * 0.05), sign * 0.8)
+    run(axis, 5, sign * 0.05, sign * 0.8)
     assert sign * axis.output.setpoint == pytest.approx(0.05, abs=SLACK)
 
 
@@ -87,8 +85,7 @@ def test_missed_ticks_give_no_time_back_that_is_used_up(sign: float) -> None:
     axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=Off())
     axis.allow_added(LARGEST, 10 * TICK_S)
     axis.tick(CommandInput())
-    for _ in range(30):
-        axis.tick(CommandInput(), sign * 0.2)
+    run(axis, 30, 0.0, sign * 0.2)
     assert axis.output.steps == 0
     for _ in range(5):
         axis.hold(2)
@@ -102,8 +99,7 @@ def test_missed_ticks_of_an_axis_that_stands_use_up_no_time() -> None:
     axis = ShapedAxis(TICK_S, LIMITS, sway=sway, shaper=Off())
     axis.allow_added(LARGEST, 10 * TICK_S)
     axis.tick(CommandInput())
-    for _ in range(3):
-        axis.tick(CommandInput(), 0.001)
+    run(axis, 3, 0.0, 0.001)
     assert (axis.state, axis.output.steps) == (State.ACTIVE, 0)
     axis.hold(20)
     axis.tick(CommandInput(), 0.2)

@@ -76,23 +76,15 @@ def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None
     assert (waiting.reason, waiting.output.steps) == (Reason.JOYSTICK_NOT_NEUTRAL, 0)
 
 
-def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive) -> None:
-    """Tripped before the first valid frame: enabled from the first one on is no rising edge."""
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive, reset: bool) -> None:
+    """Tripped before the first valid frame, in which enable is on, or reset is pressed."""
     drive.tick(CommandInput(trip=Reason.SEND_FAILED, fault=Reason.JOYSTICK_TIMEOUT))
-    drive.run(CENTRED, 0.2)
+    on, off = CommandInput(reset=reset), CommandInput(enabled=reset)
+    drive.run(on, 0.2)
     assert drive.state is State.TRIPPED
-    assert drive.tick(CommandInput(enabled=False)) is None
-    assert drive.tick(CENTRED) == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
-
-
-def test_nor_does_a_reset_switch_that_was_pressed_in_the_first_valid_frame(drive: Drive) -> None:
-    drive.tick(CommandInput(trip=Reason.SEND_FAILED, fault=Reason.JOYSTICK_TIMEOUT))
-    drive.run(CommandInput(reset=True), 0.2)
-    assert drive.state is State.TRIPPED
-    assert drive.tick(CENTRED) is None
-    assert drive.tick(CommandInput(reset=True)) == Transition(
-        State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET
-    )
+    assert drive.tick(off) is None
+    assert drive.tick(on) == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
 
 
 def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:

@@ -16,31 +16,30 @@ MODE = SwayMode.from_period(2.3, 0.05)
 STOPS = EndStops(2.0, 8.0, full_speed=1.5, lag_s=0.2)
 
 
-def test_the_room_is_the_way_to_both_stops_in_seconds_of_full_speed() -> None:
-    assert STOPS.room(5.0, 0.0, (0.0, 0.0)) == (-2.0, 2.0)
+@pytest.mark.parametrize(
+    ("position", "velocity", "run_on", "expected"),
+    [
+        (5.0, 0.0, (0.0, 0.0), (-2.0, 2.0)),
+        (5.0, 0.5, (0.0, 0.0), (-2.0, 1.9)),  # the valve is late
+        (5.0, -0.5, (0.0, 0.0), (-1.9, 2.0)),
+        (5.0, 0.0, (-0.5, 0.3), (-1.5, 1.7)),
+        (5.0, 0.0, (0.5, -0.3), (-2.0, 2.0)),  # what goes away from a stop gives no room
+        (8.3, 0.0, (0.0, 0.0), (-4.2, 0.0)),  # beyond a stop only the way back is open
+        (1.7, 0.0, (0.0, 0.0), (0.0, 4.2)),
+    ],
+)
+def test_the_room_is_the_way_to_both_stops_in_seconds_of_full_speed(
+    position: float,
+    velocity: float,
+    run_on: tuple[float, float],
+    expected: tuple[float, float],
+) -> None:
+    assert STOPS.room(position, velocity, run_on) == pytest.approx(expected)
 
 
 def test_of_a_position_that_falls_with_the_command_the_other_stop_is_ahead() -> None:
     falling = EndStops(2.0, 8.0, full_speed=-1.5, lag_s=0.2)
     assert falling.room(3.5, 0.0, (0.0, 0.0)) == (-3.0, 1.0)
-
-
-@pytest.mark.parametrize(("velocity", "expected"), [(0.5, (-2.0, 1.9)), (-0.5, (-1.9, 2.0))])
-def test_the_valve_is_late(velocity: float, expected: tuple[float, float]) -> None:
-    assert STOPS.room(5.0, velocity, (0.0, 0.0)) == pytest.approx(expected)
-
-
-def test_what_comes_takes_its_room_and_gives_none_away_from_a_stop() -> None:
-    assert STOPS.room(5.0, 0.0, (-0.5, 0.3)) == pytest.approx((-1.5, 1.7))
-    # A filter may ask for some of it on the other side.
-    assert STOPS.room(5.0, 0.0, (0.5, -0.3)) == (-2.0, 2.0)
-
-
-@pytest.mark.parametrize(("position", "expected"), [(8.3, (-4.2, 0.0)), (1.7, (0.0, 4.2))])
-def test_beyond_a_stop_only_the_way_back_is_open(
-    position: float, expected: tuple[float, float]
-) -> None:
-    assert STOPS.room(position, 0.0, (0.0, 0.0)) == pytest.approx(expected)
 
 
 def test_demands_are_bounded_by_the_room_and_never_faster_than_full_speed() -> None:

@@ -1,6 +1,7 @@
 """Swing that another axis makes, damped by an axis whose joystick no one touches."""
 
 import math
+from unittest.mock import Mock
 
 import pytest
 
@@ -150,3 +151,13 @@ def test_with_a_path_at_full_speed_it_is_no_error() -> None:
         assert abs(rig.axis.output.setpoint) <= LARGEST
     rig.axis.command(CommandInput(enabled=True), -1.1, damps=True)
     assert rig.axis.state is State.TRIPPED
+
+
+def test_a_filter_that_gives_no_number_while_the_axis_damps_is_named() -> None:
+    rig = swinging(Rig())
+    rig.run(0.1, damps=True)
+    assert rig.axis.output.damping
+    rig.axis._transfer._shaper = Mock(step=Mock(return_value=math.nan))
+    tripped = rig.axis.command(CommandInput(enabled=True), 0.0, damps=True)
+    assert tripped is not None
+    assert tripped.error.startswith("ValueError: filter output is nan (")

@@ -13,6 +13,7 @@ from canshaper.machine.stopping import allowed_s
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.states import CommandInput, Reason, State
+from tests.shaping.added_pair import run
 from tests.shaping.test_stopping import axis_with
 
 DriveWith = Callable[..., Any]
@@ -52,8 +53,7 @@ def test_it_goes_no_farther_than_the_limit(
     shaper = Anything()
     axis = axis_of(shaper)
     for command, shaper.asks, ticks in before:
-        for _ in range(ticks):
-            axis.tick(CommandInput(command))
+        run(axis, ticks, command)
     way = 0.0
     for tick in range(150):
         shaper.asks = after[tick // 7 % len(after)]
@@ -67,8 +67,7 @@ def test_it_goes_no_farther_than_the_limit(
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_it_reaches_the_limit_and_falls(sign: float) -> None:
     axis = axis_of(Anything(sign))
-    for _ in range(40):
-        axis.tick(CommandInput(sign))
+    run(axis, 40, sign)
     seen = []
     while axis.output.setpoint:
         axis.tick(CommandInput())
@@ -99,8 +98,7 @@ def test_what_is_added_beyond_its_bound_counts_too(sign: float, turns: int) -> N
 def test_a_lower_demand_bounds_what_runs_on_beyond_it(sign: float) -> None:
     """The axis ends at the demand, which goes on for as long as it is held."""
     axis = axis_of(Anything(sign))
-    for _ in range(40):
-        axis.tick(CommandInput(sign))
+    run(axis, 40, sign)
     beyond = 0.0
     for _ in range(200):
         axis.tick(CommandInput(sign * 0.3))
@@ -117,8 +115,7 @@ def test_a_lower_demand_bounds_what_runs_on_beyond_it(sign: float) -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_against_the_joystick_the_way_counts_as_in_neutral(sign: float) -> None:
     axis = axis_of(Anything(sign), replace(LIMITS, reversal_s=5.0))
-    for _ in range(40):
-        axis.tick(CommandInput(sign))
+    run(axis, 40, sign)
     way = 0.0
     for _ in range(60):
         axis.tick(CommandInput(-sign))
@@ -132,8 +129,7 @@ def test_a_new_stroke_has_the_whole_way_again(sign: float) -> None:
     axis = axis_of(shaper)
     ways = []
     for _ in range(2):
-        for _ in range(40):
-            axis.tick(CommandInput(sign))
+        run(axis, 40, sign)
         way = 0.0
         for _ in range(100):
             axis.tick(CommandInput())
@@ -145,8 +141,7 @@ def test_a_new_stroke_has_the_whole_way_again(sign: float) -> None:
 
 def test_missed_ticks_count_as_way() -> None:
     axis = axis_of(Anything(1.0))
-    for _ in range(40):
-        axis.tick(CommandInput(1.0))
+    run(axis, 40, 1.0)
     way = 0.0
     for _ in range(60):
         axis.tick(CommandInput())
@@ -162,8 +157,7 @@ def test_missed_ticks_count_as_way() -> None:
 @pytest.mark.parametrize("size", [0.03, 1.0])
 def test_against_the_joystick_it_ends_in_time(sign: float, lost: bool, size: float) -> None:
     axis = axis_of(Anything(sign), replace(LIMITS, run_on=9.0))
-    for _ in range(40):
-        axis.tick(CommandInput(sign))
+    run(axis, 40, sign)
     fault = LATE if lost else None
     old = []
     for _ in range(60):
@@ -177,11 +171,9 @@ def test_against_the_joystick_it_ends_in_time(sign: float, lost: bool, size: flo
 def test_a_touch_the_other_way_is_enough(sign: float, reversal_s: float) -> None:
     """The old direction ends in the same time when the joystick is let go of again."""
     axis = axis_of(Anything(sign), replace(LIMITS, run_on=9.0, reversal_s=reversal_s))
-    for _ in range(40):
-        axis.tick(CommandInput(sign))
+    run(axis, 40, sign)
     axis.tick(CommandInput(-sign))
-    for _ in range(round(max(reversal_s, 0.25) / TICK_S)):
-        axis.tick(CommandInput())
+    run(axis, round(max(reversal_s, 0.25) / TICK_S))
     for _ in range(100):
         assert axis.output.setpoint == 0.0
         axis.tick(CommandInput())
@@ -189,10 +181,8 @@ def test_a_touch_the_other_way_is_enough(sign: float, reversal_s: float) -> None
 
 def test_missed_ticks_count_as_time_against_the_joystick() -> None:
     axis = axis_of(Anything(1.0), replace(LIMITS, run_on=9.0))
-    for _ in range(40):
-        axis.tick(CommandInput(1.0))
-    for _ in range(5):
-        axis.tick(CommandInput(-1.0))
+    run(axis, 40, 1.0)
+    run(axis, 5, -1.0)
     axis.hold(5)
     assert axis.output.setpoint == 1.0
     axis.tick(CommandInput(-1.0))
@@ -201,10 +191,8 @@ def test_missed_ticks_count_as_time_against_the_joystick() -> None:
 
 def test_with_allow_reverse_the_old_direction_has_no_time() -> None:
     axis = axis_of(Anything(1.0), replace(LIMITS, run_on=9.0, allow_reverse=True))
-    for _ in range(40):
-        axis.tick(CommandInput(1.0))
-    for _ in range(60):
-        axis.tick(CommandInput(-1.0))
+    run(axis, 40, 1.0)
+    run(axis, 60, -1.0)
     assert (axis.output.setpoint, axis.state) == (1.0, State.ACTIVE)
 
 

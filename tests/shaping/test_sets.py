@@ -204,6 +204,10 @@ def test_a_longer_shaper_takes_the_oldest_command_for_older_ones() -> None:
     new = Fir([0.25] * 4)
     new.copy_state(old)
     assert new.step(1.0) == pytest.approx((1.0 + 0.8 + 0.2 + 0.2) / 4)
+    stretchable = Fir([0.25] * 4)
+    stretchable.lengthen(6)  # longer than its taps
+    stretchable.copy_state(old)
+    assert stretchable.step(1.0) == pytest.approx((1.0 + 0.8 + 0.2 + 0.2) / 4)
     shorter = Fir([1.0])
     shorter.copy_state(old)
     assert shorter.step(0.4) == 0.4

@@ -45,18 +45,16 @@ def test_s_curve_on_a_restless_joystick_stays_within_the_joystick() -> None:
 EXACT = {"tick_s": 0.5, "rate_per_s": 8.0, "jerk_per_s2": 2.0}
 
 
-def test_s_curve_from_rest_begins_with_one_step_of_the_slope() -> None:
+@pytest.mark.parametrize(
+    ("commands", "expected"),
+    [
+        ((8.0, 8.0, 8.0), [0.5, 1.5, 3.0]),  # from rest it begins with one step of the slope
+        ((0.5, 8.0, 8.0), [0.5, 1.0, 2.0]),  # where it has arrived it begins from rest again
+        ((8.0, 8.0, 1.5), [0.5, 1.5, 2.0]),  # met by the joystick in motion it slows by the jerk
+    ],
+)
+def test_s_curve_changes_its_slope_by_the_jerk(
+    commands: tuple[float, ...], expected: list[float]
+) -> None:
     curve = SCurve(**EXACT)
-    assert [curve.step(8.0) for _ in range(3)] == [0.5, 1.5, 3.0]
-
-
-def test_s_curve_that_has_arrived_is_at_rest() -> None:
-    """The next move begins from rest again, not with what the arrival was made with."""
-    curve = SCurve(**EXACT)
-    assert [curve.step(command) for command in (0.5, 8.0, 8.0)] == [0.5, 1.0, 2.0]
-
-
-def test_s_curve_does_not_stop_dead_where_the_joystick_meets_it() -> None:
-    """The joystick comes back to just where the output is, in motion: it slows down by the jerk."""
-    curve = SCurve(**EXACT)
-    assert [curve.step(command) for command in (8.0, 8.0, 1.5)] == [0.5, 1.5, 2.0]
+    assert [curve.step(command) for command in commands] == expected

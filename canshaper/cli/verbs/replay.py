@@ -44,8 +44,8 @@ MOST_EVENTS = 12
 
 
 def replay(
-    log: Path = typer.Argument(..., help="A black box or another bundle (.zip);"
-    " .log, .asc, .blf, .trc, .csv, .txt, .pcap, .db, .mcap, .mf4, see docs/replay.md."),
+    log: Path = typer.Argument(..., help="A black box or another bundle (.zip), or"
+    " a log of CAN frames such as .log, .asc, .blf: all formats are in docs/replay.md."),
     configs: list[str] | None = typer.Option(
         None, "--config", metavar="FILE", help="Deployment; twice for two side by side. A bundle"
         " has its own."

@@ -138,9 +138,14 @@ def beaten_by(row: Row, table: list[Row]) -> Row | None:
 
 
 def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, str]]:
-    """Return a row and a sentence with its reason for each of "fast", "balanced" and "calm".
+    """Return the filter to take by three priorities: its row, and a sentence with the reason.
 
-    A row always exists: the candidate "off" never dips.
+    All three leave out filters that an operator feels dip (``FELT_DIP``); "off" never does. "fast"
+    stops soonest, "balanced" leaves least of those that stop in time, "calm" leaves least.
+
+    Args:
+        table: rows of the comparison, one of them "off".
+        period_s: period of the swing.
     """
     off = next(r for r in table if r.name == "off")
     even = [r for r in table if r.dip <= FELT_DIP]

@@ -51,7 +51,12 @@ class Verdict:
         return "useless" if self.useless else "poor" if self.left > GOOD else "good"
 
     def with_cure(self, left: float, change: str) -> Self:
-        """Return a copy with this change as first cure if it is needed and helps, else itself."""
+        """Return a copy with ``change`` as first cure, if the verdict needs one and it helps.
+
+        Args:
+            left: share of the swing that is left with the change.
+            change: the change, as the subject of a sentence.
+        """
         if self.left <= GOOD or left >= _HELPS * self.left:
             return self
         text = f"{change} would leave {100.0 * left:.1f} %"

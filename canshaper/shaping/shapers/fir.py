@@ -55,7 +55,7 @@ class Fir:
 
     def copy_state(self, old: "Fir") -> None:
         """Copy the commands that another filter has seen; its oldest stands for older ones."""
-        count = len(self.taps)
+        count = self._history.maxlen or 0
         seen = [*old._history, *[old._history[-1]] * count]
         self._history.extend(seen[:count])
 
@@ -157,6 +157,7 @@ KINDS = (
         _zv,
         lambda _mode, _tick_s: {"ZV": {}},
         needs_sway=True,
+        runs_ahead=False,
     ),
     ShaperKind(
         "zvd",
@@ -164,6 +165,7 @@ KINDS = (
         _zvd,
         lambda _mode, _tick_s: {"ZVD": {}},
         needs_sway=True,
+        runs_ahead=False,
     ),
     ShaperKind(
         "ei",
@@ -172,6 +174,7 @@ KINDS = (
         lambda _mode, _tick_s: {"EI 5 %": {"residual_pct": 5.0}},
         (Parameter("residual_pct", 0.1, 20, "%", "swing left at the nominal period", default=5.0),),
         needs_sway=True,
+        runs_ahead=False,
     ),
     ShaperKind(
         "two_mode",
@@ -185,5 +188,6 @@ KINDS = (
             Parameter("damping_ratio", 0, 0.95, "", "damping ratio of the second mode"),
         ),
         needs_sway=True,
+        runs_ahead=False,
     ),
 )

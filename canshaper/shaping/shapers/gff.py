@@ -119,7 +119,7 @@ def poles_from_denominator(a1: float, a2: float) -> tuple[float, float]:
 
 
 def denominator_from_poles(poles_rad_s: tuple[float, float]) -> tuple[float, float]:
-    """Coefficients (a1, a2) of the denominator with these two negative poles."""
+    """Return (a1, a2) of 1 + a1 s + a2 s^2 with these two negative poles."""
     p, q = poles_rad_s
     return -(1.0 / p + 1.0 / q), 1.0 / (p * q)
 
@@ -204,5 +204,6 @@ KINDS = (
         interpolable=_by_poles,
         follows=_followed,
         designed_by="tune",
+        runs_ahead=True,
     ),
 )

@@ -6,7 +6,7 @@ The schema of the deployment file, ``build_shaper``, the table in docs/deploymen
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from canshaper.shaping.sway import SwayMode
@@ -94,6 +94,8 @@ class ShaperKind:
             where the filter needs the sway; raises ValueError where the parameters make none.
         settings: returns, for sway mode and tick (s) of an axis, the settings that ``canshaper
             compare`` drives, by their names there; the tests build them too.
+        runs_ahead: whether the output may travel farther than the demand by more than 0.4 s of full
+            speed, as one that damps swing may; the gate allows it 1.5 s or more.
         parameters: parameters of the filter in the file.
         needs_sway: ``build`` gets the axis' sway model, which the axis steps with what was sent.
         needs_valve_rate: ``build`` also gets ``valve_rate_per_s``, full speeds per second.
@@ -106,8 +108,6 @@ class ShaperKind:
         follows: returns the parameters that the filter has while it follows a rope to ``factor``
             times the period, by ``follow(factor)``; None where it cannot follow.
         designed_by: verb of ``canshaper`` that finds the parameters, "" without one.
-        runs_ahead: whether the output travels farther ahead of the demand than 0.4 s of full speed,
-            as to damp swing; the gate has its own table for this package, others must say it.
 
     Raises:
         ValueError: a name is no word, is reserved, or stands twice.
@@ -133,6 +133,7 @@ class ShaperKind:
     summary: str
     build: Callable[..., Shaper]
     settings: Callable[[SwayMode, float], Mapping[str, Parameters]]
+    runs_ahead: bool = field(kw_only=True)
     parameters: tuple[Parameter, ...] = ()
     needs_sway: bool = False
     needs_valve_rate: bool = False
@@ -142,7 +143,6 @@ class ShaperKind:
     stretched: Callable[[Parameters, float], Parameters] | None = None
     follows: Callable[[Parameters, float], Parameters] | None = None
     designed_by: str = ""
-    runs_ahead: bool | None = None
 
     def __post_init__(self) -> None:
         names = [parameter.name for parameter in self.parameters]

@@ -42,16 +42,7 @@ class LimitAware:
     """
 
     spreads = True
-    __slots__ = (
-        "_gff",
-        "_pole",
-        "_rate",
-        "_shaper",
-        "_sway",
-        "_table",
-        "_twin",
-        "_unlimited",
-    )
+    __slots__ = ("_gff", "_pole", "_rate", "_shaper", "_sway", "_table", "_twin", "_unlimited")
 
     def __init__(self, sway: SwayModel, shaper: Fir, rate_per_s: float = math.inf) -> None:
         omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
@@ -155,11 +146,7 @@ class LimitAware:
 
 
 def _robust(
-    sway: SwayModel,
-    *,
-    taps: Sequence[float],
-    valve_rate_per_s: float,
-    tick_ms: float | None = None,
+    sway: SwayModel, *, taps: Sequence[float], valve_rate_per_s: float, tick_ms: float | None = None
 ) -> Shaper:
     if tick_ms is not None and tick_ms != round(1000.0 * sway.tick_s):
         raise ValueError(
@@ -199,5 +186,6 @@ KINDS = (
         designed_by="robust",
         stretched=_stretched,
         follows=_stretched,
+        runs_ahead=True,
     ),
 )

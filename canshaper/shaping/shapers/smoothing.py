@@ -83,6 +83,7 @@ KINDS = (
         FirstOrder,
         lambda mode, _tick_s: {"first order": {"time_constant_s": 0.3 * mode.period_s}},
         (Parameter("time_constant_s", 0.01, 5, "s", "time to 63 % of a step"),),
+        runs_ahead=False,
     ),
     ShaperKind(
         "s_curve",
@@ -97,5 +98,6 @@ KINDS = (
                 "jerk_per_s2", 0.2, 1000, "full speeds per s^2", "fastest change of the rate"
             ),
         ),
+        runs_ahead=False,
     ),
 )
